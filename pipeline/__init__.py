@@ -1,0 +1,1 @@
+"""From a folder of photos and forces to a report of the bending stiffness characteristic."""

@@ -1,0 +1,1 @@
+"""From a specimen folder to checked records: ``folder`` reads specimen.toml, ``forcelog`` reads force.csv."""

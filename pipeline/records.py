@@ -1,0 +1,197 @@
+"""Frozen records that travel between the rooms of the pipeline; right once made. SI units, unless the name says px.
+
+folder -> `Specimen` -> photos -> `Centerline` (or `Rejected`, a value); force log -> `LoadStep`.
+Pixel coordinates: (0, 0) is the centre of the top-left pixel of the photo as displayed (after EXIF orientation).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.measurement import MeasuredShape
+
+Array = NDArray[np.float64]
+Level = Literal["info", "warning", "error"]
+Branch = Literal["mounted", "loading", "unloading"]
+Side = Literal["left", "right"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something a reader of the report must know: a stable code, a level and one sentence."""
+
+    code: str
+    level: Level
+    message: str
+
+
+@dataclass(frozen=True)
+class Board:
+    """Chessboard of a calibration photo: inner corners per row and column, side of a square in m (measured)."""
+
+    columns: int
+    rows: int
+    square_m: float
+    charuco: bool = False
+    marker_m: float | None = None
+
+
+@dataclass(frozen=True)
+class CameraSpec:
+    """Where the scale comes from; the first that is given counts. All None: bearings and log, or markers."""
+
+    scale_px_per_m: float | None = None
+    calibration: Path | None = None
+    board: Board | None = None
+    distance_m: float | None = None       # camera to calibration plane, for the height of the cable axis
+
+
+@dataclass(frozen=True)
+class RigSpec:
+    """The bending machine: which bearing moves, how its axes are found, which sign of force is compression."""
+
+    moving_bearing: Side = "left"
+    marker_diameter_m: float | None = None
+    bearings_px: tuple[tuple[float, float], tuple[float, float]] | None = None
+    force_sign: Literal["compression", "tension"] = "compression"
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """One displacement step of the force log: a hold with its force samples and the photo taken in it.
+
+    ``force_N`` is the force at the time of the photo (compression positive), ``force_std_N`` its standard deviation
+    from the samples of the hold. ``times_s`` may be empty where the log has no time.
+    """
+
+    step: int
+    branch: Branch
+    displacement_m: float
+    force_N: float
+    force_std_N: float
+    photo_time_s: float | None
+    times_s: Array
+    forces_N: Array
+    image: str | None
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A specimen folder, read and checked; nothing measured yet.
+
+    ``images`` maps the name relative to the folder (as in the log) to the path of an existing file; a photo named in
+    the log whose file is missing stays out of it and is a finding. ``hashes`` are SHA-256 by relative name.
+    """
+
+    id: str
+    folder: Path
+    length_m: float
+    diameter_m: float
+    camera: CameraSpec
+    rig: RigSpec
+    steps: tuple[LoadStep, ...]
+    images: dict[str, Path]
+    description: dict[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    hashes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Pixels to metres on the plane of the cable axis, and where that came from."""
+
+    px_per_m: float
+    std_relative: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A reduced picture of the photo for people: JPEG bytes, and displayed px = preview px * ``reduction``.
+
+    ``strip``: JPEG of the cable straightened along its centerline (arc length to the right), magnified across.
+    """
+
+    jpeg: bytes
+    width: int
+    height: int
+    reduction: float
+    strip: bytes | None = None
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A photo that was not measured: a stable code, the reason in one sentence, the figure that shows why."""
+
+    image: str
+    code: str
+    reason: str
+    preview: Preview | None = None
+    figure: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Centerline:
+    """The cable on one photo: curve in the chord frame with covariance, and where it lies on the photo.
+
+    Attributes
+    ----------
+    image : str
+        Name relative to the specimen folder.
+    shape : MeasuredShape
+        Chord frame, metres; see there. ``n`` points from the left to the right bearing axis.
+    u_px, v_px : (n,) px
+        The same points on the photo as displayed.
+    kappa_std : (n,) 1/m
+    position_std : (n,) m
+        Along the normal.
+    chord_m, chord_std_m : m
+        Distance of the bearing axes, std without the common scale error.
+    traced_length_m, traced_length_std_m : m
+        Arc length from axis to axis.
+    left_px, right_px : (u, v) px
+        Bearing axes; ``axis_std_px`` the standard deviation of each coordinate.
+    width_m, width_std_m : m
+        Measured width of the cable and its scatter along s, to be held against the diameter.
+    mirrored : bool
+        True if the bow points up on the photo (y of the chord frame is against the v axis).
+    quality : dict
+        Figures a person may want: contrast_to_noise, blur_px, noise, correlation_px, edge_asymmetry, ...
+    findings : tuple of Finding
+    preview : Preview or None
+    """
+
+    image: str
+    shape: MeasuredShape
+    u_px: Array
+    v_px: Array
+    kappa_std: Array
+    position_std: Array
+    chord_m: float
+    chord_std_m: float
+    traced_length_m: float
+    traced_length_std_m: float
+    left_px: tuple[float, float]
+    right_px: tuple[float, float]
+    axis_std_px: float
+    width_m: float
+    width_std_m: float
+    mirrored: bool
+    quality: dict[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    preview: Preview | None = None
+
+
+@dataclass(frozen=True)
+class Traces:
+    """What the vision stage makes of a specimen: one outcome per photo, in the order of the steps, and the scale."""
+
+    photos: tuple[Centerline | Rejected, ...]
+    scale: Scale
+    findings: tuple[Finding, ...] = ()

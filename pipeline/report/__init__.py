@@ -1,0 +1,1 @@
+"""From a result to files people and programs read: html, csv, index."""

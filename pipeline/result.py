@@ -1,0 +1,296 @@
+"""The result of one specimen: ``result.json`` as a typed record, and its published schema.
+
+``result.json`` is at once the cache, the provenance record, the report's only source and what the Python API returns.
+SI units; the unit stands in every name. Arrays are plain lists so that any program reads them.
+The parts fixed by the contract (schema, specimen, photos, inverse, balance, agreement, diagnosis, findings, provenance)
+keep their names; more stands beside them.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA = "cablebend/result/1"
+
+Floats = list[float]
+
+
+class Part(BaseModel):
+    """Base of all parts: frozen, no unknown keys, NaN and infinity written as null by whoever fills it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+class SpecimenPart(Part):
+    """The cable and the rig, as given."""
+
+    id: str
+    length_m: float
+    diameter_m: float
+    folder: str
+    moving_bearing: str
+    description: dict[str, str] = {}
+
+
+class PreviewPart(Part):
+    """Reduced photo for the report: base64 JPEG; displayed px = preview px * reduction."""
+
+    jpeg_base64: str
+    width: int
+    height: int
+    reduction: float
+    strip_base64: str | None = None
+
+
+class PhotoPart(Part):
+    """One photo: traced (with its centerline) or rejected (with the reason)."""
+
+    image: str
+    step: int
+    status: Literal["traced", "rejected", "missing"]
+    reason: str | None = None
+    code: str | None = None
+    chord_m: float | None = None
+    chord_std_m: float | None = None
+    traced_length_m: float | None = None
+    traced_length_std_m: float | None = None
+    width_m: float | None = None
+    width_std_m: float | None = None
+    left_px: tuple[float, float] | None = None
+    right_px: tuple[float, float] | None = None
+    mirrored: bool | None = None
+    s_m: Floats = []
+    x_m: Floats = []
+    y_m: Floats = []
+    u_px: Floats = []
+    v_px: Floats = []
+    theta_rad: Floats = []
+    kappa_per_m: Floats = []
+    kappa_std_per_m: Floats = []
+    seen: list[bool] = []
+    kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m")
+    shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal, at s_m")
+    shape_residual_std_m: Floats = Field([], description="its standard deviation: photo noise, correlated")
+    quality: dict[str, float] = {}
+    preview: PreviewPart | None = None
+
+
+class ScalePart(Part):
+    """Scale of the photos and how it was cross-checked."""
+
+    px_per_mm: float
+    std_relative: float
+    source: str
+
+
+class StepPart(Part):
+    """One displacement step: measured and simulated force."""
+
+    step: int
+    branch: str
+    displacement_m: float
+    force_N: float
+    force_std_N: float
+    force_fit_N: float | None = None
+    image: str | None = None
+
+
+class Curve(Part):
+    """A characteristic on a grid: moment and both readings with pointwise 1-sigma bands, on the visited range."""
+
+    kappa_per_m: Floats
+    moment_Nm: Floats
+    moment_std_Nm: Floats
+    tangent_Nm2: Floats
+    tangent_std_Nm2: Floats
+    secant_Nm2: Floats
+    secant_std_Nm2: Floats
+    supported: list[bool]
+
+
+class KnotPart(Part):
+    """A control point of the natural cubic spline, tangent reading."""
+
+    kappa_per_m: float
+    tangent_Nm2: float
+    std_Nm2: float
+
+
+class MisfitPart(Part):
+    """How well the fitted simulation explains the data, in units and in sigma."""
+
+    force_rmse_N: float
+    shape_rmse_m: float
+    curvature_rmse_per_m: float | None = None
+    chi2: float
+    degrees_of_freedom: float
+    chi2_by_block: dict[str, tuple[float, float]] = Field({}, description="chi2 and number of data by block")
+
+
+class InversePart(Part):
+    """Way one: simulate the experiment and fit."""
+
+    reading: Literal["tangent"] = "tangent"
+    outcome: str
+    advice: str = ""
+    converged: bool
+    iterations: int = 0
+    pre_curvature_per_m: float | None = None
+    pre_curvature_std_per_m: float | None = None
+    supported_per_m: tuple[float, float] | None = None
+    knots: list[KnotPart] = []
+    knots_chosen_by: str = ""
+    curve: Curve | None = None
+    misfit: MisfitPart | None = None
+    nuisance: dict[str, tuple[float, float]] = Field({}, description="fitted value and std, e.g. scale, length")
+    branches: dict[str, Curve] = Field({}, description="loading and unloading fitted apart")
+
+
+class PointwisePart(Part):
+    """The paper's (kappa, f_EI)-graph of one photo, Eq. (14) point by point."""
+
+    step: int
+    kappa_per_m: Floats
+    tangent_Nm2: Floats
+
+
+class BalancePart(Part):
+    """Way two: balance equations, no simulation."""
+
+    outcome: str
+    advice: str = ""
+    pre_curvature_per_m: float | None = None
+    pre_curvature_std_per_m: float | None = None
+    supported_per_m: tuple[float, float] | None = None
+    curve: Curve | None = None
+    points_kappa_per_m: Floats = []
+    points_moment_Nm: Floats = []
+    pointwise: list[PointwisePart] = []
+    checks: dict[str, float] = Field({}, description="left against right half, photo against photo: z or p")
+
+
+class AgreementPart(Part):
+    """Both ways compared as the same quantity on the range both visited."""
+
+    quantity: Literal["tangent"] = "tangent"
+    rms_relative: float | None = None
+    max_relative: float | None = None
+    compatible: bool | None = None
+    p_value: float | None = None
+    level: float = 0.05
+    range_per_m: tuple[float, float] | None = None
+    pre_curvature: dict[str, tuple[float, float]] = Field({}, description="K0 and std: photo, balance, inverse")
+    hints: list[str] = []
+
+
+class CausePart(Part):
+    """A named cause with its class of twins, probability and estimate."""
+
+    name: str
+    class_: Annotated[list[str], Field(alias="class")] = []
+    probability: float
+    estimate: float
+    std: float
+    unit: str
+
+
+class CauseRow(Part):
+    """One row of the table of causes; see `pipeline.diagnosis`."""
+
+    name: str
+    z: float
+    p_adjusted: float
+    estimate: float
+    std: float
+    unit: str
+    minimal_detectable: float | None = None
+    surviving_fraction: float
+    nearest_twin: str = ""
+    twin_cosine: float = 0.0
+    delta_chi2: float | None = None
+    heldout_excess_removed: float | None = None
+    stiffness_shift: float | None = None
+
+
+class GainPart(Part):
+    """What the extension bought, on steps it had not seen."""
+
+    heldout_excess_removed: float
+    ci95: tuple[float, float]
+    force_rmse_N: tuple[float, float]
+    shape_rmse_m: tuple[float, float]
+
+
+class BlindSpot(Part):
+    """A cause that cannot be seen here but would hurt."""
+
+    name: str
+    stiffness_bias_at_plausible_size: float
+    settled_by: str
+
+
+class NextExperiment(Part):
+    """The cheapest measurement that separates what is confused."""
+
+    what: str
+    separates: list[str]
+
+
+class DiagnosisPart(Part):
+    """What the simulation gets wrong, and why."""
+
+    verdict: Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"]
+    headline: str
+    causes: list[CausePart] = []
+    table: list[CauseRow] = []
+    gain: GainPart | None = None
+    blind_spots: list[BlindSpot] = []
+    next_experiment: NextExperiment | None = None
+    extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
+    leftover: dict[str, Any] | None = None
+    residuals_before: dict[str, Any] | None = Field(None, description="map over s and step, in sigma")
+    residuals_after: dict[str, Any] | None = None
+    twins: dict[str, dict[str, float]] = Field({}, description="cosines of confusable causes")
+
+
+class FindingPart(Part):
+    """Something a reader must know."""
+
+    code: str
+    level: Literal["info", "warning", "error"]
+    message: str
+
+
+class Result(Part):
+    """Everything measured on one specimen."""
+
+    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = SCHEMA
+    status: Literal["measured", "partial", "failed"]
+    headline: str = ""
+    specimen: SpecimenPart
+    scale: ScalePart | None = None
+    photos: list[PhotoPart] = []
+    steps: list[StepPart] = []
+    inverse: InversePart | None = None
+    balance: BalancePart | None = None
+    agreement: AgreementPart | None = None
+    diagnosis: DiagnosisPart | None = None
+    findings: list[FindingPart] = []
+    provenance: dict[str, Any] = {}
+
+
+def to_json(result: Result) -> str:
+    """Text of ``result.json``: contract names, no NaN, one line per top-level entry not guaranteed."""
+    return result.model_dump_json(by_alias=True, indent=1)
+
+
+def from_json(text: str) -> Result:
+    """Read ``result.json`` back; raises ``pydantic.ValidationError`` for anything that is not one."""
+    return Result.model_validate_json(text)
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema of ``result.json``, published as ``result.schema.json``."""
+    return Result.model_json_schema(by_alias=True)

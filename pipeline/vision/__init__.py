@@ -1,0 +1,1 @@
+"""From photos to arc-length-parametrised centerlines with curvature and true error bars."""

@@ -1,0 +1,125 @@
+"""What the bending test tells the mechanics: one record per displacement step, SI units, no pixels.
+
+Axes: the chord frame. Origin at the left bearing axis, x along the line through both axes, y toward the bow, so the
+curvature of a cable bent to its natural side is positive. Force ``P`` along the chord, positive in compression.
+
+Both ways to the bending stiffness characteristic read these records and nothing else of each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredShape:
+    """A centerline in the chord frame, as measured on one photo.
+
+    The curve ``x(s), y(s), theta(s), kappa(s)`` on ``n`` points is the smooth estimate of the vision stage. Its errors
+    are linear in ``p`` parameters with joint covariance: ``d normal = basis_normal @ dq`` and so on, where "normal"
+    is the displacement along the normal ``(-sin theta, cos theta)``.
+    The ``k`` sections are the raw midline points of the visible cable, before smoothing.
+
+    Attributes
+    ----------
+    s, x, y : (n,) m
+        Arc length from the left bearing axis and position.
+    theta : (n,) rad
+    kappa : (n,) 1/m
+    seen : (n,) bool
+        False where the cable lies under a bearing cover and was extended by the model.
+    basis_normal : (n, p) m, basis_theta : (n, p) rad, basis_kappa : (n, p) 1/m
+        Derivatives with respect to the parameters q of the curve.
+    covariance : (p, p)
+        Of q, systematic part included.
+    section_s, section_x, section_y : (k,) m
+        Raw midline points.
+    section_std : (k,) m
+        Standard deviation of a section along the normal, correlated along s.
+    correlation_length : m
+        Of the section errors: correlation exp(-ds / correlation_length).
+    systematic_std : m
+        Slowly varying sideways error common to neighbouring sections (light), not reduced by averaging.
+    systematic_length : m
+        Its correlation length along s.
+    """
+
+    s: Array
+    x: Array
+    y: Array
+    theta: Array
+    kappa: Array
+    seen: NDArray[np.bool_]
+    basis_normal: Array
+    basis_theta: Array
+    basis_kappa: Array
+    covariance: Array
+    section_s: Array
+    section_x: Array
+    section_y: Array
+    section_std: Array
+    correlation_length: float
+    systematic_std: float
+    systematic_length: float
+
+
+@dataclass(frozen=True)
+class MeasuredStep:
+    """Force, displacement and shape of one displacement step.
+
+    Attributes
+    ----------
+    step : int
+        Number in the force log.
+    branch : str
+        ``mounted``, ``loading`` or ``unloading``.
+    displacement : m or None
+        By the log, from the mounted position.
+    force, force_std : N
+        At the time of the photo; compression positive.
+    chord, chord_std : m or None
+        Distance of the bearing axes by the photo, and its standard deviation without the common scale error.
+    shape : MeasuredShape or None
+        None if the photo was rejected or is missing; the force still counts.
+    time : s or None
+    """
+
+    step: int
+    branch: str
+    displacement: float | None
+    force: float
+    force_std: float
+    chord: float | None = None
+    chord_std: float | None = None
+    shape: MeasuredShape | None = None
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class MeasuredTest:
+    """A whole bending test.
+
+    Attributes
+    ----------
+    length : m
+        Cable length between the bearing axes.
+    length_std : m
+    scale_std : relative
+        Common to all photos: every length on the photos may be off by this factor.
+    steps : tuple of MeasuredStep
+        In the order of the test.
+    moving : str
+        ``left`` or ``right``: the bearing that is pushed.
+    """
+
+    length: float
+    length_std: float
+    scale_std: float
+    steps: tuple[MeasuredStep, ...]
+    moving: str = "left"
+    notes: tuple[str, ...] = field(default=())
