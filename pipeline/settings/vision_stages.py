@@ -1,0 +1,50 @@
+"""Settings of the stages of ``vision`` before the sub-pixel measurement: unit in the name, reason in the description."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class StageSettings(BaseModel):
+    """Base of the stages: frozen, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PhotoSettings(StageSettings):
+    """Loading of photos."""
+
+    max_megapixels: float = Field(
+        120.0, gt=0, description="Mpx; a larger photo is refused before decoding: 12 bytes a pixel would pass 1.5 GB"
+    )
+    max_file_megabytes: float = Field(
+        800.0, gt=0, description="MB; a larger file is refused unread: 120 Mpx of 16-bit colour are 720 MB"
+    )
+    min_side_px: int = Field(32, ge=1, description="px; a smaller picture shows no cable of five widths and its ground")
+
+
+class CalibrationSettings(StageSettings):
+    """Scale and plane of the photos."""
+
+
+class SegmentationSettings(StageSettings):
+    """Search for the cable."""
+
+    min_contrast_to_noise: float = Field(
+        5.0, gt=0, description="ratio; below it the edges' errors stop being Gaussian and false edges win"
+    )
+
+
+class BearingSettings(StageSettings):
+    """Bearing covers and axes."""
+
+
+class SeriesSettings(StageSettings):
+    """Photos of one specimen together."""
+
+
+class PreviewSettings(StageSettings):
+    """Pictures for people."""
+
+    long_side_px: int = Field(1200, ge=200, description="px; as wide as a report's column on a dense screen")
+    jpeg_quality: int = Field(80, ge=10, le=100, description="percent; about 80 kB a photo without visible blocks")

@@ -1,0 +1,89 @@
+"""Pixels of the photo to metres on the plane of the cable axis, and back: points are carried, never pictures.
+
+``pixel (u, v) -> undistorted pixel (lens) -> plane (x, y) in m (homography) -> scaled about the foot of the camera (height)``
+
+Plane axes: right-handed as the pixel axes are (``x`` roughly along ``u``, ``y`` roughly along ``v``, downward on the
+photo), origin anywhere: only differences matter, the chord frame follows from the bearing axes.
+A plain scale is the trivial case, and a photo without any scale has one "metre" per pixel.
+
+Lens model: Brown-Conrady as in OpenCV; ``(u, v) = K distort(K^-1 (u', v'))``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.records import Array
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Camera matrix and distortion coefficients in the order of OpenCV (k1, k2, p1, p2, k3)."""
+
+    camera: Array
+    distortion: Array
+
+    def undistort(self, uv: Array) -> Array:
+        """Pixels ``(n, 2)`` a camera without distortion would have shown."""
+        # OpenCV's default of five fixed-point steps leaves 1e-3 px at 5 % distortion; forty leave nothing.
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
+        points = np.ascontiguousarray(uv, dtype=np.float64).reshape(-1, 1, 2)
+        ideal = cv2.undistortPointsIter(points, self.camera, self.distortion, None, self.camera, criteria)
+        return np.asarray(ideal, dtype=np.float64).reshape(-1, 2)
+
+    def distort(self, uv: Array) -> Array:
+        """Inverse of `undistort`."""
+        rays = np.linalg.solve(self.camera, np.column_stack([uv, np.ones(len(uv))]).T).T
+        shown, _ = cv2.projectPoints(rays.reshape(-1, 1, 3), np.zeros(3), np.zeros(3), self.camera, self.distortion)
+        return np.asarray(shown, dtype=np.float64).reshape(-1, 2)
+
+
+def _project(matrix: Array, points: Array) -> Array:
+    image = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    return np.asarray(image[:, :2] / image[:, 2:])
+
+
+@dataclass(frozen=True)
+class PlaneMap:
+    """Map between photo pixels and metres on the plane of the cable axis.
+
+    Attributes
+    ----------
+    homography : (3, 3)
+        From undistorted pixels to the plane in m.
+    lens : Lens or None
+    """
+
+    homography: Array
+    lens: Lens | None = None
+
+    @classmethod
+    def from_scale(cls, px_per_m: float) -> PlaneMap:
+        """Map of a camera looking straight down: one scale everywhere, origin at pixel (0, 0)."""
+        return cls(np.diag([1.0 / px_per_m, 1.0 / px_per_m, 1.0]))
+
+    def to_plane(self, uv: Array) -> Array:
+        """Points ``(n, 2)`` in m of photo pixels ``(n, 2)``."""
+        uv = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        return _project(self.homography, uv if self.lens is None else self.lens.undistort(uv))
+
+    def to_pixels(self, xy: Array) -> Array:
+        """Photo pixels ``(n, 2)`` of points ``(n, 2)`` in m; inverse of `to_plane`."""
+        uv = _project(np.linalg.inv(self.homography), np.atleast_2d(np.asarray(xy, dtype=np.float64)))
+        return uv if self.lens is None else self.lens.distort(uv)
+
+    def jacobian(self, uv: Array) -> Array:
+        """Derivative ``(n, 2, 2)`` of the plane point with respect to the pixel, m/px, by central differences.
+
+        The map is smooth over hundreds of pixels, so a step of one pixel leaves a relative error below 1e-6.
+        """
+        uv = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        columns = [(self.to_plane(uv + step) - self.to_plane(uv - step)) / 2.0 for step in np.eye(2)]
+        return np.stack(columns, axis=-1)
+
+    def local_scale(self, uv: Array) -> Array:
+        """Scale ``(n,)`` in px/m at photo pixels: inverse square root of the area of a pixel."""
+        return np.asarray(1.0 / np.sqrt(np.abs(np.linalg.det(self.jacobian(uv)))))

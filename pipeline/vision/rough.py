@@ -1,0 +1,94 @@
+"""What the search for the cable hands to the sub-pixel measurement: a cable found to about a pixel, and why to trust it.
+
+Pixel coordinates ``(u, v)`` are those of the photo as displayed; (0, 0) is the centre of the top-left pixel, ``u`` runs
+right, ``v`` down. Grey values are fractions of the photo's full range (0 black, 1 white) along one colour projection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records import Array, Finding
+
+AxisKind = Literal["cover", "given", "end", "clamp"]
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A bearing axis on the photo and how it was found.
+
+    Attributes
+    ----------
+    center_px : (u, v) px
+    std_px : px
+        Standard deviation of each coordinate of the axis.
+    radius_px : px or None
+        Of the round cover; None where no cover was measured. The cable is not seen within it.
+    radius_std_px : px or None
+    kind : str
+        ``cover``: centre of the round cover; ``given``: pixels of the user; ``end``: visible end of the cable;
+        ``clamp``: the cable disappears in a larger object there.
+    """
+
+    center_px: tuple[float, float]
+    std_px: float
+    radius_px: float | None = None
+    radius_std_px: float | None = None
+    kind: AxisKind = "cover"
+
+
+@dataclass(frozen=True)
+class RoughCable:
+    """The cable on one photo, to about a pixel.
+
+    Attributes
+    ----------
+    image : str
+        Name relative to the specimen folder.
+    path_px : (k, 2) px
+        Polyline ``(u, v)`` from the left to the right bearing axis, smooth, points about evenly spaced (at most a quarter
+        of the cable's width apart). Where the cable is seen it lies within about a tenth of the width of the midline.
+    visible : (first, last)
+        Indices into ``path_px``, both included: the part in which the cable is seen. Outside, the path runs straight to
+        the bearing axis and carries no information.
+    left, right : Bearing
+    half_width_px : px
+        Half the width of the cable's mask, median along the cable.
+    grey : (h, w) float32
+        Window of the photo around the cable, projected to one grey value.
+    origin_px : (u, v) px
+        Photo pixel of ``grey[0, 0]``: photo pixel ``(u, v)`` is ``grey[v - origin_px[1], u - origin_px[0]]``.
+    dark : bool
+        True if the cable is darker than the ground in ``grey``.
+    contrast : grey
+        Median step between ground and cable, positive.
+    noise : grey
+        Standard deviation of one pixel: sensor noise and fine texture, without what varies slowly.
+    blur_px : px
+        Standard deviation of the edge spread, estimated on the window's edges along the cable.
+    weights : tuple of float
+        Colour projection: weight of each channel as stored (one for grey photos).
+    quality : dict
+        Figures for the report: contrast_to_noise, width_scatter, ...
+    findings : tuple of Finding
+    """
+
+    image: str
+    path_px: Array
+    visible: tuple[int, int]
+    left: Bearing
+    right: Bearing
+    half_width_px: float
+    grey: NDArray[np.float32]
+    origin_px: tuple[int, int]
+    dark: bool
+    contrast: float
+    noise: float
+    blur_px: float
+    weights: tuple[float, ...] = (1.0,)
+    quality: dict[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
