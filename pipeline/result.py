@@ -8,9 +8,12 @@ keep their names; more stands beside them.
 
 from __future__ import annotations
 
+from html import escape
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from pipeline.rounding import rounded
 
 SCHEMA = "cablebend/result/1"
 
@@ -108,6 +111,9 @@ class Curve(Part):
     secant_Nm2: Floats
     secant_std_Nm2: Floats
     supported: list[bool]
+    tangent_factor_Nm2: list[Floats] = Field(
+        [], description="F (n, r) with F F^T the covariance of tangent_Nm2 along the grid; empty if not known"
+    )
 
 
 class KnotPart(Part):
@@ -238,6 +244,16 @@ class NextExperiment(Part):
     separates: list[str]
 
 
+class ResidualMap(Part):
+    """Residuals over arc length and step, in standard deviations; null where there is no photo or no force."""
+
+    s_m: Floats
+    steps: list[int]
+    branches: list[str] = []
+    shape_sigma: list[list[float | None]]
+    force_sigma: list[float | None] = []
+
+
 class DiagnosisPart(Part):
     """What the simulation gets wrong, and why."""
 
@@ -250,7 +266,7 @@ class DiagnosisPart(Part):
     next_experiment: NextExperiment | None = None
     extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
     leftover: dict[str, Any] | None = None
-    residuals_before: dict[str, Any] | None = Field(None, description="map over s and step, in sigma")
+    residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
     residuals_after: dict[str, Any] | None = None
     twins: dict[str, dict[str, float]] = Field({}, description="cosines of confusable causes")
 
@@ -279,6 +295,30 @@ class Result(Part):
     diagnosis: DiagnosisPart | None = None
     findings: list[FindingPart] = []
     provenance: dict[str, Any] = {}
+
+    def _repr_html_(self) -> str:
+        """Show the result in a notebook: what was found, each number with its standard deviation."""
+        agreement = self.agreement.pre_curvature if self.agreement else {}
+        rows = [(f"pre-curvature K0, {way}", rounded(value, std) + " 1/m") for way, (value, std) in agreement.items()]
+        for way, part in (("inverse", self.inverse), ("balance", self.balance)):
+            if part is not None and part.curve is not None and part.curve.kappa_per_m:
+                rows += [(f"f_EI, {way}, at {kappa:.3g} 1/m", text) for kappa, text in _ends(part.curve)]
+        if self.diagnosis is not None:
+            rows.append((f"diagnosis: {self.diagnosis.verdict}", self.diagnosis.headline))
+        rows += [(finding.level, finding.message) for finding in self.findings if finding.level != "info"]
+        body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
+        title = f"{self.specimen.id}: {self.status}" + (f". {self.headline}" if self.headline else "")
+        return f"<table><caption>{escape(title)}</caption><tbody>{body}</tbody></table>"
+
+
+def _ends(curve: Curve) -> list[tuple[float, str]]:
+    """First and last supported point of a characteristic: curvature and tangent with its standard deviation."""
+    points = [i for i, supported in enumerate(curve.supported) if supported]
+    ends = (points[0], points[-1]) if points else ()
+    return [
+        (curve.kappa_per_m[i], rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i]) + " mN m²")
+        for i in ends
+    ]
 
 
 def to_json(result: Result) -> str:
