@@ -87,6 +87,14 @@ class MeasuredStep:
     shape : MeasuredShape or None
         None if the photo was rejected or is missing; the force still counts.
     time : s or None
+        Of the photo, same clock as ``hold_times``.
+    hold_times : (h,) s or None
+        Times of the force samples of this hold; None where the log has no time.
+    hold_forces : (h,) N or None
+        The force samples of this hold (compression positive); relaxation and drift are read from them.
+    picture_centre : (x, y) m or None
+        Where the centre of the picture lies in the chord frame of this photo: lens distortion and camera tilt are
+        counted from there.
     """
 
     step: int
@@ -98,6 +106,9 @@ class MeasuredStep:
     chord_std: float | None = None
     shape: MeasuredShape | None = None
     time: float | None = None
+    hold_times: Array | None = None
+    hold_forces: Array | None = None
+    picture_centre: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -115,6 +126,9 @@ class MeasuredTest:
         In the order of the test.
     moving : str
         ``left`` or ``right``: the bearing that is pushed.
+    notes : tuple of str
+    picture_half_diagonal : m or None
+        Half the diagonal of the picture on the plane of the cable.
     """
 
     length: float
@@ -123,3 +137,4 @@ class MeasuredTest:
     steps: tuple[MeasuredStep, ...]
     moving: str = "left"
     notes: tuple[str, ...] = field(default=())
+    picture_half_diagonal: float | None = None
