@@ -1,0 +1,371 @@
+"""The bending stiffness characteristic f_EI: from control points to the moment curve m(K, K0).
+
+A characteristic *is* its moment curve; tangent and secant are two readings of it, and every number called f_EI must say
+which one it is:
+
+    tangent  f = dm/dK            (Eqs. (5) and (14) of the paper)
+    secant   f = m / (K - K0)     (fixed point of the iteration of Sec. 2.3)
+
+They agree only for constant f or at K = K0. `Characteristic` is a natural cubic spline of f through control points
+(knots), continued linearly outside, in either reading; whichever is chosen, `moment`, `tangent`, `secant` and `energy`
+answer for the same object:
+
+    m(K, K0) = int_{K0}^{K} f dk            tangent reading
+    m(K, K0) = f(K) (K - K0)                secant reading
+    energy   = int_{K0}^{K} m dk            energy per length; Eq. (5) without its superfluous factor 1/2
+
+Signs and units: curvature ``K`` and pre-curvature ``K0`` in 1/m, positive in the direction of the bow; moment in N m
+with the sign of ``K - K0`` (for positive stiffness); f in N m^2; energy in N (J/m).
+
+Options: the abscissa of the spline is the curvature ``K`` itself (as in the paper) or the excess ``K - K0`` (a cable
+that was set to another shape keeps its law); ``even`` makes f an even function of the abscissa, for bending both ways.
+
+Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulation*, Secs. 2.3, 4 and 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+Array = NDArray[np.float64]
+Reading = Literal["tangent", "secant"]
+Abscissa = Literal["curvature", "excess"]
+
+
+class MomentCurve(Protocol):
+    """Anything that answers as a moment curve; `Characteristic` is the one built here.
+
+    All methods are vectorised: ``K`` (n,) in 1/m, ``K0`` scalar or (n,) in 1/m.
+    """
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Typical size of the stiffness, N m^2; used for scaling only."""
+
+    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Bending moment m(K, K0), N m."""
+
+    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Tangent dm/dK, N m^2."""
+
+    def moment_and_tangent(self, K: Array, K0: Array) -> tuple[Array, Array]:
+        """Both at once."""
+
+    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative dm/dK0, N m^2."""
+
+    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Energy per length int_{K0}^{K} m dk, N."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Piecewise polynomials of f and its first two primitives, and of the cardinal splines, over all segments.
+
+    ``breaks`` are the q spline knots; segment 0 lies below the first, segment q above the last. Coefficients are in
+    ``u - origin[segment]``, rising powers: f (4,), primitive F (5,), second primitive G (6,); with F = G = 0 at the
+    first break. ``cardinal`` holds the same for the unit ordinates: shape (6, q + 1, p).
+    """
+
+    breaks: Array
+    origin: Array
+    f: Array
+    F: Array
+    G: Array
+    cardinal_f: Array
+    cardinal_primitive: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Characteristic:
+    """Natural cubic spline f through control points, and the moment curve that it means.
+
+    Made by `from_ordinates`, `constant`, `from_table` or `from_law`.
+
+    Attributes
+    ----------
+    knots : (p,) 1/m
+        Increasing abscissae of the control points; with ``even`` not negative.
+    ordinates : (p,) N m^2
+    reading : {"tangent", "secant"}
+        What f means.
+    even : bool
+        f is an even function of the abscissa: the spline runs through the mirrored control points too.
+    abscissa : {"curvature", "excess"}
+        f depends on K, or on K - K0.
+    """
+
+    knots: Array
+    ordinates: Array
+    reading: Reading = "tangent"
+    even: bool = False
+    abscissa: Abscissa = "curvature"
+    _pieces: _Pieces = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        knots, ordinates = np.atleast_1d(self.knots).astype(float), np.atleast_1d(self.ordinates).astype(float)
+        if knots.ndim != 1 or knots.shape != ordinates.shape:
+            raise ValueError(f"knots {knots.shape} and ordinates {ordinates.shape} must be one-dimensional and equal")
+        if not (np.all(np.isfinite(knots)) and np.all(np.isfinite(ordinates))):
+            raise ValueError("knots and ordinates must be finite")
+        if np.any(np.diff(knots) <= 0.0):
+            raise ValueError("knots must increase")
+        if self.even and knots[0] < 0.0:
+            raise ValueError("an even characteristic takes knots >= 0")
+        if self.reading not in ("tangent", "secant") or self.abscissa not in ("curvature", "excess"):
+            raise ValueError(f"unknown reading {self.reading!r} or abscissa {self.abscissa!r}")
+        object.__setattr__(self, "knots", knots)
+        object.__setattr__(self, "ordinates", ordinates)
+        object.__setattr__(self, "_pieces", _pieces(knots, ordinates, self.even))
+
+    # Constructors -----------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_ordinates(
+        cls,
+        knots: ArrayLike,
+        ordinates: ArrayLike,
+        *,
+        reading: Reading = "tangent",
+        even: bool = False,
+        abscissa: Abscissa = "curvature",
+    ) -> Characteristic:
+        """Spline through the control points ``(knots, ordinates)``, 1/m and N m^2, in the given reading."""
+        return cls(np.asarray(knots, float), np.asarray(ordinates, float), reading, even, abscissa)
+
+    @classmethod
+    def constant(cls, bending_stiffness: float) -> Characteristic:
+        """Linear cable: f = ``bending_stiffness`` (EI, N m^2) everywhere, both readings."""
+        return cls(np.zeros(1), np.array([bending_stiffness], float))
+
+    @classmethod
+    def from_law(
+        cls,
+        law: Callable[[Array], ArrayLike],
+        knots: ArrayLike,
+        *,
+        reading: Reading = "tangent",
+        even: bool = False,
+        abscissa: Abscissa = "curvature",
+    ) -> Characteristic:
+        """Spline through the values of a function ``law(knots)``, N m^2, of the abscissa in 1/m."""
+        at = np.asarray(knots, float)
+        ordinates = np.broadcast_to(np.asarray(law(at), float), at.shape)
+        return cls(at, ordinates.copy(), reading, even, abscissa)
+
+    @classmethod
+    def from_table(
+        cls,
+        kappa: ArrayLike,
+        moment: ArrayLike,
+        *,
+        knots: ArrayLike | int = 5,
+        pre_curvature: float | None = None,
+        reading: Reading = "tangent",
+        even: bool = False,
+        abscissa: Abscissa = "curvature",
+    ) -> Characteristic:
+        """Least-squares spline through a table of curvature and moment, which may hold measured noise.
+
+        Parameters
+        ----------
+        kappa : (n,) 1/m
+        moment : (n,) N m
+        knots : (p,) 1/m, or int
+            Abscissae of the control points, or their number, equally spaced over the table; at most n.
+        pre_curvature : 1/m or None
+            Curvature of zero moment. The tangent reading over the curvature does without (the zero of the moment is
+            fitted along); the secant reading and the abscissa ``excess`` need it.
+
+        Raises
+        ------
+        ValueError
+            For a table that does not determine the control points, or a missing ``pre_curvature``.
+        """
+        K, m = np.asarray(kappa, float).ravel(), np.asarray(moment, float).ravel()
+        if K.shape != m.shape:
+            raise ValueError(f"kappa {K.shape} and moment {m.shape} differ in length")
+        free_zero = pre_curvature is None
+        if free_zero and (reading == "secant" or abscissa == "excess"):
+            raise ValueError("the secant reading and the abscissa 'excess' need pre_curvature")
+        K0 = float(K[np.argmin(np.abs(m))]) if pre_curvature is None else float(pre_curvature)
+        u = K - K0 if abscissa == "excess" else K
+        u = np.abs(u) if even else u
+        at = np.linspace(u.min(), u.max(), knots) if isinstance(knots, int) else np.asarray(knots, float)
+        unit = cls(at, np.ones_like(at), reading, even, abscissa)
+        columns = unit.moment_by_ordinates(K, K0)
+        scales = np.max(np.abs(columns), axis=0, initial=0.0)
+        if free_zero:
+            columns = np.column_stack([columns, np.full(K.size, scales.max(initial=0.0))])
+        scales = np.max(np.abs(columns), axis=0, initial=0.0)
+        if np.any(scales == 0.0) or np.linalg.matrix_rank(columns / scales) < columns.shape[1]:
+            raise ValueError(f"a table of {K.size} rows does not determine {at.size} control points")
+        solution = np.linalg.lstsq(columns / scales, m, rcond=None)[0] / scales
+        return cls(at, solution[: at.size], reading, even, abscissa)
+
+    def with_ordinates(self, ordinates: ArrayLike) -> Characteristic:
+        """Same knots and conventions with other ``ordinates`` (p,) N m^2."""
+        return Characteristic(self.knots, np.asarray(ordinates, float), self.reading, self.even, self.abscissa)
+
+    # The moment curve -------------------------------------------------------------------------------------------------
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Largest control point in absolute value, N m^2; used for scaling only."""
+        return float(np.max(np.abs(self.ordinates)))
+
+    def f(self, u: ArrayLike) -> Array:
+        """The spline itself at the abscissa ``u`` (n,) 1/m, N m^2, in its own reading."""
+        return _evaluate(self._pieces.f, self._pieces, np.asarray(u, float))
+
+    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Bending moment m(K, K0), N m, shape of ``K`` broadcast with ``K0``."""
+        u, u0, D = self._arguments(K, K0)
+        if self.reading == "secant":
+            return np.asarray(self.f(u) * D)
+        F = self._pieces.F
+        return np.asarray(_evaluate(F, self._pieces, u) - _evaluate(F, self._pieces, u0))
+
+    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Tangent reading dm/dK, N m^2."""
+        u, _, D = self._arguments(K, K0)
+        if self.reading == "tangent":
+            return self.f(u) + np.zeros_like(D)
+        return np.asarray(self.f(u) + _slope(self._pieces, u) * D)
+
+    def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
+        u, u0, D = self._arguments(K, K0)
+        if self.reading == "secant":
+            return self.f(u) + np.zeros_like(D)
+        # Mean of f over [u0, u]. Where the interval is short the difference of primitives loses digits, and Simpson's
+        # rule is exact (f is a cubic there) but for a knot inside, whose share is of the order of interval^3.
+        span = max(float(np.ptp(self._pieces.breaks)), float(np.max(np.abs(u - u0), initial=0.0)))
+        short = np.abs(D) <= 1e-4 * span
+        simpson = (self.f(u0) + 4.0 * self.f(0.5 * (u + u0)) + self.f(u)) / 6.0
+        return np.where(short, simpson, self.moment(K, K0) / np.where(short, 1.0, D))
+
+    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Energy per length int_{K0}^{K} m dk, N: Eq. (5) with the factor 1/2 taken out."""
+        u, u0, D = self._arguments(K, K0)
+        p = self._pieces
+        rise = _evaluate(p.G, p, u) - _evaluate(p.G, p, u0)
+        if self.reading == "secant":
+            return np.asarray(_evaluate(p.F, p, u) * D - rise)
+        return np.asarray(rise - _evaluate(p.F, p, u0) * D)
+
+    def moment_and_tangent(self, K: Array, K0: Array) -> tuple[Array, Array]:
+        """`moment` and `tangent` with one look-up of the segments: the call inside Newton's method."""
+        p = self._pieces
+        u = K - K0 if self.abscissa == "excess" else K
+        segment = np.searchsorted(p.breaks, u)
+        t = u - p.origin[segment]
+        if self.reading == "secant":
+            c0, c1, c2, c3 = p.f[:, segment]
+            f = ((c3 * t + c2) * t + c1) * t + c0
+            D = K - K0
+            return f * D, f + ((3.0 * c3 * t + 2.0 * c2) * t + c1) * D
+        c0, c1, c2, c3, c4 = p.F[:, segment]
+        F0 = _evaluate(p.F, p, np.zeros(()) if self.abscissa == "excess" else K0)
+        m = (((c4 * t + c3) * t + c2) * t + c1) * t + (c0 - F0)
+        return m, ((4.0 * c4 * t + 3.0 * c3) * t + 2.0 * c2) * t + c1
+
+    def moment_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of the moment with respect to the control points, (n, p) in 1/m; exact, m is linear in them."""
+        u, u0, D = self._arguments(K, K0)
+        p = self._pieces
+        if self.reading == "secant":
+            return np.asarray(_evaluate(p.cardinal_f, p, u) * np.broadcast_to(D, np.shape(D))[..., None])
+        rise = _evaluate(p.cardinal_primitive, p, u) - _evaluate(p.cardinal_primitive, p, u0)
+        return np.asarray(np.broadcast_to(rise, (*np.shape(D), self.knots.size)))
+
+    def tangent_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of the tangent dm/dK with respect to the control points, (n, p), dimensionless."""
+        u, _, D = self._arguments(K, K0)
+        p = self._pieces
+        value = np.broadcast_to(_evaluate(p.cardinal_f, p, u), (*np.shape(D), self.knots.size))
+        if self.reading == "tangent":
+            return value.copy()
+        return np.asarray(value + _slope(p, u, cardinal=True) * D[..., None])
+
+    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative dm/dK0, N m^2 (negative for positive stiffness)."""
+        u, u0, D = self._arguments(K, K0)
+        if self.abscissa == "excess":
+            return -self.tangent(K, K0)
+        return -self.f(u if self.reading == "secant" else u0) + np.zeros_like(D)
+
+    def _arguments(self, K: ArrayLike, K0: ArrayLike) -> tuple[Array, Array, Array]:
+        """Abscissae of the state and of rest, and the excess K - K0."""
+        K_, K0_ = np.asarray(K, float), np.asarray(K0, float)
+        D = np.asarray(K_ - K0_)
+        if self.abscissa == "excess":
+            return D, np.zeros(()), D
+        return K_, K0_, D
+
+
+def _pieces(knots: Array, ordinates: Array, even: bool) -> _Pieces:
+    """Coefficients of f, F, G and of the cardinal splines on every segment, the linear ends included."""
+    p = knots.size
+    at, pick = knots, np.eye(p)
+    if even:
+        inner = knots > 0.0
+        at = np.concatenate([-knots[inner][::-1], knots])
+        pick = np.vstack([pick[inner][::-1], pick])
+    q = at.size
+    f = np.zeros((4, q + 1, p))
+    if q == 1:
+        f[0] = pick
+    elif q == 2:
+        slope = (pick[1] - pick[0]) / (at[1] - at[0])
+        f[0], f[1] = pick[[0, 0, 1]], slope
+    else:
+        spline = CubicSpline(at, pick, bc_type="natural")
+        f[:, 1:-1] = spline.c[::-1]
+        f[0, 0], f[0, -1] = pick[0], pick[-1]
+        f[1, 0], f[1, -1] = spline(at[0], 1), spline(at[-1], 1)
+    origin = at[np.r_[0, np.arange(q)]]
+    F = np.zeros((5, q + 1, p))
+    F[1:] = f / np.arange(1, 5)[:, None, None]
+    G = np.zeros((6, q + 1, p))
+    # Constants of integration: F = G = 0 at the first break, both continuous through all breaks.
+    for j in range(2, q + 1):
+        t = origin[j] - origin[j - 1]
+        F[0, j] = _horner(F[:, j - 1], t)
+    G[1:] = F / np.arange(1, 6)[:, None, None]
+    for j in range(2, q + 1):
+        t = origin[j] - origin[j - 1]
+        G[0, j] = _horner(G[:, j - 1], t)
+    return _Pieces(at, origin, f @ ordinates, F @ ordinates, G @ ordinates, f, F)
+
+
+def _horner(coefficients: Array, t: float) -> Array:
+    value = coefficients[-1]
+    for c in coefficients[-2::-1]:
+        value = value * t + c
+    return np.asarray(value)
+
+
+def _evaluate(coefficients: Array, pieces: _Pieces, u: Array) -> Array:
+    """Piecewise polynomial at ``u``; with cardinal coefficients (k, q + 1, p) the result has a last axis p."""
+    segment = np.searchsorted(pieces.breaks, u)
+    t = u - pieces.origin[segment]
+    if coefficients.ndim == 3:
+        t = t[..., None]
+    value = coefficients[-1][segment]
+    for c in coefficients[-2::-1]:
+        value = value * t + c[segment]
+    return np.asarray(value)
+
+
+def _slope(pieces: _Pieces, u: Array, cardinal: bool = False) -> Array:
+    """Derivative f'(u), N m^3, or that of the cardinal splines (n, p)."""
+    c = pieces.cardinal_f if cardinal else pieces.f
+    weights = np.arange(1, 4).reshape((3,) + (1,) * (c.ndim - 1))
+    return _evaluate(c[1:] * weights, pieces, u)
