@@ -54,8 +54,8 @@ class MomentCurve(Protocol):
     def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Tangent dm/dK, N m^2."""
 
-    def moment_and_tangent(self, K: Array, K0: Array) -> tuple[Array, Array]:
-        """Both at once."""
+    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2."""
@@ -260,21 +260,27 @@ class Characteristic:
             return np.asarray(_evaluate(p.F, p, u) * D - rise)
         return np.asarray(rise - _evaluate(p.F, p, u0) * D)
 
-    def moment_and_tangent(self, K: Array, K0: Array) -> tuple[Array, Array]:
-        """`moment` and `tangent` with one look-up of the segments: the call inside Newton's method."""
-        p = self._pieces
-        u = K - K0 if self.abscissa == "excess" else K
-        segment = np.searchsorted(p.breaks, u)
-        t = u - p.origin[segment]
-        if self.reading == "secant":
-            c0, c1, c2, c3 = p.f[:, segment]
-            f = ((c3 * t + c2) * t + c1) * t + c0
+    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """`moment` and `tangent` as one function of K (n,) for fixed pre-curvature (n,) or (1,): Newton's inner call.
+
+        One look-up of the segments, 12 microseconds for 100 points.
+        """
+        p, excess, secant = self._pieces, self.abscissa == "excess", self.reading == "secant"
+        table = np.vstack([p.f, p.F])
+        rest = _evaluate(p.F, p, np.zeros(1) if excess else K0)
+
+        def moment_and_tangent(K: Array) -> tuple[Array, Array]:
             D = K - K0
-            return f * D, f + ((3.0 * c3 * t + 2.0 * c2) * t + c1) * D
-        c0, c1, c2, c3, c4 = p.F[:, segment]
-        F0 = _evaluate(p.F, p, np.zeros(()) if self.abscissa == "excess" else K0)
-        m = (((c4 * t + c3) * t + c2) * t + c1) * t + (c0 - F0)
-        return m, ((4.0 * c4 * t + 3.0 * c3) * t + 2.0 * c2) * t + c1
+            u = D if excess else K
+            segment = p.breaks.searchsorted(u)
+            t = u - p.origin.take(segment)
+            f0, f1, f2, f3, F0, F1, F2, F3, F4 = table.take(segment, axis=1)
+            f = ((f3 * t + f2) * t + f1) * t + f0
+            if secant:
+                return f * D, f + ((3.0 * f3 * t + 2.0 * f2) * t + f1) * D
+            return (((F4 * t + F3) * t + F2) * t + F1) * t + (F0 - rest), f
+
+        return moment_and_tangent
 
     def moment_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment with respect to the control points, (n, p) in 1/m; exact, m is linear in them."""
@@ -354,7 +360,7 @@ def _horner(coefficients: Array, t: float) -> Array:
 
 def _evaluate(coefficients: Array, pieces: _Pieces, u: Array) -> Array:
     """Piecewise polynomial at ``u``; with cardinal coefficients (k, q + 1, p) the result has a last axis p."""
-    segment = np.searchsorted(pieces.breaks, u)
+    segment = pieces.breaks.searchsorted(u)
     t = u - pieces.origin[segment]
     if coefficients.ndim == 3:
         t = t[..., None]

@@ -1,0 +1,81 @@
+"""Moment curves in closed form: cables whose truth is no spline, for tests, demonstrations and designs of experiments.
+
+A law answers as `rod.characteristic.MomentCurve`: K and K0 in 1/m to moment in N m, tangent in N m^2, energy in N.
+
+`StickSlip` is the usual picture of a cable whose wires stick to each other while hardly bent (stiffness EI0) and slip
+when bent more (EI1 < EI0): f(K) = EI1 + (EI0 - EI1) / cosh^2((K - K0) / kc), tangent reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rod.characteristic import Array
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """m = EI1 D + (EI0 - EI1) kc tanh(D / kc) with D = K - K0.
+
+    Attributes
+    ----------
+    EI0, EI1 : N m^2
+        Stiffness at rest and far from it.
+    kc : 1/m
+        Curvature change over which the wires come to slip; positive.
+    """
+
+    EI0: float
+    EI1: float
+    kc: float
+
+    def __post_init__(self) -> None:
+        if not self.kc > 0.0:
+            raise ValueError(f"kc must be positive, got {self.kc}")
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Larger of the two stiffnesses, N m^2."""
+        return max(abs(self.EI0), abs(self.EI1))
+
+    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Bending moment, N m."""
+        D = np.asarray(K, float) - np.asarray(K0, float)
+        return np.asarray(self.EI1 * D + (self.EI0 - self.EI1) * self.kc * np.tanh(D / self.kc))
+
+    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Tangent dm/dK, N m^2."""
+        D = np.asarray(K, float) - np.asarray(K0, float)
+        return np.asarray(self.EI1 + (self.EI0 - self.EI1) * (1.0 - np.tanh(D / self.kc) ** 2))
+
+    def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Secant m / (K - K0), N m^2, with its limit EI0 at rest."""
+        D = np.asarray(K, float) - np.asarray(K0, float)
+        rest = np.abs(D) < 1e-8 * self.kc  # tanh(x)/x = 1 - x^2/3: the limit is exact to the last digit there
+        return np.where(rest, self.EI0, self.moment(K, K0) / np.where(rest, 1.0, D))
+
+    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of K alone that returns moment and tangent."""
+        slip = self.EI0 - self.EI1
+
+        def moment_and_tangent(K: Array) -> tuple[Array, Array]:
+            D = K - K0
+            t = np.tanh(D / self.kc)
+            return self.EI1 * D + (slip * self.kc) * t, self.EI1 + slip * (1.0 - t * t)
+
+        return moment_and_tangent
+
+    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative dm/dK0 = -dm/dK, N m^2."""
+        return -self.tangent(K, K0)
+
+    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Energy per length, N."""
+        D = np.asarray(K, float) - np.asarray(K0, float)
+        u = np.abs(D) / self.kc
+        log_cosh = u + np.log1p(np.exp(-2.0 * u)) - np.log(2.0)
+        return np.asarray(0.5 * self.EI1 * D**2 + (self.EI0 - self.EI1) * self.kc**2 * log_cosh)
