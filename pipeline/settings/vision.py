@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline.settings.vision_curve import CurveSettings
 from pipeline.settings.vision_stages import (
     BearingSettings,
     CalibrationSettings,
@@ -23,5 +24,6 @@ class VisionSettings(BaseModel):
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)
     segmentation: SegmentationSettings = Field(default_factory=SegmentationSettings)
     bearings: BearingSettings = Field(default_factory=BearingSettings)
+    curve: CurveSettings = Field(default_factory=CurveSettings)
     series: SeriesSettings = Field(default_factory=SeriesSettings)
     preview: PreviewSettings = Field(default_factory=PreviewSettings)

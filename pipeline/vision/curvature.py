@@ -1,0 +1,298 @@
+"""Curve through points along a cable: a penalised spline of the curvature, integrated twice, with joint covariance.
+
+    kappa(s) = sum_j c_j B_j(s),   theta(s) = theta_a + int kappa ds,
+    (x, y)(s) = (x, y)_a + int (cos theta, sin theta) ds
+
+``s`` runs along the curve, ``kappa = d theta / ds`` in the axes of the points, whatever they are; lengths in any one
+unit. ``B_j`` are cubic B-splines on evenly spaced knots over the whole range, the parts without points included: there
+the curve is continued by the penalty, with the uncertainty that follows from it.
+
+Parameters ``q = (offset, turn, c_1 .. c_J)``: displacement of the anchor (mid-range) along its normal, its angle, the
+spline. The anchor moves along its normal only, else the curve could slide along itself. Gauss-Newton on the distances
+along the normal; each linear step is a penalised least-squares problem, whitened for errors with correlation
+``exp(-ds/l)`` and solved by QR of the stacked ``[R; sqrt(mu) D]``.
+The penalty ``int (d^k kappa / ds^k)^2 ds`` has its weight, and the noise its correlation length, by restricted maximum
+likelihood; what is left open about the weight goes into the covariance.
+
+Never is ``kappa`` or its slope forced at the ends: moment-free ends carry ``kappa = K0`` with a finite slope.
+
+Source: O'Sullivan (1986) for the penalty; Patterson and Thompson (1971) and Wahba (1983) for REML and the posterior
+covariance; the reasons for a spline of the curvature are measured in the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from pipeline.records import Array
+from pipeline.vision.smoothing import Smooth, smooth
+
+DEGREE = 3
+_CELLS = 8  # cells of quadrature per knot interval: Simpson leaves 1e-9 of the length at a turn of 0.3 rad per interval
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Knots with everything that depends on them alone.
+
+    Attributes
+    ----------
+    knots : (J + 4,)
+    grid : (2 G + 1,)
+        Ends and middles of the cells of quadrature.
+    anchor : int
+        Index of the anchor in ``grid``; even.
+    values, integrals : (2 G + 1, J)
+        Splines and their integrals from the anchor.
+    penalty : (d, J)
+        Root of the penalty: ``|penalty @ c|^2 = int (d^k kappa / ds^k)^2 ds``.
+    """
+
+    knots: Array
+    grid: Array
+    anchor: int
+    values: Array
+    integrals: Array
+    penalty: Array
+
+    @property
+    def size(self) -> int:
+        """Number of parameters q."""
+        return int(self.values.shape[1]) + 2
+
+
+def make_frame(start: float, end: float, *, intervals: int, order: int, breaks: tuple[float, ...] = ()) -> Frame:
+    """Knots from ``start`` to ``end``; at each of ``breaks`` the slope of the curvature may jump (a point load).
+
+    Raises
+    ------
+    ValueError
+        If a break lies outside the range or ``intervals`` is below 4.
+    """
+    if intervals < 4 or not end > start:
+        raise ValueError("a curvature spline needs end > start and at least 4 intervals")
+    if any(not start < at < end for at in breaks):
+        raise ValueError("a break must lie inside the range")
+    inner = np.linspace(start, end, intervals + 1)[1:-1]
+    if breaks:  # no knot closer than half an interval to a break, which has multiplicity 3
+        gap = np.abs(inner[:, None] - np.asarray(breaks)).min(axis=1)
+        inner = np.sort(np.r_[inner[gap > 0.5 * (end - start) / intervals], np.repeat(breaks, DEGREE)])
+    knots = np.r_[[start] * (DEGREE + 1), inner, [end] * (DEGREE + 1)]
+    count = len(knots) - DEGREE - 1
+    spline = BSpline(knots, np.eye(count), DEGREE)
+    edges = np.unique(knots)
+    cells = [np.linspace(a, b, _CELLS + 1) for a, b in pairwise(edges)]
+    nodes = np.unique(np.concatenate(cells))
+    grid = np.empty(2 * len(nodes) - 1)
+    grid[::2], grid[1::2] = nodes, 0.5 * (nodes[1:] + nodes[:-1])
+    anchor = 2 * (len(nodes) // 2)
+    integral = spline.antiderivative()(grid)
+    return Frame(knots, grid, anchor, spline(grid), integral - integral[anchor], _penalty(spline, edges, order))
+
+
+def _penalty(spline: BSpline, edges: Array, order: int) -> Array:
+    abscissae, weights = np.polynomial.legendre.leggauss(max(1, DEGREE + 1 - order))  # exact for the square
+    half = 0.5 * np.diff(edges)
+    at = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * abscissae).ravel()
+    return np.asarray(np.sqrt(np.outer(half, weights)).ravel()[:, None] * spline.derivative(order)(at))
+
+
+@dataclass(frozen=True)
+class PlaneCurve:
+    """A curve: frame, spline coefficients ``(J,)``, point ``(2,)`` and angle of the anchor."""
+
+    frame: Frame
+    coefficients: Array
+    point: Array
+    angle: float
+
+    def curvature(self, s: Array) -> Array:
+        """Curvature at ``s`` (d theta / ds)."""
+        return np.asarray(BSpline(self.frame.knots, self.coefficients, DEGREE)(s))
+
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """Points ``(n, 2)`` and angles ``(n,)`` at ``s``; beyond the range the curve goes on straight."""
+        grid, theta = self.frame.grid, self.angle + self.frame.integrals @ self.coefficients
+        tangent = np.column_stack([np.cos(theta), np.sin(theta)])
+        nodes, points = grid[::2], self.point + _integrate(tangent, grid, self.frame.anchor)
+        inside = np.clip(s, nodes[0], nodes[-1])
+        cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
+        width = nodes[cell + 1] - nodes[cell]
+        t = ((inside - nodes[cell]) / width)[:, None]
+        h = width[:, None]
+        # Cubic Hermite in a cell: the tangents are known, its error is far below that of the quadrature.
+        where = (
+            points[cell] * (1 + 2 * t) * (1 - t) ** 2
+            + points[cell + 1] * t**2 * (3 - 2 * t)
+            + h * tangent[::2][cell] * t * (1 - t) ** 2
+            - h * tangent[::2][cell + 1] * t**2 * (1 - t)
+        )
+        # The angle by the parabola through both ends and the middle of the cell.
+        a, m, b = theta[2 * cell], theta[2 * cell + 1], theta[2 * cell + 2]
+        t = t[:, 0]
+        angle = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
+        beyond = (np.asarray(s) - inside)[:, None]
+        return where + beyond * np.column_stack([np.cos(angle), np.sin(angle)]), angle
+
+    def foot(self, points: Array, s: Array) -> Array:
+        """Arc length of the points' feet on the curve, from a guess ``s``; two Newton steps without curvature."""
+        for _ in range(3):
+            where, angle = self.at(s)
+            s = s + np.cos(angle) * (points[:, 0] - where[:, 0]) + np.sin(angle) * (points[:, 1] - where[:, 1])
+        return s
+
+    def bases(self, s: Array) -> tuple[Array, Array, Array]:
+        """Derivatives ``(n, J + 2)`` of normal displacement, angle and curvature at ``s`` with respect to q."""
+        frame = self.frame
+        theta = self.angle + frame.integrals @ self.coefficients
+        turns = np.column_stack([np.ones(len(theta)), frame.integrals])  # of the angle, by turn and coefficients
+        along_x = _integrate(-np.sin(theta)[:, None] * turns, frame.grid, frame.anchor)
+        along_y = _integrate(np.cos(theta)[:, None] * turns, frame.grid, frame.anchor)
+        nodes = frame.grid[::2]
+        inside = np.clip(s, nodes[0], nodes[-1])
+        cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
+        f = ((inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell]))[:, None]
+        _, angle = self.at(inside)
+        sin, cos = np.sin(angle)[:, None], np.cos(angle)[:, None]
+        moved = [a[cell] * (1 - f) + a[cell + 1] * f for a in (along_x, along_y)]
+        anchored = np.cos(angle - theta[frame.anchor])[:, None]
+        normal = np.column_stack([anchored, -sin * moved[0] + cos * moved[1]])
+        zero = np.zeros((len(inside), 1))
+        spline = turns[::2][cell] * (1 - f) + turns[::2][cell + 1] * f
+        values = np.asarray(BSpline.design_matrix(inside, frame.knots, DEGREE).toarray())
+        normal[:, 1:] += (np.asarray(s) - inside)[:, None] * spline
+        return normal, np.column_stack([zero, spline]), np.column_stack([zero, zero, values])
+
+    def moved(self, step: Array) -> PlaneCurve:
+        """The curve after a change ``(J + 2,)`` of q."""
+        at = self.angle
+        point = self.point + step[0] * np.array([-np.sin(at), np.cos(at)])
+        return PlaneCurve(self.frame, self.coefficients + step[2:], point, float(at + step[1]))
+
+
+def _integrate(values: Array, grid: Array, anchor: int) -> Array:
+    """Simpson's integral from the anchor to the nodes ``grid[::2]``, of values on ``grid``."""
+    cells = (values[:-2:2] + 4.0 * values[1::2] + values[2::2]) * ((grid[2::2] - grid[:-2:2]) / 6.0)[:, None]
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(cells, axis=0)])
+    return np.asarray(total - total[anchor // 2])
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A curve fitted to points, with what is known of its errors.
+
+    Attributes
+    ----------
+    curve : PlaneCurve
+    smooth : Smooth
+        Covariance of q and gain on the points' normal displacements.
+    points : (n, 2)
+    s : (n,)
+        Feet of the points.
+    residual : (n,)
+        Distances of the points along the normal, positive to the left of the curve.
+    weight : (n,)
+        Robust weight of each point; 1 for all that agree with their neighbours.
+    """
+
+    curve: PlaneCurve
+    smooth: Smooth
+    points: Array
+    s: Array
+    residual: Array
+    weight: Array
+
+
+def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
+    """Curve whose angle follows that of a polyline ``points`` ``(n, 2)`` at ``s``, smoothed firmly; a start only."""
+    step = np.diff(points, axis=0)
+    theta, middle = np.unwrap(np.arctan2(step[:, 1], step[:, 0])), 0.5 * (s[1:] + s[:-1])
+    spline = BSpline(frame.knots, np.eye(frame.size - 2), DEGREE).antiderivative()
+    at_anchor = spline(frame.grid[frame.anchor])
+    turns = np.column_stack([np.ones(len(middle)), spline(middle) - at_anchor])
+    weight = np.sqrt(np.hypot(*step.T))
+    penalty = np.column_stack([np.zeros(len(frame.penalty)), frame.penalty])
+    # A share of 1e-6 leaves wiggles longer than about a fifth of the range: the shape, not the noise of the polyline.
+    penalty *= 1e-3 * np.linalg.norm(turns * weight[:, None]) / np.linalg.norm(penalty)
+    rows = np.concatenate([turns * weight[:, None], penalty])
+    solution = np.linalg.lstsq(rows, np.r_[theta * weight, np.zeros(len(penalty))], rcond=None)[0]
+    curve = PlaneCurve(frame, solution[1:], np.zeros(2), float(solution[0]))
+    return PlaneCurve(frame, solution[1:], np.mean(points - curve.at(s)[0], axis=0), float(solution[0]))
+
+
+def fit_curve(
+    points: Array,
+    std: Array,
+    *,
+    start: PlaneCurve,
+    s: Array,
+    order: int,
+    longest: float,
+    correlation_length: float | None = None,
+    robust: float = 4.0,
+    iterations: int = 8,
+) -> CurveFit:
+    """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
+
+    Parameters
+    ----------
+    start : PlaneCurve
+        First guess, as `initial_curve` gives; carries the knots.
+    s : (n,)
+        Guess of the points' arc lengths, ascending.
+    order : int
+        Order of the penalised derivative of the curvature, as in `make_frame`.
+    longest : length
+        Bound of the correlation length: longer errors cannot be told from the curve.
+    robust : float
+        Points beyond this many standard deviations lose weight (Tukey's biweight, at 1.5 times it none).
+    """
+    curve, frame = start, start.frame
+    weight = np.ones(len(points))
+    length = correlation_length
+    smooth_: Smooth | None = None
+    for iteration in range(iterations):
+        s = curve.foot(points, s)
+        residual = _residual(curve, points, s)
+        normal = curve.bases(s)[0]
+        spread = 1.4826 * np.median(np.abs(residual / std))
+        if iteration:
+            weight = _biweight(residual / std, max(spread, 1e-12), robust)
+        data = residual + normal[:, 2:] @ curve.coefficients
+        # The correlation is settled once the curve is: twice is enough, each search costs a dozen factorisations.
+        length = correlation_length if iteration in (0, 2) else length
+        used = weight > 0.0
+        before = smooth_
+        smooth_ = smooth(
+            normal[used],
+            data[used],
+            penalty=frame.penalty,
+            null=2 + order,
+            std=(std / np.sqrt(np.maximum(weight, 1e-9)))[used],
+            position=s[used],
+            longest=longest,
+            correlation_length=length,
+        )
+        length = smooth_.correlation_length
+        step = smooth_.estimate - np.r_[0.0, 0.0, curve.coefficients]
+        curve = curve.moved(step)
+        if before is not None and iteration > 2 and np.max(np.abs(normal @ step)) < 1e-3 * spread * np.median(std):
+            break
+    assert smooth_ is not None
+    s = curve.foot(points, s)
+    return CurveFit(curve, smooth_, points, s, _residual(curve, points, s), weight)
+
+
+def _residual(curve: PlaneCurve, points: Array, s: Array) -> Array:
+    where, angle = curve.at(s)
+    return np.asarray(-np.sin(angle) * (points[:, 0] - where[:, 0]) + np.cos(angle) * (points[:, 1] - where[:, 1]))
+
+
+def _biweight(residual: Array, spread: float, limit: float) -> Array:
+    """Weights: 1 up to ``limit`` spreads, falling to 0 at 1.5 times it."""
+    beyond = np.clip((np.abs(residual) / spread - limit) / (0.5 * limit), 0.0, 1.0)
+    return np.asarray((1.0 - beyond**2) ** 2)

@@ -1,0 +1,167 @@
+"""Two sub-pixel edges of the sheath on sections across the cable.
+
+Strategy. A smooth path within a few pixels of the midline gives each pixel near the cable coordinates ``(s, t)``: along
+the path, and across it, positive to the right of the direction of travel as seen on the photo. Pixels are used as they
+are, at their true ``(s, t)``: nothing is interpolated, so errors stay independent and edges keep their blur.
+
+1. `search_edges`: on block means of the straightened strip, the pair of gradients that a cable of about the known width
+   would show. Searched from the expected edges, so highlights and text on the sheath do not compete.
+2. `fit_profiles`: per side, in windows along s with hundreds of pixels each: the whole edge profile
+   ``a + A Phi((t - t0)/w) + b_in ramp_in + b_out ramp_out`` with blur w and the ramps of shading (inside) and soft
+   shadow (outside), both blurred alike.
+3. `fit_edges`: per section with blur and ramps held, only place, level and step; all sections at once, Gauss-Newton
+   with robust weights.
+
+Grey values are turned so that the cable is dark. Lengths in px. Limits: one section across an edge of blur w with
+noise n and contrast A has a standard deviation of ``(n/A) sqrt(2 sqrt(pi) w)`` px.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from pipeline.records import Array
+from pipeline.settings.vision_curve import CurveSettings
+from pipeline.vision.curvature import PlaneCurve
+from pipeline.vision.edge_profile import Pixels
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Picture in which the cable is dark, and the photo pixel of its corner."""
+
+    grey: Float32
+    origin_px: tuple[int, int]
+
+
+def normals(angle: Array) -> Array:
+    """Unit normals ``(n, 2)``: direction of t."""
+    return np.column_stack([-np.sin(angle), np.cos(angle)])
+
+
+def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Array:
+    """Grey values ``(n, m)`` at sections ``s`` and offsets ``t``, bilinear; NaN outside the picture."""
+    where, angle = curve.at(s)
+    across = normals(angle)
+    u = where[:, :1] - ground.origin_px[0] + across[:, :1] * t
+    v = where[:, 1:] - ground.origin_px[1] + across[:, 1:] * t
+    return np.asarray(
+        cv2.remap(
+            ground.grey,
+            u.astype(np.float32),
+            v.astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=float("nan"),
+        ),
+        dtype=np.float64,
+    )
+
+
+@dataclass(frozen=True)
+class Found:
+    """Edges found by search: sections ``s``, offsets of both edges ``(n, 2)`` in px, usable sections."""
+
+    s: Array
+    edges: Array
+    usable: NDArray[np.bool_]
+
+
+def search_edges(
+    ground: Ground,
+    curve: PlaneCurve,
+    *,
+    span: tuple[float, float],
+    half_width: float,
+    tolerance: float,
+    settings: CurveSettings,
+) -> Found:
+    """Both edges on blocks along ``span``, to a few tenths of a pixel.
+
+    Parameters
+    ----------
+    half_width : px
+        Expected, from diameter and scale, or of the mask.
+    tolerance : relative
+        Of the expected width.
+    """
+    block = max(2, round(half_width / 4.0))
+    count = max(8, int((span[1] - span[0]) / block))
+    s = span[0] + (np.arange(count * block) + 0.5) * (span[1] - span[0]) / (count * block)
+    reach = np.ceil(half_width * (1.0 + 2.0 * settings.search_radii) + 4.0)
+    t = np.arange(-reach, reach + 1.0)
+    strip = straighten(ground, curve, s, t).reshape(count, block, len(t)).mean(axis=1)
+    rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
+    middle = _offset(np.nanmedian(rise, axis=0), t, half_width, tolerance, settings)
+    # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
+    sigma = settings.search_radii * half_width / 2.0 + 1.0
+    edges = np.empty((count, 2))
+    ok = np.isfinite(strip).all(axis=1)
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        near = np.exp(-0.5 * ((t - middle[side]) / sigma) ** 2)
+        score = np.where(ok[:, None], np.maximum(sign * rise, 0.0), 0.0) * near
+        edges[:, side] = _peak(score, t)
+        ok &= score.max(axis=1) > 0.0
+    return Found(s.reshape(count, block).mean(axis=1), edges, ok)
+
+
+def _offset(rise: Array, t: Array, half_width: float, tolerance: float, settings: CurveSettings) -> tuple[float, float]:
+    """The pair of a falling and a rising edge of about the right distance and place that stand out most."""
+    width = t[None, :] - t[:, None]
+    off = 0.5 * (t[None, :] + t[:, None])
+    prior = ((width / (2.0 * half_width) - 1.0) / tolerance) ** 2 + (off / (settings.search_radii * half_width)) ** 2
+    pair = np.sqrt(np.maximum(-rise[:, None], 0.0) * np.maximum(rise[None, :], 0.0)) * np.exp(-0.5 * prior)
+    first, second = np.unravel_index(int(np.nanargmax(pair)), pair.shape)
+    return float(t[first]), float(t[second])
+
+
+def _peak(score: Array, t: Array) -> Array:
+    """Place of the largest value of each row, refined by the parabola through its neighbours."""
+    at = np.clip(np.argmax(score, axis=1), 1, len(t) - 2)
+    rows = np.arange(len(score))
+    a, b, c = score[rows, at - 1], score[rows, at], score[rows, at + 1]
+    bend = np.where(a - 2 * b + c < 0.0, a - 2 * b + c, -np.inf)
+    return np.asarray(t[at] + np.clip(0.5 * (a - c) / bend, -0.5, 0.5))
+
+
+def edge_pixels(
+    ground: Ground,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    rows: int,
+    side: float,
+    half_width: float,
+    window: tuple[float, float],
+) -> Pixels:
+    """Pixels nearest to a grid about one edge: ``rows`` a section along s, one a px across.
+
+    Parameters
+    ----------
+    side : float
+        -1 or +1: sign of t of the edge.
+    half_width : px
+        Distance of the expected edge from the path.
+    window : (inside, outside) px
+    """
+    spacing = float(np.median(np.diff(s))) / rows
+    all_s = (s[:, None] + (np.arange(rows) - 0.5 * (rows - 1)) * spacing).ravel()
+    where, angle = curve.at(all_s)
+    across = side * normals(angle)
+    steps = np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0)
+    uv = where[:, None, :] + across[:, None, :] * (half_width + steps)[None, :, None]
+    index = np.rint(uv).astype(np.int64)
+    offset = np.einsum("nmk,nk->nm", index - where[:, None, :], across) - half_width
+    column, row = index[..., 0] - ground.origin_px[0], index[..., 1] - ground.origin_px[1]
+    height, width = ground.grey.shape
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    value = ground.grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float64)
+    value[~inside] = np.nan
+    return Pixels(offset.reshape(len(s), -1), value.reshape(len(s), -1))

@@ -1,0 +1,175 @@
+"""Midline of the cable from its two edges: sections with their errors, the width, and how far the light misleads them.
+
+A section's midpoint is the mean of its edges. An edge that contradicts its neighbours (text, dirt, an object beside the
+cable) is replaced by the other one and the local width; a section without any edge is left out.
+
+What the light does to both edges of a section alike (same direction on the photo) moves the midline slowly along s,
+and no averaging removes it. Its size is judged by three things seen on the photo itself:
+
+- how far the midline moves when ramps of shading and shadow are left out of the edge model;
+- how far the measured width, which is constant on the cable, changes slowly along s: independent edge errors that
+  change the width by w move the midline by w / 2;
+- the difference of the two edges' blur: an edge that is broader than the other by more than the lens explains is
+  shading or penumbra, and its place is open by half of that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pipeline.records import Array
+from pipeline.settings.vision_curve import CurveSettings
+from pipeline.vision.curvature import PlaneCurve
+from pipeline.vision.edge_profile import Edges, Profiles, fit_edges, fit_profiles
+from pipeline.vision.edges import Ground, edge_pixels, normals
+
+
+@dataclass(frozen=True)
+class Cover:
+    """Disc on the photo that hides the cable: centre (u, v) and radius with its margin, px."""
+
+    center: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class Sections:
+    """Measured sections across the cable, in px of the photo.
+
+    Attributes
+    ----------
+    s : (k,)
+        Along the path the sections were laid on.
+    first, second : (k, 2)
+        Edge points at negative and positive t.
+    middle : (k, 2)
+    std : (k,)
+        Of the midpoint along the normal, from the scatter of the pixels.
+    width, width_smooth : (k,)
+        Raw, and running median.
+    off_path : (k,)
+        Offset of the midpoint from the path.
+    systematic_std : px
+    share : float
+        Of the sections asked for, those that were measured.
+    profiles : (Profiles, Profiles)
+    contrast, noise, blur : float
+        Median step and scatter of pixels, grey; median edge blur, px.
+    asymmetry : float
+        Relative difference of the two edges' contrast.
+    """
+
+    s: Array
+    first: Array
+    second: Array
+    middle: Array
+    std: Array
+    width: Array
+    width_smooth: Array
+    off_path: Array
+    systematic_std: float
+    share: float
+    profiles: tuple[Profiles, Profiles]
+    contrast: float
+    noise: float
+    blur: float
+    asymmetry: float
+
+
+def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cover, ...]) -> NDArray[np.bool_]:
+    """Sections whose points at ``offset`` from the path on both sides lie outside every cover."""
+    where, angle = curve.at(s)
+    free = np.ones(len(s), dtype=bool)
+    for cover in covers:
+        for side in (-1.0, 1.0):
+            point = where + side * offset * normals(angle)
+            free &= np.hypot(*(point - np.asarray(cover.center)).T) > cover.radius
+    return free
+
+
+def measure_sections(
+    ground: Ground, curve: PlaneCurve, s: Array, *, half_width: float, blur: float, settings: CurveSettings
+) -> Sections | None:
+    """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
+    inside = min(settings.inside_radii * half_width, settings.longest_side_px)
+    outside = min(settings.outside_radii * half_width, settings.longest_side_px)
+    window = (max(inside, 2.5 * blur + 0.5), max(outside, 2.5 * blur + 0.5))
+    rows = max(1, int(np.median(np.diff(s))))
+    ramps = half_width >= settings.small_radius_px
+    sides: list[tuple[Profiles, Edges]] = []
+    for side in (-1.0, 1.0):
+        pixels = edge_pixels(ground, curve, s, rows=rows, side=side, half_width=half_width, window=window)
+        profiles = fit_profiles(pixels, s, windows=settings.profile_windows, ramps=ramps, blur=max(blur, 0.5))
+        sides.append((profiles, fit_edges(pixels, s, profiles)))
+    (profiles1, edges1), (profiles2, edges2) = sides
+    place = np.column_stack([edges1.place, edges2.place])
+    std = np.column_stack([edges1.std, edges2.std])
+    good = np.isfinite(place)
+    if np.count_nonzero(good.any(axis=1)) < 20 or good.sum(axis=0).min() < 10:
+        return None
+    place, std, good = _consistent(place, std, good)
+    keep = good.any(axis=1)
+    s, place, std = s[keep], place[keep], std[keep]
+    where, angle = curve.at(s)
+    across = normals(angle)
+    off = 0.5 * (place[:, 1] - place[:, 0])
+    width = place.sum(axis=1) + 2.0 * half_width
+    step = np.column_stack([edges1.step, edges2.step])[keep]
+    contrast = float(np.nanmedian(step))
+    sides_contrast = np.nanmedian(step, axis=0)
+    smooth_width = _running_median(width)
+    return Sections(
+        s=s,
+        first=where - (half_width + place[:, :1]) * across,
+        second=where + (half_width + place[:, 1:]) * across,
+        middle=where + off[:, None] * across,
+        std=0.5 * np.hypot(std[:, 0], std[:, 1]),
+        width=width,
+        width_smooth=smooth_width,
+        off_path=off,
+        systematic_std=_systematic(profiles1, profiles2, smooth_width, std),
+        share=float(np.mean(keep)),
+        profiles=(profiles1, profiles2),
+        contrast=contrast,
+        noise=float(np.median(np.r_[profiles1.noise, profiles2.noise])),
+        blur=float(np.median(np.r_[profiles1.blur, profiles2.blur])),
+        asymmetry=float(abs(sides_contrast[1] - sides_contrast[0]) / sides_contrast.mean()),
+    )
+
+
+def _running_median(values: Array, size: int = 15) -> Array:
+    return np.asarray(median_filter(values, size=min(size, len(values)), mode="nearest"))
+
+
+def _consistent(place: Array, std: Array, good: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Edges that contradict their neighbours replaced by the other edge and the local width."""
+    index = np.arange(len(place))
+    filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
+    local = np.column_stack([_running_median(p) for p in filled.T])
+    off = np.abs(filled - local)
+    limit = 6.0 * 1.4826 * np.median(off, axis=0) + 0.02  # px; a floor for pictures without noise
+    good = good & (off < limit)
+    width = local.sum(axis=1)
+    out, spread = filled.copy(), std.copy()
+    for side, other in ((0, 1), (1, 0)):
+        lost = ~good[:, side] & good[:, other]
+        out[lost, side] = width[lost] - filled[lost, other]
+        spread[lost, side] = (
+            2.0 * std[lost, other]
+        )  # the same error again, with the other sign: midpoint moves by all of it
+    return out, spread, good
+
+
+def _systematic(first: Profiles, second: Profiles, width: Array, std: Array) -> float:
+    """Standard deviation, px, of the slow sideways error of the midline; see the module's text."""
+    model = 0.5 * ((second.place - second.plain) - (first.place - first.plain))
+    # Half the width of the change between two models that both have some right: its standard deviation.
+    by_model = 0.5 * np.sqrt(np.mean(model**2))
+    noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
+    by_width = 0.5 * np.sqrt(max(np.var(width) - noise2, 0.0))
+    by_blur = 0.25 * np.sqrt(np.mean((second.blur - first.blur) ** 2))
+    return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2))
