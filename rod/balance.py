@@ -1,0 +1,283 @@
+"""Way two: from photos and forces to the characteristic by the balance equations, without any simulation (Sec. 5).
+
+Between moment-free bearings statics alone gives the bending moment, ``m(s) = P y(s)`` (Eq. 13), and the photo gives the
+curvature ``K(s)``. All points of all photos lie on one curve K(m) if the cable is uniform; its slope is the compliance,
+and the bending stiffness characteristic (tangent reading) is
+
+    f_EI(K) = dm/dK = 1 / c(m),    K(m) = K0 + int_0^m c dm'.
+
+Strategy: the paper differentiates m and K along s and divides (Eq. 14); that graph is kept for comparison
+(`rod.moment_points.pointwise_graph`), but it is 0/0 at mid-span and biased by noise. Here K is regressed on m, once
+over all photos and both halves. The moment is nearly free of error, so there is no attenuation; what error it has
+(force, bearing axes, scale, position) is carried into the covariance of the residual together with the joint covariance
+of the smooth curve. With that covariance the curvatures weigh as much as the positions behind them: no second
+derivative is taken. The compliance is a positive penalised spline (`rod.compliance`), fitted in
+`rod.moment_regression`.
+
+Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; SI units.
+
+Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulation*, Sec. 5, Eqs. (13), (14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.compliance import compliance_basis
+from rod.measurement import MeasuredTest
+from rod.moment_points import MomentPoints, moment_points
+from rod.moment_regression import (
+    BOW_TERMS,
+    MomentModel,
+    Regression,
+    assumption_checks,
+    regress,
+    uniform_at_rest,
+)
+
+Array = NDArray[np.float64]
+Source = tuple[str, int]
+
+
+class BalanceOutcome(Enum):
+    """How the balance way ended; the value is advice to the reader."""
+
+    MEASURED = "all photos and forces were laid on one curve of moment over curvature"
+    NO_PHOTO = (
+        "no loaded step has both a photo and a force, and the balance equations need both; check why the photos were "
+        "rejected"
+    )
+    NO_MOMENT = (
+        "the curvature does not grow with the moment; this usually means that the force log counts tension as positive "
+        "(set rig.force_sign) or that photos and forces are mixed up (check the column image)"
+    )
+    STALLED = (
+        "the regression did not settle; this usually means that one photo or force contradicts the others: compare the "
+        "points of the photos"
+    )
+
+
+@dataclass(frozen=True)
+class BalanceOptions:
+    """Numbers of the balance way, each with its reason.
+
+    Attributes
+    ----------
+    points : int
+        Points per photo: more than a curvature spline has parameters; further ones hold no new information.
+    coefficients : int
+        Splines of the compliance; the penalty decides the form, ten can follow any stick-slip law.
+    floor : relative
+        Curvature that no photo resolves, over the range met: the error of the smooth curve's own spline.
+    roughness : (low, high)
+        Range of the prior standard deviation of d^2 log c / dmu^2 that is averaged over: from a straight line to a law
+        that changes its stiffness tenfold within a third of the range.
+    grid : int
+        Points of the reported curve.
+    level : float
+        Significance of the test of uniform pre-curvature below which K0(s) is taken from the force-free photo.
+    iterations : int
+        Bound of the Gauss-Newton method; four or five are usual.
+    """
+
+    points: int = 60
+    coefficients: int = 10
+    floor: float = 2e-4
+    roughness: tuple[float, float] = (0.1, 60.0)
+    grid: int = 61
+    level: float = 0.01
+    iterations: int = 25
+
+
+def _none() -> Array:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class BalanceGraph:
+    """The characteristic by the balance equations, with bands; SI units.
+
+    Attributes
+    ----------
+    outcome : BalanceOutcome
+    pre_curvature, pre_curvature_std : 1/m
+        Zero of the moment, all photos.
+    loaded_pre_curvature, loaded_pre_curvature_std : 1/m
+        The same without the force-free photo: a witness of its own.
+    kappa : (n,) 1/m
+        Grid over the visited range.
+    moment, tangent, secant : (n,) N m, N m^2, N m^2
+        With ``moment_std``, ``tangent_std``, ``secant_std``.
+    log_covariance : (n, n)
+        Joint covariance of log(tangent) on the grid.
+    gains : dict
+        Response of log(tangent) on the grid to the sources of error, keyed ``("curve", step)`` (n, p),
+        ``("axes", step)`` (n, 2), ``("force", step)`` (n, 1), ``("scale", -1)`` (n, 1): what a comparison with another
+        way through the same data needs for the joint uncertainty.
+    points : tuple of MomentPoints
+    varying : (4,) 1/m
+        Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
+    checks : dict
+        See `rod.moment_regression.assumption_checks`; ``misfit_floor_per_m`` is the curvature within which the photos
+        obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
+    """
+
+    outcome: BalanceOutcome
+    pre_curvature: float = np.nan
+    pre_curvature_std: float = np.nan
+    loaded_pre_curvature: float = np.nan
+    loaded_pre_curvature_std: float = np.nan
+    kappa: Array = field(default_factory=_none)
+    moment: Array = field(default_factory=_none)
+    moment_std: Array = field(default_factory=_none)
+    tangent: Array = field(default_factory=_none)
+    tangent_std: Array = field(default_factory=_none)
+    secant: Array = field(default_factory=_none)
+    secant_std: Array = field(default_factory=_none)
+    log_covariance: Array = field(default_factory=_none)
+    gains: dict[Source, Array] = field(default_factory=dict)
+    points: tuple[MomentPoints, ...] = ()
+    varying: tuple[float, ...] = (0.0,) * BOW_TERMS
+    checks: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def measured(self) -> bool:
+        """True if there is a curve."""
+        return self.outcome is BalanceOutcome.MEASURED
+
+
+def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> BalanceGraph:
+    """Characteristic from moments ``P y`` and curvatures of all photos.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    options : BalanceOptions or None
+        None means the defaults.
+
+    Returns
+    -------
+    BalanceGraph
+        With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
+    """
+    options = options or BalanceOptions()
+    data = moment_points(test, points=options.points)
+    if not any(points.force != 0.0 for points in data):
+        return BalanceGraph(BalanceOutcome.NO_PHOTO, points=data)
+    kappa, m = np.concatenate([d.kappa for d in data]), np.concatenate([d.moment for d in data])
+    slope, intercept = (float(v) for v in np.polyfit(m, kappa, 1))
+    if not slope > 0.0:
+        return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
+    basis = compliance_basis(float(m.min()), float(m.max()), unit=slope, coefficients=options.coefficients)
+    floor = options.floor * slope * (basis.high - basis.low)
+    model = MomentModel(data, basis, test.scale_std, floor, options.roughness)
+    rest = next((d for d in data if d.force == 0.0), None)
+    start = intercept if rest is None else float(rest.kappa.mean())
+    at_rest = 1.0 if rest is None else uniform_at_rest(rest, floor)
+    model = replace(model, varying=at_rest < options.level)
+    fitted = _regress_in_spite_of_misfit(model, start, options)
+    if fitted is None:
+        return BalanceGraph(BalanceOutcome.STALLED, points=data)
+    blurred, found = fitted
+    checks = assumption_checks(model, found) | {"misfit_floor_per_m": blurred.floor}
+    if rest is not None:
+        checks["uniform_at_rest_p"] = at_rest
+    return _graph(blurred, found, checks, options.grid)
+
+
+def _regress_in_spite_of_misfit(
+    model: MomentModel, start: float, options: BalanceOptions
+) -> tuple[MomentModel, Regression] | None:
+    """Regression; where the photos contradict the one curve beyond their noise, with the contradiction as noise.
+
+    The floor of the curvature is raised until the residuals agree with it, so the band holds the contradiction, which
+    is reported by the checks. 4 per degree of freedom is far above what noise alone does with more than 20 of them.
+    """
+    photos_noise = model.floor
+    for _ in range(8):
+        found = regress(model, pre_curvature=start, iterations=options.iterations)
+        if found is not None:
+            chi2 = sum(float(row.value @ row.value) for row in found.rows)
+            # A raised floor is noise in every row, not only in those that the photo's noise fills.
+            all_rows = model.floor > photos_noise
+            rows = sum(float(row.value.size) if all_rows else row.informative for row in found.rows)
+            if chi2 <= 4.0 * max(rows - found.size, 1.0):
+                return model, found
+        model = replace(model, floor=4.0 * model.floor)
+    return None
+
+
+def _graph(model: MomentModel, found: Regression, checks: dict[str, float], points: int) -> BalanceGraph:
+    """Read moment, tangent and secant off the compliance on a grid of curvature, with bands by propagation."""
+    curve, p = found.curve, found.size
+    K0, scale = float(found.unknowns[p]), float(found.unknowns[p + 1])
+    met = np.concatenate([d.moment * (1.0 + scale) for d in model.data])
+    low, high = K0 + curve.excess(np.array([met.min(), met.max()]))
+    kappa = np.linspace(float(low), float(high), points)
+    m = curve.moment(kappa - K0)
+    f = 1.0 / curve.compliance(m)
+    # K = K0 + excess(m; a) at fixed K: dm = -f (dK0 + excess_a da), and log f = -log c(m; a) moves with a and m.
+    by_moment = np.zeros((m.size, found.unknowns.size))
+    by_moment[:, :p] = -f[:, None] * curve.excess_by_coefficients(m)
+    by_moment[:, p] = -f
+    by_log = -curve.log_slope(m)[:, None] * by_moment
+    by_log[:, :p] -= curve.basis.at(m)
+    # Secant m / (K - K0); within a thousandth of the range from K0 it is the tangent.
+    D = kappa - K0
+    near = np.abs(D) < 1e-3 * (kappa[-1] - kappa[0])
+    D = np.where(near, 1.0, D)
+    by_secant = by_moment / D[:, None]
+    by_secant[:, p] += m / D**2
+    by_secant = np.where(near[:, None], f[:, None] * by_log, by_secant)
+    covariance = found.posterior.covariance
+
+    def std(by: Array) -> Array:
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0)))
+
+    loaded, loaded_std = _loaded_pre_curvature(model, found)
+    return BalanceGraph(
+        outcome=BalanceOutcome.MEASURED,
+        pre_curvature=K0,
+        pre_curvature_std=float(np.sqrt(covariance[p, p])),
+        loaded_pre_curvature=loaded,
+        loaded_pre_curvature_std=loaded_std,
+        kappa=kappa,
+        moment=m,
+        moment_std=std(by_moment),
+        tangent=f,
+        tangent_std=f * std(by_log),
+        secant=np.where(near, f, m / D),
+        secant_std=std(by_secant),
+        log_covariance=by_log @ covariance @ by_log.T,
+        gains=_gains(model, found, by_log),
+        points=model.data,
+        varying=tuple(float(v) for v in found.unknowns[p + 2 :]),
+        checks=checks,
+    )
+
+
+def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source, Array]:
+    """Response of log(tangent) to every source of error: the estimate moves by -response J^T W d(residual)."""
+    gains: dict[Source, Array] = {("scale", -1): np.zeros((by_log.shape[0], 1))}
+    for data, row in zip(model.data, found.rows, strict=True):
+        response = -by_log @ found.posterior.response @ model.columns(data, row).T
+        for name, columns in row.by_source.items():
+            gains[name, data.step.step] = response @ row.whitener @ columns
+        gains["scale", -1] -= response @ row.jacobian[:, [found.size + 1]]
+    return gains
+
+
+def _loaded_pre_curvature(model: MomentModel, found: Regression) -> tuple[float, float]:
+    """K0 and its std by the loaded photos alone: the same linearisation without the rows of force-free photos."""
+    loaded = [k for k, d in enumerate(model.data) if d.force != 0.0]
+    if len(loaded) == len(model.data):
+        posterior = found.posterior
+    else:
+        value = np.concatenate([found.rows[k].value for k in loaded])
+        J = np.vstack([model.columns(model.data[k], found.rows[k]) for k in loaded])
+        posterior = replace(model, varying=False).posterior(found.unknowns, value, J)
+    return float(posterior.mean[found.size]), float(np.sqrt(posterior.covariance[found.size, found.size]))

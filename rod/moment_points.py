@@ -1,0 +1,168 @@
+"""Curvature against moment on each photo, and what moves those points: the data of the balance way.
+
+One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
+(Eq. 13). The residual against a compliance curve, ``rho = K - K0 - excess(m)``, is moved by the parameters of the
+smooth curve (through K and y together), by the force, by both bearing axes across the chord and by the scale of the
+photos; their derivatives here are the ingredients of its covariance.
+
+Axes and signs: chord frame of `rod.measurement`; SI units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.compliance import ComplianceCurve
+from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MomentPoints:
+    """Points of one photo.
+
+    Attributes
+    ----------
+    step : MeasuredStep
+    length : m
+        Traced length of the curve, axis to axis.
+    s : (n,) m
+    kappa : (n,) 1/m
+    y : (n,) m
+    force, force_std : N
+        Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
+    by_curve_kappa : (n, p) 1/m, by_curve_y : (n, p) m
+        Derivatives of curvature and y with respect to the curve's parameters, covariance `curve_covariance` (p, p).
+    by_axes_y : (n, 2) m
+        Derivative of y with respect to the sideways position of the left and right axis, each of std `axis_std`.
+    """
+
+    step: MeasuredStep
+    length: float
+    s: Array
+    kappa: Array
+    y: Array
+    force: float
+    force_std: float
+    by_curve_kappa: Array
+    by_curve_y: Array
+    curve_covariance: Array
+    by_axes_y: Array
+    axis_std: float
+
+    @property
+    def moment(self) -> Array:
+        """Bending moment P y, N m."""
+        return self.force * self.y
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Residual of one photo against a compliance curve, whitened, and its derivatives (all rows whitened).
+
+    `whitener` turns a change of the raw residual into whitened rows. ``by_source`` holds the raw derivatives with
+    respect to the sources of error ``curve`` (n, p), ``axes`` (n, 2), ``force`` (n, 1). ``informative`` is the number
+    of rows whose noise is the photo's: a curve of p parameters fills only p of n rows, the others hold the floor.
+    """
+
+    value: Array
+    jacobian: Array
+    whitener: Array
+    by_source: dict[str, Array]
+    informative: float
+
+
+def moment_points(test: MeasuredTest, *, points: int = 60) -> tuple[MomentPoints, ...]:
+    """Points of every step that has a photo, in the order of the test."""
+    return tuple(
+        _points_of(step, step.shape, points)
+        for step in test.steps
+        if step.shape is not None and np.count_nonzero(step.shape.seen) >= 8
+    )
+
+
+def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentPoints:
+    seen = np.flatnonzero(shape.seen)
+    keep = np.unique(np.round(np.linspace(0, seen.size - 1, min(points, seen.size))).astype(int))
+    at = seen[keep]
+    along = shape.s[at] / shape.s[-1]
+    mounted = step.branch == "mounted"
+    return MomentPoints(
+        step=step,
+        length=float(shape.s[-1]),
+        s=shape.s[at],
+        kappa=shape.kappa[at],
+        y=shape.y[at],
+        force=0.0 if mounted else step.force,
+        force_std=0.0 if mounted else step.force_std,
+        by_curve_kappa=shape.basis_kappa[at],
+        by_curve_y=np.cos(shape.theta[at])[:, None] * shape.basis_normal[at],
+        curve_covariance=shape.covariance,
+        by_axes_y=-np.column_stack([1.0 - along, along]),
+        axis_std=(step.chord_std or 0.0) / np.sqrt(2.0),
+    )
+
+
+def residual(
+    data: MomentPoints, curve: ComplianceCurve, pre_curvature: float, *, varying: Array, scale: float, floor: float
+) -> Residual:
+    """Whitened residual of one photo.
+
+    Parameters
+    ----------
+    varying : (n,) 1/m
+        K0(s) minus its mean.
+    scale : relative
+        Every length on the photos is to be multiplied by 1 + scale.
+    floor : 1/m
+        Standard deviation of the curvature that no photo resolves.
+
+    Returns
+    -------
+    Residual
+        Columns of the jacobian: coefficients of log c (p), K0, scale.
+    """
+    kappa, y = data.kappa / (1.0 + scale), data.y * (1.0 + scale)
+    m = data.force * y
+    c = curve.compliance(m)
+    rho = kappa - pre_curvature - varying - curve.excess(m)
+    stiff = (c * data.force)[:, None]
+    by_source = {
+        "curve": data.by_curve_kappa - stiff * data.by_curve_y,
+        "axes": -stiff * data.by_axes_y,
+        "force": -(c * y)[:, None],
+    }
+    covariance = by_source["curve"] @ data.curve_covariance @ by_source["curve"].T
+    covariance += data.axis_std**2 * by_source["axes"] @ by_source["axes"].T
+    covariance += data.force_std**2 * by_source["force"] @ by_source["force"].T
+    covariance[np.diag_indices_from(covariance)] += floor**2
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    columns = np.column_stack([-curve.excess_by_coefficients(m), -np.ones(m.size), -(kappa + c * m)])
+    informative = m.size - floor**2 * float(np.sum(whitener**2))
+    return Residual(whitener @ rho, whitener @ columns, whitener, by_source, informative)
+
+
+def pointwise_graph(step: MeasuredStep) -> tuple[Array, Array]:
+    """The paper's graph of one photo (Fig. 7): K(s) and ``(dm/ds) / (dK/ds)`` (Eq. 14), 1/m and N m^2.
+
+    Kept for comparison. It is 0/0 at mid-span, where it is NaN, and biased wherever the photo is noisy.
+
+    Raises
+    ------
+    ValueError
+        If the step has no photo.
+    """
+    shape = step.shape
+    if shape is None:
+        raise ValueError(f"step {step.step} has no photo")
+    seen = shape.seen
+    s, kappa = shape.s[seen], shape.kappa[seen]
+    turn = np.gradient(kappa, s)
+    lift = np.gradient(step.force * shape.y[seen], s)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(np.abs(turn) > 1e-6 * np.max(np.abs(turn), initial=0.0), lift / turn, np.nan)
+    return kappa, ratio

@@ -1,0 +1,207 @@
+"""Regression of curvature on moment over all points of all photos: the numerical part of the balance way.
+
+Unknowns, in this order: coefficients of log c (see `rod.compliance`), the pre-curvature K0, the common scale error of
+the photos, and Legendre coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual depends on the
+compliance and is renewed in each iteration. The posterior is an average over the prior size of the roughness of log c,
+weighted by its evidence (Laplace), so that the bands hold what the data do not know about the form of the law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from rod.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
+from rod.moment_points import MomentPoints, Residual, residual
+
+Array = NDArray[np.float64]
+
+BOW_TERMS = 4
+"""Legendre terms of K0(s) - K0: a linear set from the spool, one and two bows, and a kink's rough place."""
+
+ROUGHNESS_STEPS = 25
+"""Values of the roughness averaged over: a factor 1.3 apart, over which the posterior hardly changes."""
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Average over the roughness: mean and covariance of the unknowns, mean of the inverse normal matrices."""
+
+    mean: Array
+    covariance: Array
+    response: Array
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A settled regression.
+
+    Attributes
+    ----------
+    curve : ComplianceCurve
+    unknowns : (q,)
+        Where the rows were taken; see the module for their order.
+    posterior : Posterior
+    rows : tuple of Residual
+        Whitened, one entry per photo.
+    jacobian : (n, q)
+        Whitened, of all rows.
+    """
+
+    curve: ComplianceCurve
+    unknowns: Array
+    posterior: Posterior
+    rows: tuple[Residual, ...]
+    jacobian: Array
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients of log c: the index of K0; the scale and K0(s) follow."""
+        return self.curve.coefficients.size
+
+
+@dataclass(frozen=True)
+class MomentModel:
+    """Data, basis and priors of the regression.
+
+    Attributes
+    ----------
+    data : tuple of MomentPoints
+    basis : ComplianceBasis
+    scale_std : relative
+    floor : 1/m
+        Curvature that no photo resolves.
+    roughness : (low, high)
+        Range of the prior standard deviation of d^2 log c / dmu^2.
+    varying : bool
+        Whether K0(s) is free to vary.
+    """
+
+    data: tuple[MomentPoints, ...]
+    basis: ComplianceBasis
+    scale_std: float
+    floor: float
+    roughness: tuple[float, float]
+    varying: bool = False
+
+    def rows(self, unknowns: Array) -> tuple[ComplianceCurve, tuple[Residual, ...]]:
+        """Compliance curve and whitened residuals at the given unknowns."""
+        p = self.basis.table.shape[1]
+        curve = compliance_curve(self.basis, unknowns[:p])
+        K0, scale, bow = float(unknowns[p]), float(unknowns[p + 1]), unknowns[p + 2 :]
+        return curve, tuple(
+            residual(d, curve, K0, varying=bow_terms(d) @ bow, scale=scale, floor=self.floor) for d in self.data
+        )
+
+    def columns(self, data: MomentPoints, row: Residual) -> Array:
+        """Whitened jacobian of one photo with respect to all unknowns, (n, q)."""
+        return np.hstack([row.jacobian, -row.whitener @ bow_terms(data)])
+
+    def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
+        """Mean and covariance of the unknowns, averaged over the roughness with its evidence as the weight."""
+        p, size = self.basis.table.shape[1], J.shape[1]
+        prior = np.zeros(size)
+        prior[p + 1] = 1.0 / max(self.scale_std, 1e-9) ** 2
+        if not self.varying:  # a prior far sharper than any photo switches them off
+            prior[p + 2 :] = (1e6 / self.floor) ** 2
+        penalty = np.zeros((size, size))
+        penalty[:p, :p] = self.basis.roughness
+        normal, pull = J.T @ J + np.diag(prior), J.T @ (J @ unknowns - value)
+        evidence, means, inverses = [], [], []
+        for log_tau in np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS):
+            A = normal + penalty * np.exp(-2.0 * log_tau)
+            unit = 1.0 / np.sqrt(np.diag(A))  # unknowns of very different size
+            scaled = unit[:, None] * A * unit
+            inverse = unit[:, None] * np.linalg.inv(scaled) * unit
+            mean = inverse @ pull
+            log_det = np.linalg.slogdet(scaled)[1] - 2.0 * np.sum(np.log(unit))
+            # The penalty leaves straight lines free: p - 2 coefficients have the prior exp(-2 log_tau).
+            evidence.append(0.5 * (pull @ mean - log_det) - (p - 2) * log_tau)
+            means.append(mean)
+            inverses.append(inverse)
+        weight = np.exp(np.array(evidence) - max(evidence))
+        weight /= weight.sum()
+        mean, response = np.tensordot(weight, means, 1), np.tensordot(weight, inverses, 1)
+        spread = np.array(means) - mean
+        return Posterior(mean, response + (weight[:, None] * spread).T @ spread, response)
+
+
+def bow_terms(data: MomentPoints) -> Array:
+    """Legendre polynomials 1 to 4 of 2 s/L - 1 at the points of a photo, (n, 4)."""
+    t = 2.0 * data.s / data.length - 1.0
+    return np.asarray(np.polynomial.legendre.legvander(t, BOW_TERMS)[:, 1:])
+
+
+def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -> Regression | None:
+    """Fit by Gauss-Newton from a straight line of compliance; None if it does not settle."""
+    p = model.basis.table.shape[1]
+    unknowns = np.concatenate([np.zeros(p), [pre_curvature, 0.0], np.zeros(BOW_TERMS)])
+    for _ in range(iterations):
+        curve, rows = model.rows(unknowns)
+        value = np.concatenate([row.value for row in rows])
+        J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
+        posterior = model.posterior(unknowns, value, J)
+        move = posterior.mean - unknowns
+        # A hundredth of a standard deviation is nothing anyone could see.
+        if np.all(np.abs(move) <= 0.01 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
+            return Regression(curve, unknowns, posterior, rows, J)
+        # One unit of log c is a factor e in stiffness: longer steps leave the range of the linearisation.
+        unknowns = unknowns + move * min(1.0, 1.0 / max(float(np.max(np.abs(move[:p]))), 1e-12))
+    return None
+
+
+def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]:
+    """Score tests of the assumptions: what would each further freedom explain beyond the noise of `model`.
+
+    Returns
+    -------
+    dict
+        ``left_right_z``: curvature linear in s, in sigma. ``photos_p``: an own K0 for each photo. ``uniform_p``: K0(s)
+        with Legendre terms 1 to 4. ``chi2``, ``degrees_of_freedom`` of the fit.
+    """
+    rows = model.rows(found.unknowns)[1]
+    J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
+    value = np.concatenate([row.value for row in rows])
+    response = model.posterior(found.unknowns, value, J).response
+    value = value - J @ (response @ (J.T @ value))  # nothing where the model is the one that was fitted
+    bow = np.vstack([row.whitener @ bow_terms(d) for d, row in zip(model.data, rows, strict=True)])
+    photo = np.zeros((value.size, len(rows)))
+    ends = np.cumsum([0] + [row.value.size for row in rows])
+    for k, row in enumerate(rows):
+        photo[ends[k] : ends[k + 1], k] = row.whitener.sum(axis=1)
+
+    def score(columns: Array) -> Array:
+        inside = columns.T @ J
+        information = columns.T @ columns - inside @ response @ inside.T
+        values, vectors = np.linalg.eigh(information)
+        # A combination of which the fit leaves less than a millionth is not testable: it is an unknown itself.
+        keep = values > 1e-6 * np.max(np.sum(columns**2, axis=0), initial=0.0)
+        return np.asarray((vectors[:, keep].T @ (columns.T @ value)) / np.sqrt(values[keep]))
+
+    def p_value(z: Array) -> float:
+        return float(chdtrc(z.size, z @ z)) if z.size else 1.0
+
+    left_right = score(bow[:, :1])
+    used = float(np.einsum("ij,jk,ik->", J, response, J))
+    return {
+        "left_right_z": float(left_right[0]) if left_right.size else 0.0,
+        "photos_p": p_value(score(photo)),
+        "uniform_p": p_value(score(bow)),
+        "chi2": float(value @ value),
+        "degrees_of_freedom": max(sum(row.informative for row in rows) - used, 0.0),
+    }
+
+
+def uniform_at_rest(data: MomentPoints, floor: float) -> float:
+    """Probability of a force-free photo as uneven as this one if the cable's curvature at rest is constant."""
+    covariance = data.by_curve_kappa @ data.curve_covariance @ data.by_curve_kappa.T
+    covariance[np.diag_indices_from(covariance)] += floor**2
+    columns = np.column_stack([np.ones(data.s.size), bow_terms(data)])
+    weighted = np.linalg.solve(covariance, columns)
+    information = columns.T @ weighted
+    estimate = np.linalg.solve(information, weighted.T @ data.kappa)[1:]
+    spread = np.linalg.inv(information)[1:, 1:]
+    return float(chdtrc(estimate.size, estimate @ np.linalg.solve(spread, estimate)))

@@ -1,0 +1,166 @@
+"""The balance way against truth from quadrature and from solve_bvp; nothing of the project's solvers takes part."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rod.balance import BalanceOptions, BalanceOutcome, balance
+from rod.measurement import MeasuredTest
+from rod.moment_points import moment_points, pointwise_graph
+from tests.rod.virtual_cable import StickSlip, bent_by_bvp, equilibrium, force_free
+from tests.rod.virtual_photo import Camera, bending_test, record
+
+LENGTH = 0.2
+LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
+CHORDS = force_free(LAW, LENGTH).chord - np.array([5e-3, 10e-3, 15e-3])
+SHARP = Camera(section_px=1e-3, axis_px=1e-3, scale=1e-6, length=1e-9)
+
+
+def measured(seed=1, law=LAW, chords=CHORDS, **kind):
+    return bending_test(law, LENGTH, chords, np.random.default_rng(seed), **kind)[0]
+
+
+def test_sharp_photos_give_the_law_back():
+    graph = balance(measured(camera=SHARP, force_noise=1e-6))
+    # 2e-4 is the floor of the curvature in units of the range; the slope of a law doubles it three times over.
+    assert np.allclose(graph.tangent, LAW.tangent(graph.kappa), rtol=4e-3)
+    assert np.allclose(graph.moment, LAW.moment(graph.kappa), rtol=0, atol=2e-4 * graph.moment.max())
+    assert graph.pre_curvature == pytest.approx(LAW.K0, abs=2e-3)
+
+
+@pytest.mark.parametrize("EI0", [1e-5, 5e-3, 1.0])
+def test_result_scales_with_the_stiffness(EI0):
+    graph = balance(measured(law=replace(LAW, EI0=EI0, EI1=0.3 * EI0)))
+    unit = balance(measured())
+    assert np.allclose(graph.tangent / EI0, unit.tangent / LAW.EI0, rtol=1e-6)
+    assert np.allclose(graph.tangent_std / EI0, unit.tangent_std / LAW.EI0, rtol=1e-5)
+    assert graph.pre_curvature == pytest.approx(unit.pre_curvature, rel=1e-7)
+
+
+def test_secant_and_tangent_are_readings_of_one_moment_curve():
+    graph = balance(measured())
+    K0 = graph.pre_curvature
+    away = graph.kappa - K0 > 0.5
+    assert np.allclose(graph.secant[away], graph.moment[away] / (graph.kappa[away] - K0), rtol=1e-12)
+    slope = np.gradient(graph.moment, graph.kappa)[1:-1]
+    assert np.allclose(slope, graph.tangent[1:-1], rtol=3e-3)
+    assert graph.secant[0] == pytest.approx(graph.tangent[0], rel=1e-2)
+
+
+def test_constant_stiffness_is_found_constant():
+    graph = balance(measured(law=replace(LAW, EI1=LAW.EI0)))
+    assert np.all(np.abs(graph.tangent / LAW.EI0 - 1) < 0.02)
+
+
+def test_band_is_true_to_the_gains():
+    """A single error of known size moves the estimate as its gain says."""
+    test = measured()
+    graph = balance(test)
+    k, step = 2, test.steps[2]
+    pushed = replace(step, force=step.force * 1.001)
+    moved = balance(replace(test, steps=(*test.steps[:k], pushed, *test.steps[k + 1 :])))
+    told = graph.gains["force", step.step][:, 0] * 1e-3 * step.force
+    seen = np.log(np.interp(graph.kappa, moved.kappa, moved.tangent) / graph.tangent)
+    inner = slice(3, -3)
+    assert np.allclose(seen[inner], told[inner], atol=0.1 * np.abs(told).max())
+
+
+def test_scale_error_moves_the_estimate_as_told():
+    test = measured()
+    graph = balance(test)
+    stretched = []
+    for step in test.steps:
+        shape = step.shape
+        stretched.append(
+            replace(
+                step,
+                shape=replace(
+                    shape, s=shape.s * 1.001, x=shape.x * 1.001, y=shape.y * 1.001, kappa=shape.kappa / 1.001
+                ),
+            )
+        )
+    moved = balance(replace(test, steps=tuple(stretched)))
+    told = graph.gains["scale", -1][:, 0] * -1e-3
+    seen = np.log(np.interp(graph.kappa, moved.kappa, moved.tangent) / graph.tangent)
+    assert np.allclose(seen[3:-3], told[3:-3], atol=2e-4)
+
+
+def test_checks_are_quiet_on_a_uniform_cable():
+    checks = balance(measured(seed=4)).checks
+    assert abs(checks["left_right_z"]) < 3.5
+    assert checks["photos_p"] > 1e-3
+    assert checks["uniform_p"] > 1e-3
+    # standard deviation of chi2 per degree of freedom is sqrt(2/60) here
+    assert checks["chi2"] / checks["degrees_of_freedom"] == pytest.approx(1.0, abs=0.6)
+
+
+def test_one_wrong_force_shows_photo_against_photo():
+    test = measured()
+    step = test.steps[2]
+    wrong = replace(step, force=1.05 * step.force)
+    assert balance(replace(test, steps=(*test.steps[:2], wrong, *test.steps[3:]))).checks["photos_p"] < 1e-6
+
+
+@pytest.mark.parametrize("mounted", [True, False])
+def test_pre_curvature_growing_along_the_cable(mounted):
+    """Truth by solve_bvp. With a force-free photo the law comes back; without one the halves disagree, and it shows."""
+    rest = force_free(LAW, LENGTH)
+    truth = [bent_by_bvp(LAW, LENGTH, chord, bow=lambda s: 0.8 * (2 * s / LENGTH - 1)) for chord in CHORDS]
+    shapes = ([bent_by_bvp(LAW, LENGTH, None, bow=lambda s: 0.8 * (2 * s / LENGTH - 1))] if mounted else []) + truth
+    graph = balance(record(shapes, rest.chord, np.random.default_rng(5))[0])
+    if not mounted:
+        assert abs(graph.checks["left_right_z"]) > 6
+    else:
+        assert graph.checks["uniform_at_rest_p"] < 1e-6
+        assert graph.varying[0] == pytest.approx(0.8, abs=0.05)
+        assert np.sqrt(np.mean((graph.tangent / LAW.tangent(graph.kappa) - 1) ** 2)) < 0.03
+
+
+def test_bvp_and_quadrature_agree():
+    """The two sources of truth of these tests, held against each other."""
+    one, two = equilibrium(LAW, LENGTH, CHORDS[1]), bent_by_bvp(LAW, LENGTH, CHORDS[1], bow=np.zeros_like)
+    assert two.force == pytest.approx(one.force, rel=1e-6)
+    assert np.allclose(two.at(one.s)[3], one.kappa, rtol=1e-5)
+
+
+def test_pointwise_graph_is_exact_on_an_exact_shape():
+    step = measured(camera=Camera(section_px=1e-9, axis_px=1e-9, scale=0.0), force_noise=1e-9).steps[2]
+    kappa, ratio = pointwise_graph(step)
+    good = np.isfinite(ratio) & (kappa > 2.5) & (kappa < 0.9 * kappa.max())
+    assert good.sum() > 30
+    assert np.allclose(ratio[good], LAW.tangent(kappa[good]), rtol=1e-2)
+
+
+def test_pointwise_graph_needs_a_photo():
+    with pytest.raises(ValueError, match="no photo"):
+        pointwise_graph(replace(measured().steps[1], shape=None))
+
+
+def test_without_loaded_photo_the_outcome_says_so():
+    test = measured()
+    only = MeasuredTest(test.length, test.length_std, test.scale_std, test.steps[:1])
+    graph = balance(only)
+    assert graph.outcome is BalanceOutcome.NO_PHOTO
+    assert "photo" in graph.outcome.value
+    assert not graph.measured
+    assert graph.kappa.size == 0
+
+
+def test_tension_counted_as_compression_is_refused():
+    test = measured()
+    flipped = tuple(replace(step, force=-step.force) for step in test.steps)
+    assert balance(replace(test, steps=flipped)).outcome is BalanceOutcome.NO_MOMENT
+
+
+def test_mounted_step_is_force_free_whatever_the_load_cell_reads():
+    test = measured()
+    off = (replace(test.steps[0], force=0.3), *test.steps[1:])
+    assert np.array_equal(balance(replace(test, steps=off)).tangent, balance(test).tangent)
+
+
+def test_fewer_points_per_photo_change_nothing_beyond_the_band():
+    test = measured()
+    one, two = balance(test), balance(test, options=BalanceOptions(points=40))
+    assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < one.tangent_std)
+    assert max(p.s.size for p in moment_points(test, points=40)) == 40
