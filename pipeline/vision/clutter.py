@@ -1,0 +1,238 @@
+"""What else lies in the picture: discs over the bearings, tools, rulers, writing; and the chessboard of a calibration.
+
+All places are table metres, so that lens and tilt act on them as on the cable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isinf, sqrt
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from pipeline.vision.lens import Camera
+from pipeline.vision.lighting import Light
+from pipeline.vision.sheath import Colour, ink
+from pipeline.vision.strand import Layer, disc_cover
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cover:
+    """Round cover on a bearing axis.
+
+    Attributes
+    ----------
+    diameter_m : float
+    colour : (r, g, b)
+    dot_m : float
+        Diameter of the dot (screw, pin) on the axis; 0 for none.
+    dot_colour : (r, g, b)
+    sheen : float
+        Relative change of brightness across the disc, toward the lamp.
+    rim : float
+        Darkness of a rim of a tenth of the radius, 0 for none.
+    slot : bool
+        A cross slot in the dot.
+    """
+
+    diameter_m: float = 0.012
+    colour: Colour = (0.55, 0.55, 0.55)
+    dot_m: float = 0.0025
+    dot_colour: Colour = (0.05, 0.05, 0.05)
+    sheen: float = 0.2
+    rim: float = 0.0
+    slot: bool = False
+
+
+@dataclass(frozen=True)
+class Thing:
+    """Another object: ``disc``, ``box``, ``ruler``, ``pen``, ``text``.
+
+    Attributes
+    ----------
+    kind : str
+    place_m : (X, Y) m
+        Its middle on the table.
+    size_m : (float, float) m
+        Length and width (text: height of the letters is the width).
+    angle_rad : float
+    colour : (r, g, b)
+    text : str
+    """
+
+    kind: str
+    place_m: tuple[float, float]
+    size_m: tuple[float, float] = (0.02, 0.02)
+    angle_rad: float = 0.0
+    colour: Colour = (0.3, 0.3, 0.3)
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("disc", "box", "ruler", "pen", "text"):
+            raise ValueError(f"thing {self.kind!r} is none of disc, box, ruler, pen, text")
+
+
+def cover_layers(
+    cover: Cover, place_m: tuple[float, float], camera: Camera, light: Light, channels: int, *, blur_px: float = 0.0
+) -> list[Layer]:
+    """Layers of a bearing's cover: the disc, then its dot."""
+    index, alpha, away = disc_cover(camera, place_m, 0.5 * cover.diameter_m, blur_px=blur_px)
+    level = light.strength * (light.ambient + (1 - light.ambient) * light.direction[2])
+    radius = 0.5 * cover.diameter_m * camera.px_per_m
+    toward = (away[0] * np.cos(light.azimuth_rad) + away[1] * np.sin(light.azimuth_rad)) / radius
+    shade = level * (1.0 + 0.5 * cover.sheen * toward)
+    shade *= np.where(np.hypot(*away) > 0.9 * radius, 1.0 - cover.rim, 1.0)
+    layers = [Layer(index, alpha, shade[:, None] * ink(cover.colour, channels))]
+    if cover.dot_m:
+        index, alpha, away = disc_cover(camera, place_m, 0.5 * cover.dot_m, blur_px=blur_px)
+        colour = np.broadcast_to(level * ink(cover.dot_colour, channels), (index.size, channels)).copy()
+        if cover.slot:
+            slot = np.min(np.abs(away), axis=0) < 0.08 * cover.dot_m * camera.px_per_m
+            colour[slot] *= 0.4
+        layers.append(Layer(index, alpha, colour))
+    return layers
+
+
+def thing_layers(thing: Thing, camera: Camera, light: Light, channels: int) -> list[Layer]:
+    """Layers of an object, anti-aliased to 8 bit: no truth hangs on it."""
+    level = light.strength * (light.ambient + (1 - light.ambient) * light.direction[2])
+    if thing.kind == "disc":
+        index, alpha, _ = disc_cover(camera, thing.place_m, 0.5 * thing.size_m[0])
+        return [Layer(index, alpha, np.broadcast_to(level * ink(thing.colour, channels), (index.size, channels)))]
+    paint = {"box": _box, "pen": _pen, "ruler": _ruler, "text": _text}[thing.kind]
+    layers = []
+    for mask, gain in paint(thing, camera):
+        index = np.flatnonzero(mask)
+        colour = np.broadcast_to(gain * level * ink(thing.colour, channels), (index.size, channels))
+        layers.append(Layer(index, mask.ravel()[index] / 255.0, colour))
+    return layers
+
+
+def _polygon(
+    thing: Thing, camera: Camera, a: Array, b: Array, mask: NDArray[np.uint8] | None = None
+) -> NDArray[np.uint8]:
+    """Mask of a polygon given in the thing's own axes (m from its middle)."""
+    c, q = np.cos(thing.angle_rad), np.sin(thing.angle_rad)
+    u, v = camera.project(thing.place_m[0] + c * a - q * b, thing.place_m[1] + q * a + c * b)
+    if mask is None:
+        mask = np.zeros((camera.height, camera.width), np.uint8)
+    points = np.rint(np.clip(np.column_stack([u, v]), -30_000, 30_000) * 16).astype(np.int32)
+    return cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
+
+
+def _frame(length: float, width: float) -> tuple[Array, Array]:
+    return 0.5 * length * np.array([-1.0, 1.0, 1.0, -1.0]), 0.5 * width * np.array([-1.0, -1.0, 1.0, 1.0])
+
+
+def _box(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
+    return [(_polygon(thing, camera, *_frame(*thing.size_m)), 1.0)]
+
+
+def _pen(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
+    length, width = thing.size_m
+    a = np.array([-0.5, 0.42, 0.5, 0.42, -0.5]) * length
+    b = np.array([-0.5, -0.5, 0.0, 0.5, 0.5]) * width
+    return [(_polygon(thing, camera, a, b), 1.0), (_polygon(thing, camera, *_frame(0.8 * length, 0.2 * width)), 1.5)]
+
+
+def _ruler(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
+    length, width = thing.size_m
+    ticks = np.zeros((camera.height, camera.width), np.uint8)
+    for k, at in enumerate(np.arange(-0.48 * length, 0.48 * length, 0.001)):
+        deep = 0.45 if k % 10 == 0 else 0.25
+        a = at + 1e-4 * np.array([-1.0, 1.0, 1.0, -1.0])
+        _polygon(thing, camera, a, width * np.array([0.5, 0.5, 0.5 - deep, 0.5 - deep]), ticks)
+    return [(_polygon(thing, camera, *_frame(length, width)), 1.0), (ticks, 0.15)]
+
+
+def _text(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
+    font, scale = cv2.FONT_HERSHEY_SIMPLEX, thing.size_m[1] * camera.px_per_m / 22.0
+    (w, h), _ = cv2.getTextSize(thing.text, font, scale, 2)
+    u, v = (float(a) for a in camera.project(*thing.place_m))
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    cv2.putText(mask, thing.text, (int(u - w / 2), int(v + h / 2)), font, scale, 255, 2, cv2.LINE_AA)
+    turn = cv2.getRotationMatrix2D((u, v), -np.degrees(thing.angle_rad + camera.roll_rad), 1.0)
+    return [(cv2.warpAffine(mask, turn, (camera.width, camera.height)), 1.0)]
+
+
+@dataclass(frozen=True)
+class ChessBoard:
+    """Chessboard for the calibration, lying on the table or held at a tilt.
+
+    Attributes
+    ----------
+    columns, rows : int
+        Inner corners.
+    square_m : float
+    place_m : (X, Y) m
+        Middle of the inner corners on the table.
+    rotation : (3,) rad
+        Rotation vector in table axes, third component about the table's normal; tilts need a finite camera distance.
+    height_m : float
+        Of its middle above the cable axis (on the table: minus half a diameter).
+    """
+
+    columns: int = 13
+    rows: int = 7
+    square_m: float = 0.010
+    place_m: tuple[float, float] = (0.09, 0.03)
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    height_m: float = 0.0
+
+    def homography(self, camera: Camera) -> Array:
+        """Matrix (3, 3) from board metres (from its middle) to undistorted pixels from the picture's middle."""
+        turn = cv2.Rodrigues(np.asarray(self.rotation, dtype=float))[0]
+        if isinf(camera.distance_m) and np.hypot(*self.rotation[:2]) > 0:
+            raise ValueError("a tilted board needs a finite camera distance")
+        base = camera.homography(0.0)
+        # homography(h) is linear in h: its derivative is the column by which heights enter.
+        lift = camera.homography(1.0)[:, 2] - base[:, 2]
+        spatial = np.column_stack([base[:, 0], base[:, 1], lift, base[:, 2]])
+        pose = np.vstack([np.column_stack([turn[:, :2], [*self.place_m, self.height_m]]), [0.0, 0.0, 1.0]])
+        return spatial @ pose
+
+    def corners(self, camera: Camera) -> Array:
+        """Exact pixels (rows * columns, 2) of the inner corners, row by row."""
+        a, b = np.meshgrid(np.arange(self.columns) - (self.columns - 1) / 2, np.arange(self.rows) - (self.rows - 1) / 2)
+        points = np.stack([a.ravel() * self.square_m, b.ravel() * self.square_m, np.ones(a.size)])
+        U, V, W = self.homography(camera) @ points
+        return np.column_stack(camera.distort(U / W, V / W))
+
+
+def board_layer(board: ChessBoard, camera: Camera, light: Light, channels: int, *, blur_px: float = 0.0) -> Layer:
+    """Layer of a printed chessboard with a white border of one square, its edges blurred by a lens of ``blur_px``.
+
+    Lens and pixel act as a Gaussian that is the same in all directions, so the blurred board is the product of two
+    blurred square waves, exactly where the board is locally flat; a pixel counts with its variance 1/12.
+    """
+    back = np.linalg.inv(board.homography(camera))
+    v, u = (a.ravel().astype(float) for a in np.mgrid[0 : camera.height, 0 : camera.width])
+    a, b = _on_board(back, camera, u, v)
+    sigma = sqrt(blur_px**2 + 1.0 / 12.0) / camera.px_per_m
+    half = 0.5 * board.square_m * np.array([board.columns + 3, board.rows + 3])
+    sheet = np.prod([ndtr((h - np.abs(p)) / sigma) for h, p in zip(half, (a, b), strict=True)], axis=0)
+    inner = np.prod([ndtr((h - board.square_m - np.abs(p)) / sigma) for h, p in zip(half, (a, b), strict=True)], axis=0)
+    waves = [_wave(p, board.square_m, count, sigma) for p, count in ((a, board.columns), (b, board.rows))]
+    white = 1.0 - inner * (0.5 - 0.5 * waves[0] * waves[1])
+    level = light.strength * (light.ambient + (1 - light.ambient) * light.direction[2])
+    seen = sheet > 1e-7
+    shade = level * (0.06 + 0.84 * white[seen])
+    return Layer(np.flatnonzero(seen), sheet[seen], np.broadcast_to(shade[:, None], (shade.size, channels)))
+
+
+def _on_board(back: Array, camera: Camera, u: Array, v: Array) -> tuple[Array, Array]:
+    du, dv = camera.undistort(u, v)
+    a, b, w = (row[0] * du + row[1] * dv + row[2] for row in back)
+    return a / w, b / w
+
+
+def _wave(at: Array, square: float, corners: int, sigma: float) -> Array:
+    """Square wave of +-1 that changes sign at the corners' lines, blurred by ``sigma``."""
+    line = at / square + 0.5 * (corners - 1)
+    near = np.rint(line)
+    return (2.0 * ndtr((line - near) * square / sigma) - 1.0) * np.where(near % 2 == 0, 1.0, -1.0)

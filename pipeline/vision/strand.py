@@ -1,0 +1,274 @@
+"""A cable as a curve, and its picture with exact edges.
+
+`Curve` is a centerline in the chord frame: origin at the left bearing axis, x through both axes, y toward the bow,
+metres. `strand_layer` colours the pixels it covers.
+
+Strategy of the picture: each pixel near the cable knows the nearest node of the curve (nodes at most one pixel apart).
+In that node's frame (t along the tangent, n along the normal) the signed distance to the osculating circle is
+
+    o = q / (1 + sqrt(1 - kappa q)),   q = 2 n - kappa (t^2 + n^2),
+
+which misses the curve by kappa' t^3 / 6, below 1e-6 px for any cable. The covered part of a pixel cell is that of a
+half plane: sharp, the exact area (`half_plane`); or seen through a lens, the normal integral (`soft_edge`). The lens
+must act before the pixels do: a sharp picture blurred afterwards moves an edge by up to 0.02 px with its place in the
+pixel, because the skewness f (1 - f) (1 - 2 f) of a partly covered pixel survives the blur. The colour is sampled on
+3 x 3 points a pixel and weighted with what each of their cells covers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from math import ceil, sqrt
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+from scipy.special import ndtr
+
+from pipeline.vision.lens import Camera
+from pipeline.vision.lighting import Light, cylinder
+from pipeline.vision.sheath import Sheath, albedo, ink
+
+Array = NDArray[np.float64]
+
+SAMPLES = 3  # per pixel and direction, for colour only: edges are exact with one
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Centerline in the chord frame: arc length, position, tangent angle, curvature; (n,) each, m, rad, 1/m."""
+
+    s: Array
+    x: Array
+    y: Array
+    theta: Array
+    kappa: Array
+
+    @classmethod
+    def from_curvature(cls, kappa: Callable[[Array], ArrayLike] | float, length: float, *, n: int = 2001) -> Curve:
+        """Curve of a curvature kappa(s), its ends on the x axis, positive curvature bending toward y.
+
+        The tangent angle falls along s where the bow is positive: x' = cos theta, y' = sin theta, theta' = -kappa.
+        ``theta`` of the record is that tangent angle.
+
+        Parameters
+        ----------
+        kappa : callable or float, 1/m
+        length : m
+        n : int
+            Nodes; the angle is integrated by the spline through them, the position by Gauss points on it.
+        """
+        s = np.linspace(0.0, length, n)
+        values = np.broadcast_to(np.asarray(kappa(s) if callable(kappa) else kappa, dtype=float), s.shape)
+        angle = CubicSpline(s, values).antiderivative()
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        h = s[1] - s[0]
+        inner = angle(s[:-1, None] + 0.5 * h * (nodes + 1.0))
+        x = np.concatenate([[0.0], np.cumsum(0.5 * h * np.cos(inner) @ weights)])
+        y = np.concatenate([[0.0], np.cumsum(-0.5 * h * np.sin(inner) @ weights)])
+        lift = -np.arctan2(y[-1], x[-1])
+        c, q = np.cos(lift), np.sin(lift)
+        return cls(s, c * x - q * y, q * x + c * y, lift - angle(s), values.copy())
+
+    @classmethod
+    def from_points(cls, s: ArrayLike, x: ArrayLike, y: ArrayLike) -> Curve:
+        """Curve through points at known arc lengths (a solver's output), by cubic splines x(s), y(s)."""
+        s, x, y = (np.asarray(a, dtype=float) for a in (s, x, y))
+        fx, fy = CubicSpline(s, x), CubicSpline(s, y)
+        dx, dy = fx(s, 1), fy(s, 1)
+        return cls(s, x, y, np.arctan2(dy, dx), -(dx * fy(s, 2) - dy * fx(s, 2)) / np.hypot(dx, dy) ** 3)
+
+    @property
+    def chord(self) -> float:
+        """Distance of the ends, m."""
+        return float(np.hypot(self.x[-1] - self.x[0], self.y[-1] - self.y[0]))
+
+
+@dataclass(frozen=True)
+class Strand:
+    """A cable on the table.
+
+    Attributes
+    ----------
+    curve : Curve
+    diameter_m : float
+    sheath : Sheath
+    place_m : (X, Y) m
+        Of the curve's origin on the table.
+    angle_rad : float
+        Of the curve's x axis on the table, from X toward Y.
+    overhang_m : float
+        Straight continuation beyond both ends; 0 shows blunt ends on the axes.
+    """
+
+    curve: Curve
+    diameter_m: float = 0.0046
+    sheath: Sheath = field(default_factory=Sheath)
+    place_m: tuple[float, float] = (0.0, 0.0)
+    angle_rad: float = 0.0
+    overhang_m: float = 0.0
+
+    def on_table(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Table coordinates of chord-frame points."""
+        c, q = np.cos(self.angle_rad), np.sin(self.angle_rad)
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        return self.place_m[0] + c * x - q * y, self.place_m[1] + q * x + c * y
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Coloured pixels: flat indices (n,), covered part (n,), colour (n, channels) as brightness."""
+
+    index: NDArray[np.intp]
+    alpha: Array
+    colour: Array
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    s: Array
+    X: Array
+    Y: Array
+    tangent: Array
+    kappa: Array
+    u: Array
+    v: Array
+
+
+def strand_layer(strand: Strand, camera: Camera, light: Light, channels: int, *, blur_px: float = 0.0) -> Layer:
+    """Layer of a cable on the picture of ``camera``, lit by ``light``, its edges blurred by a lens of ``blur_px``."""
+    nodes = _nodes(strand, camera)
+    radius = 0.5 * strand.diameter_m
+    index, u, v, i = _near(nodes, camera, radius)
+    X, Y = camera.plane(u, v)
+    jac = _jacobian(camera, u, v)
+    c, q = np.cos(nodes.tangent[i]), np.sin(nodes.tangent[i])
+    t = (X - nodes.X[i]) * c + (Y - nodes.Y[i]) * q
+    n = (X - nodes.X[i]) * -q + (Y - nodes.Y[i]) * c
+    t_grad = np.stack([c * jac[0, 0] + q * jac[1, 0], c * jac[0, 1] + q * jac[1, 1]])
+    n_grad = np.stack([-q * jac[0, 0] + c * jac[1, 0], -q * jac[0, 1] + c * jac[1, 1]])
+    normal = n_grad / np.hypot(*n_grad)
+    kappa, ends = nodes.kappa[i], (i < 3) | (i >= nodes.s.size - 3)
+    # A blurred curved border moves toward its centre by kappa sigma^2 / 2, as in curve shortening.
+    inward = 0.5 * kappa * (blur_px**2 + 1.0 / 12.0) / camera.px_per_m**2 if blur_px else 0.0
+    inside = partial(soft_edge, blur_px=blur_px) if blur_px else half_plane
+    alpha, colour = np.zeros(index.size), np.zeros((index.size, channels))
+    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+    for du in steps:
+        for dv in steps:
+            tk, nk = t + t_grad[0] * du + t_grad[1] * dv, n + n_grad[0] * du + n_grad[1] * dv
+            bend = 2 * nk - kappa * (tk**2 + nk**2)
+            offset = bend / (1.0 + np.sqrt(np.maximum(1.0 - kappa * bend, 0.0))) - inward
+            along = nodes.s[i] + tk / (1.0 - kappa * nk)
+            cover = inside(radius - offset, n_grad, SAMPLES) + inside(radius + offset, n_grad, SAMPLES) - 1.0
+            tip = t_grad[:, ends]
+            cover[ends] *= inside(along[ends] - nodes.s[0], tip, SAMPLES) * inside(
+                nodes.s[-1] - along[ends], tip, SAMPLES
+            )
+            alpha += cover
+            colour += cover[:, None] * _shade(strand.sheath, light, along / radius, offset / radius, normal, channels)
+    seen = alpha > 1e-7
+    colour = colour[seen] / alpha[seen, None]
+    return Layer(index[seen], np.minimum(alpha[seen] / SAMPLES**2, 1.0), colour)
+
+
+def half_plane(distance: Array, gradient: Array, cells: int = 1) -> Array:
+    """Part of a pixel cell (n,) inside the half plane ``distance > 0``.
+
+    Parameters
+    ----------
+    distance : (n,)
+        Of the cell's centre from the border, positive inside.
+    gradient : (2, n)
+        Change of the distance over a pixel's width and height.
+    cells : int
+        Cells a pixel and direction.
+
+    Notes
+    -----
+    The distance over a cell is the sum of two uniform variables: their distribution is a trapezoid, its integral is
+
+        sum of +- max(d +- (a +- b) / 2, 0)^2 / (2 a b).
+    """
+    gradient = np.abs(gradient) / cells
+    a = np.max(gradient, axis=0)
+    # Below 1e-4 of a cell the cell is aligned with the border; the formula would lose its digits to 0/0.
+    b = np.maximum(np.min(gradient, axis=0) / a, 1e-4)
+    d = np.clip(distance / a, -1.5, 1.5)
+    p, m = 0.5 * (1.0 + b), 0.5 * (1.0 - b)
+    parts = [np.maximum(d + p, 0) ** 2, -(np.maximum(d + m, 0) ** 2), -(np.maximum(d - m, 0) ** 2)]
+    return np.clip((sum(parts) + np.maximum(d - p, 0) ** 2) / (2.0 * b), 0.0, 1.0)
+
+
+def soft_edge(distance: Array, gradient: Array, cells: int = 1, *, blur_px: float) -> Array:
+    """Like `half_plane`, through a Gaussian lens; the cell's own box enters with its variance (1/12 of its width^2)."""
+    slope = np.hypot(gradient[0], gradient[1])
+    return ndtr(distance / (slope * sqrt(blur_px**2 + 1.0 / (12.0 * cells**2))))
+
+
+def disc_cover(
+    camera: Camera, centre_m: tuple[float, float], radius_m: float, *, blur_px: float = 0.0
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Flat indices, covered part and distances (2, n) px from its centre of the pixels of a disc on the table."""
+    u0, v0 = (float(a) for a in camera.project(*centre_m))
+    reach = 1.2 * radius_m * camera.px_per_m + 4.0
+    cols = np.arange(max(0, ceil(u0 - reach)), min(camera.width, int(u0 + reach) + 1))
+    rows = np.arange(max(0, ceil(v0 - reach)), min(camera.height, int(v0 + reach) + 1))
+    u, v = (a.ravel().astype(float) for a in np.meshgrid(cols, rows))
+    X, Y = camera.plane(u, v)
+    dX, dY = X - centre_m[0], Y - centre_m[1]
+    r = np.maximum(np.hypot(dX, dY), 1e-12)
+    jac = _jacobian(camera, u, v)
+    gradient = np.stack([(dX * jac[0, k] + dY * jac[1, k]) / r for k in (0, 1)])
+    # The very centre has no direction; any will do deep inside.
+    gradient[0] = np.where(r < 1e-9 * radius_m, jac[0, 0], gradient[0])
+    alpha = soft_edge(radius_m - r, gradient, blur_px=blur_px) if blur_px else half_plane(radius_m - r, gradient)
+    index = (v * camera.width + u).astype(np.intp)
+    seen = alpha > 1e-7
+    return index[seen], alpha[seen], np.stack([u - u0, v - v0])[:, seen]
+
+
+def _nodes(strand: Strand, camera: Camera) -> _Nodes:
+    curve, over = strand.curve, strand.overhang_m
+    fx, fy, fk = (CubicSpline(curve.s, a) for a in (curve.x, curve.y, curve.kappa))
+    s0, s1 = float(curve.s[0]), float(curve.s[-1])
+    s = np.linspace(s0 - over, s1 + over, ceil(1.1 * (s1 - s0 + 2 * over) * camera.px_per_m) + 8)
+    inside = np.clip(s, s0, s1)
+    dx, dy = fx(inside, 1), fy(inside, 1)
+    beyond = s - inside
+    X, Y = strand.on_table(fx(inside) + beyond * dx, fy(inside) + beyond * dy)
+    # The curvature's sign: positive toward y means clockwise in (x, y), the osculating circle wants counter-clockwise.
+    kappa = np.where(beyond == 0, -fk(inside), 0.0)
+    return _Nodes(s, X, Y, np.arctan2(dy, dx) + strand.angle_rad, kappa, *camera.project(X, Y))
+
+
+def _near(nodes: _Nodes, camera: Camera, radius: float) -> tuple[NDArray[np.intp], Array, Array, NDArray[np.intp]]:
+    """Pixels that may show the cable: flat index, u, v and the nearest node."""
+    width = 2 * ceil(1.15 * radius * camera.px_per_m + 4)  # 15 % for what tilt and lens magnify
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    inside = np.clip(np.column_stack([nodes.u, nodes.v]), -4 * camera.width, 5 * camera.width)
+    cv2.polylines(mask, [np.rint(inside[:, None]).astype(np.int32)], False, 255, width)
+    index = np.flatnonzero(mask)
+    v, u = (a.astype(float) for a in np.divmod(index, camera.width))
+    _, i = cKDTree(np.column_stack([nodes.u, nodes.v])).query(np.column_stack([u, v]))
+    return index, u, v, i
+
+
+def _jacobian(camera: Camera, u: Array, v: Array) -> Array:
+    """Change of (X, Y) over one pixel in u and in v: (2, 2, n), [table axis, picture axis]."""
+    if camera.k1 == 0.0 and camera.perspective_per_m == (0.0, 0.0):
+        one = np.linalg.inv(camera.homography())[:2, :2]
+        return np.broadcast_to(one[:, :, None], (2, 2, u.size))
+    du = np.subtract(camera.plane(u + 0.5, v), camera.plane(u - 0.5, v))
+    dv = np.subtract(camera.plane(u, v + 0.5), camera.plane(u, v - 0.5))
+    return np.stack([du, dv], axis=1)
+
+
+def _shade(sheath: Sheath, light: Light, along: Array, across: Array, normal: Array, channels: int) -> Array:
+    diffuse, glossy = cylinder(light, across, normal[0], normal[1], gloss=sheath.gloss, shininess=sheath.shininess)
+    colour = ink(sheath.colour, channels) if sheath.plain else albedo(sheath, along, across, channels)
+    return diffuse[:, None] * colour + glossy[:, None]
