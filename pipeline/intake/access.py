@@ -1,0 +1,118 @@
+"""Reading files of a folder that may come from strangers: file name -> bytes, within limits and within the folder.
+
+A specimen folder is the border: a name that leads out of it, by ``..``, by an absolute path or by a link, is not
+followed unless the settings allow it. Special files (pipes, devices) are never opened: reading them may not end.
+Paths are as given by the caller; nothing is executed or unpickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+from pipeline.errors import InputError
+
+CHUNK_BYTES = 1 << 20
+
+
+def inside(folder: Path, name: str, *, allow_outside: bool) -> Path | None:
+    r"""Path of a name written in a file of the folder, or None if it leads out of the folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The specimen folder; a link to it is fine, links below it are followed to see where they end.
+    name : str
+        Relative path with ``/`` or ``\``.
+    allow_outside : bool
+        Give the path even if it leads out.
+    """
+    if "\0" in name:
+        return None
+    path = folder / name.replace("\\", "/")
+    if allow_outside:
+        return path
+    border, target = os.path.realpath(folder), os.path.realpath(path)
+    return path if target == border or target.startswith(border.rstrip(os.sep) + os.sep) else None
+
+
+def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:
+    """Contents of a regular file of at most ``limit`` bytes.
+
+    Raises
+    ------
+    InputError
+        ``file/unreadable``, ``file/not-a-file``, ``file/too-large``.
+    """
+    check_file(path, limit=limit, setting=setting)
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if len(data) > limit:
+        raise _too_large(path, len(data), limit, setting)
+    return data
+
+
+def check_file(path: Path, *, limit: int, setting: str) -> None:
+    """Refuse what is no regular file of at most ``limit`` bytes; see `read_bytes` for the codes."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError("is no ordinary file", path=path, code="file/not-a-file", remedy="put a file in its place")
+    if status.st_size > limit:
+        raise _too_large(path, status.st_size, limit, setting)
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file, read in pieces so that memory stays bounded.
+
+    Raises
+    ------
+    InputError
+        ``file/unreadable``.
+    """
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as stream:
+            while piece := stream.read(CHUNK_BYTES):
+                digest.update(piece)
+    except OSError as error:
+        raise unreadable(path, error) from error
+    return digest.hexdigest()
+
+
+def outside(path: Path, name: str, line_of: Callable[[], int | None] | None = None) -> InputError:
+    """The error for a name that leads out of the specimen folder."""
+    return InputError(
+        f"{name!r} leads out of the specimen folder",
+        path=path,
+        line=None if line_of is None else line_of(),
+        code="file/outside",
+        remedy="copy the file into the folder, or set intake.allow_outside = true if you trust it",
+    )
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """The error for a file the operating system does not hand over."""
+    return InputError(
+        f"cannot be read ({(error.strerror or type(error).__name__).lower()})",
+        path=path,
+        code="file/unreadable",
+        remedy="check that it exists, its permissions and its links",
+    )
+
+
+def _too_large(path: Path, size: int, limit: int, setting: str) -> InputError:
+    return InputError(
+        f"has {size} bytes, the limit is {limit}",
+        path=path,
+        code="file/too-large",
+        remedy=f"reduce it or raise intake.{setting}",
+    )

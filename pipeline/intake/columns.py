@@ -1,0 +1,224 @@
+"""Which column of a force log is what: header cells -> roles and units.
+
+Roles are ``step, branch, time, displacement, force, image``. English and German names are known; units stand in
+the name (``Kraft [mN]``, ``F / N``, ``force_N``) or in a row of their own below it. Factors convert to
+newton, metre and second.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipeline.errors import InputError
+from pipeline.intake.dialect import SEPARATORS, Row, cells, column_names, looks_like_number
+from pipeline.intake.specimenfile import MEASURED, ROLES, LogSpec
+from pipeline.settings.intake import IntakeSettings
+
+UNITS: dict[str, dict[str, float]] = {
+    "force": {"N": 1.0, "mN": 1e-3, "cN": 1e-2, "daN": 10.0, "kN": 1e3, "MN": 1e6, "µN": 1e-6, "uN": 1e-6}
+    | {"gf": 9.80665e-3, "kgf": 9.80665, "kp": 9.80665, "lbf": 4.4482216152605},
+    "displacement": {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "µm": 1e-6, "um": 1e-6, "in": 25.4e-3, "inch": 25.4e-3},
+    "time": {"s": 1.0, "sec": 1.0, "sek": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+}
+ASSUMED = {"force": "N", "displacement": "mm", "time": "s"}
+NAMES = {
+    "step": "step|step no|step number|schritt|schritt nr|stufe|laststufe|hold|haltestufe|position nr",
+    "branch": "branch|phase|direction|richtung|zweig|ast|belastungsrichtung",
+    "time": "time|t|elapsed time|test time|timestamp|zeit|prüfzeit|pruefzeit|zeitstempel|uhrzeit|messzeit",
+    "displacement": "displacement|travel|stroke|crosshead|crosshead displacement|position|extension|d|u|weg|"
+    "verschiebung|traversenweg|standardweg|hub|kolbenweg|verfahrweg",
+    "force": "force|load|reaction|reaction force|f|p|kraft|prüfkraft|pruefkraft|standardkraft|reaktionskraft|last|"
+    "druckkraft",
+    "image": "image|image file|picture|photo|file|filename|frame|bild|bilddatei|bildname|foto|datei|dateiname|aufnahme",
+}
+ROLE_OF = {name: role for role, names in NAMES.items() for name in names.split("|")}
+UNIT_IN_NAME = re.compile(
+    r"(?P<base>.*?\S)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|(?:/|\bin\b)\s*(?P<behind>[^\s/]+))\s*"
+)
+UNIT_AS_SUFFIX = re.compile(r"(?P<base>.*\S)[_\s](?P<unit>[^_\s]+)")
+NO_UNIT = ("", "-", "1", "--")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Where the roles stand and how to convert them.
+
+    ``index``: role -> column from 0. ``factor``: role -> SI unit per unit of the log. ``assumed``: roles whose unit was
+    not given. ``header_line``, ``first_row``: line of the header, and index of the first row of data.
+    """
+
+    index: dict[str, int]
+    names: dict[str, str]
+    factor: dict[str, float]
+    separator: str
+    header_line: int
+    first_row: int
+    assumed: tuple[str, ...] = ()
+    skipped_lines: int = 0
+    width: int = 0
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettings) -> tuple[Columns, list[Row]]:
+    """Find the separator, the header and the meaning of the columns.
+
+    Parameters
+    ----------
+    text : str
+        The whole log.
+    spec : LogSpec
+        What the user says; it wins over everything found.
+
+    Returns
+    -------
+    Columns, list of Row
+        And all rows that are not blank, split.
+
+    Raises
+    ------
+    InputError
+        ``log/empty``, ``log/no-header``, ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
+    """
+    separators = (spec.separator,) if spec.separator else SEPARATORS
+    best: tuple[int, int, str, list[Row]] | None = None
+    for separator in separators:
+        rows = cells(text, separator)
+        if not rows:
+            raise InputError("is empty", path=path, code="log/empty", remedy="export the forces again")
+        for row in range(min(len(rows), settings.header_search_lines)):
+            found = len(_roles(rows[row][1], spec))
+            if found > (best[0] if best else 1):
+                best = found, row, separator, rows
+    if best is None:
+        rows = max((cells(text, separator) for separator in separators), key=lambda rows: len(rows[0][1]))
+        raise InputError(
+            f"no line names a force column and a displacement column (first line: {column_names(rows)})",
+            path=path,
+            line=rows[0][0],
+            code="log/no-header",
+            remedy='name the columns in [force_log] of specimen.toml: columns = {force = "...", displacement = "..."}',
+        )
+    _, row, separator, rows = best
+    return _columns(rows, row, separator, spec, path), rows
+
+
+def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
+    """Columns that may be meant by each role; nothing if neither force nor displacement is among them.
+
+    Columns given by number are for logs without a header: there the first row with numbers at these places is found.
+    """
+    found: dict[str, list[int]] = {}
+    bases = [ROLE_OF.get(_plain(cell)) or ROLE_OF.get(_plain(_split_unit(cell)[0])) for cell in header]
+    for role in ROLES:
+        if role in spec.columns:
+            wanted = spec.columns[role]
+            if isinstance(wanted, int):
+                places = [wanted - 1] if wanted <= len(header) and looks_like_number(header[wanted - 1]) else []
+            else:
+                places = [place for place, cell in enumerate(header) if _same(cell, wanted)]
+        else:
+            places = [place for place, base in enumerate(bases) if base == role]
+        if places:
+            found[role] = places
+    return found if {"force", "displacement"} & found.keys() else {}
+
+
+def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Path) -> Columns:
+    line, header = rows[row]
+    places = _roles(header, spec)
+    for role in ("force", "displacement"):
+        if role not in places:
+            raise InputError(
+                f"no column of {role} among {column_names(rows[row:])}",
+                path=path,
+                line=line,
+                code="log/no-column",
+                remedy=f'name it in [force_log] of specimen.toml: columns = {{{role} = "..."}}',
+            )
+    for role, where in places.items():
+        if len(where) > 1:
+            raise InputError(
+                f"{' and '.join(repr(header[place]) for place in where)} may both be the {role}",
+                path=path,
+                line=line,
+                code="log/ambiguous-column",
+                remedy=f'choose in [force_log] of specimen.toml: columns = {{{role} = "..."}}',
+            )
+    index = {role: where[0] for role, where in places.items()}
+    headless = isinstance(spec.columns.get("force"), int)
+    below = rows[row + 1][1] if len(rows) > row + 1 else []
+    unit_row = not headless and _is_unit_row(below, index)
+    units: dict[str, str] = {}
+    for role in MEASURED:
+        if role not in index:
+            continue
+        in_name = "" if headless else _split_unit(header[index[role]])[1]
+        in_row = _bare(below[index[role]]) if unit_row and index[role] < len(below) else ""
+        units[role] = spec.units.get(role) or in_name or in_row
+    return Columns(
+        index=index,
+        names={role: header[place] for role, place in index.items()},
+        factor={role: _factor(role, unit, path, line) for role, unit in units.items()},
+        separator=separator,
+        header_line=line,
+        first_row=row + (0 if headless else 2 if unit_row else 1),
+        assumed=tuple(role for role, unit in units.items() if not unit),
+        skipped_lines=row,
+        width=len(header),
+        units={role: unit or ASSUMED[role] for role, unit in units.items()},
+    )
+
+
+def _factor(role: str, unit: str, path: Path, line: int) -> float:
+    """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC)."""
+    unit = (unit or ASSUMED[role]).replace("μ", "µ")  # Greek mu and the micro sign look the same
+    known = UNITS[role]
+    if unit in known:
+        return known[unit]
+    alike = {factor for name, factor in known.items() if name.casefold() == unit.casefold()}
+    if len(alike) == 1:
+        return alike.pop()
+    raise InputError(
+        f"{unit!r} is no known unit of {role}",
+        path=path,
+        line=line,
+        code="log/unit",
+        remedy=f'set units = {{{role} = "{ASSUMED[role]}"}} in [force_log] of specimen.toml, or another of '
+        + ", ".join(known),
+    )
+
+
+def _split_unit(cell: str) -> tuple[str, str]:
+    """Name and unit of a header cell; the unit is empty if none is given."""
+    if found := UNIT_IN_NAME.fullmatch(cell):
+        unit = (found["square"] or found["round"] or found["behind"] or "").strip()
+        return found["base"], "" if unit in NO_UNIT else unit
+    if (found := UNIT_AS_SUFFIX.fullmatch(cell)) and _is_unit(found["unit"]):
+        return found["base"], found["unit"]
+    return cell, ""
+
+
+def _is_unit(token: str) -> bool:
+    return any(token.replace("μ", "µ") in known for known in UNITS.values())
+
+
+def _is_unit_row(row: list[str], index: dict[str, int]) -> bool:
+    """True for a row such as ``;;s;mm;[N];``: units or nothing in every cell, and at least one unit."""
+    bare = [_bare(cell) for cell in row]
+    units = [cell for cell in bare if cell not in NO_UNIT]
+    return bool(units) and all(_is_unit(cell) for cell in units) and len(row) > max(index.values())
+
+
+def _bare(cell: str) -> str:
+    return cell.strip("[]() ")
+
+
+def _plain(cell: str) -> str:
+    """A name as it is compared: small letters, no punctuation, single blanks."""
+    return " ".join(re.sub(r"[_.\-:#]+", " ", cell.casefold()).split())
+
+
+def _same(cell: str, wanted: str) -> bool:
+    return " ".join(cell.casefold().split()) == " ".join(wanted.casefold().split())

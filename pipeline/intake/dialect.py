@@ -1,0 +1,172 @@
+"""How a force log is written: bytes -> lines of cells, numbers as the file's author meant them.
+
+Encodings: UTF-8, UTF-16 and cp1252, with or without byte order mark. Separators: comma, semicolon, tab. Decimal point
+or comma, decided once per file from all its numbers; thousands separators are read where they cannot be mistaken.
+What could be read in two ways with different values is refused with the setting that decides.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Literal
+
+from pipeline.errors import InputError
+
+Decimal = Literal[".", ","]
+Row = tuple[int, list[str]]  # line number from 1, cells
+
+SEPARATORS = ("\t", ";", ",")
+MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
+COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
+INFINITE = ("inf", "-inf", "+inf", "infinity")
+MISSING = frozenset(
+    ("", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#nv", "null", "none", *INFINITE, "#wert!", "#value!")
+)
+# Digit grouping by space or apostrophe, and the typographic minus sign
+SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
+
+
+def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str, str]:
+    """Text of a force log and the encoding it was read in.
+
+    UTF-16 without byte order mark shows as zero bytes at every other place; text that is not UTF-8 is taken as cp1252,
+    the encoding of western Windows programs.
+
+    Raises
+    ------
+    InputError
+        ``log/encoding`` if the bytes are no text.
+    """
+    name = encoding or _guess(data)
+    try:
+        text = data.decode(name)
+    except UnicodeDecodeError as error:
+        raise _no_text(path) from error
+    text = text.removeprefix("\ufeff")
+    if "\0" in text:
+        raise _no_text(path)
+    return text.replace("\r\n", "\n").replace("\r", "\n"), name
+
+
+def _guess(data: bytes) -> str:
+    for mark, name in MARKS:
+        if data.startswith(mark):
+            return name
+    head = data[:2000]
+    if len(head) >= 4 and len(head) % 2 == 0:
+        even, odd = head[0::2].count(0), head[1::2].count(0)
+        if odd > 0.4 * len(head) / 2 and even == 0:
+            return "utf-16-le"
+        if even > 0.4 * len(head) / 2 and odd == 0:
+            return "utf-16-be"
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _no_text(path: Path) -> InputError:
+    return InputError(
+        "is no text in UTF-8, UTF-16 or cp1252",
+        path=path,
+        code="log/encoding",
+        remedy="export it as CSV text, or set encoding in [force_log] of specimen.toml",
+    )
+
+
+def cells(text: str, separator: str) -> list[Row]:
+    """Lines that are not blank, split into stripped cells.
+
+    Line by line, so that a stray quotation mark cannot swallow the rest of the file.
+    """
+    rows = []
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.strip(" \t;,"):
+            continue
+        if '"' in line and len(line) < csv.field_size_limit():
+            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        else:
+            parts = line.split(separator)
+        rows.append((number, [part.strip() for part in parts]))
+    return rows
+
+
+def is_missing(cell: str) -> bool:
+    """True for the ways in which programs write "no value", infinity included."""
+    return cell.casefold() in MISSING
+
+
+def decimal_sign(tokens: Iterable[str], *, path: Path, separator: str, decimal: Decimal | None = None) -> Decimal:
+    """The decimal sign of a file from all its number cells.
+
+    Raises
+    ------
+    InputError
+        ``log/ambiguous-decimal`` if both readings are possible and differ.
+    """
+    if decimal is not None:
+        return decimal
+    smooth = [token.translate(SMOOTH) for token in tokens if not is_missing(token)]
+    marked = [token for token in smooth if "." in token or "," in token]
+    if not marked or (separator == "," and not any("," in token for token in marked)):
+        return "."
+    point = [token for token in marked if not _fits(POINT, token)]
+    comma = [token for token in marked if not _fits(COMMA, token)]
+    if bool(point) != bool(comma):
+        return "," if point else "."
+    if point:  # neither fits everywhere: the majority; the cells that do not fit are complained about one by one
+        return "." if len(point) <= len(comma) else ","
+    # Both fit: every number with a mark looks like 1,234 or 1.234, a thousand or a fraction
+    raise InputError(
+        f"{marked[0]!r} may be a fraction or a thousand, and no other number of the file decides",
+        path=path,
+        code="log/ambiguous-decimal",
+        remedy='set decimal = "," or decimal = "." in [force_log] of specimen.toml',
+    )
+
+
+def _fits(pattern: re.Pattern[str], token: str) -> bool:
+    """True if the whole token is a number of that notation; a leading 0 group such as 0,500 is no thousand."""
+    return bool(pattern.fullmatch(token)) and any(map(str.isdigit, token)) and not _zero_group(pattern, token)
+
+
+def _zero_group(pattern: re.Pattern[str], token: str) -> bool:
+    mark = "," if pattern is POINT else "."
+    return mark in token and token.lstrip("+-").startswith("0")
+
+
+def looks_like_number(cell: str) -> bool:
+    """True for a number in either notation."""
+    token = cell.translate(SMOOTH)
+    return _fits(POINT, token) or _fits(COMMA, token)
+
+
+def to_number(cell: str, decimal: Decimal) -> float | None:
+    """Value of a cell; None if it is no number in this notation.
+
+    Missing values (see `is_missing`) are not numbers: ask for them before.
+    """
+    token = cell.translate(SMOOTH)
+    if not _fits(POINT if decimal == "." else COMMA, token):
+        return None
+    plain = token.replace("," if decimal == "." else ".", "").replace(",", ".")
+    return float(plain)
+
+
+def decimals(cell: str, decimal: Decimal) -> int:
+    """Digits behind the decimal sign: the resolution of the log."""
+    mantissa = re.split("[eE]", cell.translate(SMOOTH), maxsplit=1)
+    shift = int(mantissa[1]) if len(mantissa) > 1 else 0
+    return len(mantissa[0].partition(decimal)[2].strip()) - shift
+
+
+def column_names(rows: Sequence[Row]) -> str:
+    """The cells of a row for a message: at most ten, in quotes."""
+    names = [repr(cell) for cell in rows[0][1] if cell][:10] if rows else []
+    return ", ".join(names) or "nothing"

@@ -1,0 +1,74 @@
+"""The force log: a text file as testing machines and people write it -> load steps.
+
+bytes -> text (`dialect`) -> columns and units (`columns`) -> samples in SI units (`samples`) -> holds with the force at
+the moment of the photo (`holds`, `holdforce`). Forces are positive in compression, displacements toward the other
+bearing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.intake.access import read_bytes
+from pipeline.intake.columns import Columns, find_columns
+from pipeline.intake.dialect import decode
+from pipeline.intake.holds import load_steps
+from pipeline.intake.noted import inferred
+from pipeline.intake.samples import read_samples
+from pipeline.intake.specimenfile import LogSpec
+from pipeline.records import Finding, LoadStep
+from pipeline.settings.intake import IntakeSettings
+
+
+@dataclass(frozen=True)
+class ForceLog:
+    """A force log, read: its steps in the order of the test, how it was read, and what a reader must know."""
+
+    steps: tuple[LoadStep, ...]
+    columns: Columns
+    encoding: str
+    findings: tuple[Finding, ...]
+
+
+def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> ForceLog:
+    """Read a force log.
+
+    Parameters
+    ----------
+    path : Path
+    spec : LogSpec
+        What the user says about it in ``specimen.toml``.
+    settings : IntakeSettings
+
+    Returns
+    -------
+    ForceLog
+
+    Raises
+    ------
+    InputError
+        Codes ``file/...`` and ``log/...``: not readable, empty, no columns of force and displacement, a cell that is no
+        number, a notation that can be read in two ways.
+    """
+    text, encoding = decode(
+        read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
+    )
+    columns, rows = find_columns(text, spec, path=path, settings=settings)
+    samples = read_samples(rows, columns, spec, path=path, settings=settings)
+    steps, findings = load_steps(samples, spec, path=path, settings=settings)
+    return ForceLog(steps, columns, encoding, (*_reading(columns, encoding, path), *samples.findings, *findings))
+
+
+def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:
+    """What was inferred about the notation."""
+    findings = []
+    if encoding == "cp1252":
+        findings.append(inferred("log/encoding-inferred", f"{path.name}: read as cp1252, because it is not UTF-8"))
+    if columns.skipped_lines:
+        message = f"{columns.skipped_lines} lines above the header, line {columns.header_line}, were skipped"
+        findings.append(inferred("log/metadata", f"{path.name}: {message}"))
+    if columns.assumed:
+        taken = ", ".join(f"{role} in {columns.units[role]}" for role in columns.assumed)
+        findings.append(inferred("log/unit-assumed", f"{path.name}: no unit given; taken as {taken}"))
+    return findings

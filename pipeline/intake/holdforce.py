@@ -1,0 +1,188 @@
+"""The force at the time of the photo, from the samples of a hold: samples -> force and its standard deviation.
+
+While a step is held the force relaxes and the load cell drifts; the photo sees one moment. All holds of a log are
+fitted together by polynomials in time of one degree, the lowest after which the holds as a whole ask for no higher one
+(F-test over all holds), so that no hold picks its own trend by chance. Symbols: ``t`` time scaled to -1..1 in a hold,
+``sigma`` the standard deviation of one sample, ``rho`` the correlation of neighbouring samples.
+
+Source: ordinary least squares and its prediction variance, Draper & Smith, Applied Regression Analysis, 3rd ed.,
+sections 3.1 and 6.1; variance inflation (1 + rho)/(1 - rho) of a first-order autoregressive series, Priestley,
+Spectral Analysis and Time Series, section 5.3.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from pipeline.records import Array
+from pipeline.settings.intake import IntakeSettings
+
+FROM_SAMPLES = "samples of the holds"
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Samples of one hold: ``times`` (n,) in s or in sample numbers, ``forces`` (n,) N, time of the photo or None."""
+
+    times: Array
+    forces: Array
+    photo_time: float | None
+
+
+@dataclass(frozen=True)
+class HoldForces:
+    """Force and standard deviation of each hold in N, the degree of the trend, and where the deviation comes from."""
+
+    force: tuple[float, ...]
+    std: tuple[float, ...]
+    degree: int
+    source: str
+
+
+def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSettings) -> HoldForces:
+    """Forces at the times of the photos.
+
+    Parameters
+    ----------
+    holds : sequence of Hold
+        In the order of the log; each with at least one sample.
+    resolution : float
+        N, value of the last digit of the log.
+    settings : IntakeSettings
+
+    Returns
+    -------
+    HoldForces
+        A deviation is never zero: the resolution of the log is its floor, and without repeated samples a share of the
+        largest force (``force_std_relative``) stands in.
+    """
+    largest = max(float(np.max(np.abs(hold.forces))) for hold in holds)
+    floor = max(
+        resolution / math.sqrt(12.0), 1e-9 * largest, 1e-12
+    )  # the last two: a log of zeros or of endless digits
+    degree = _degree(holds, settings)
+    fits = [_Fit.of(hold, degree) for hold in holds]
+    freedom = sum(fit.freedom for fit in fits)
+    if freedom == 0:
+        sigma = max(settings.force_std_relative * largest, floor)
+        return HoldForces(
+            tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, "share of the largest force"
+        )
+    inflation = math.sqrt(_inflation(fits))
+    sigmas = _sigmas(fits, floor)
+    std = tuple(
+        math.hypot(sigma * inflation * fit.leverage, floor, fit.wander) for sigma, fit in zip(sigmas, fits, strict=True)
+    )
+    return HoldForces(tuple(fit.value for fit in fits), std, degree, FROM_SAMPLES)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Trend of one hold: value at the photo, prediction factor, residuals and their degrees of freedom."""
+
+    value: float
+    leverage: float
+    wander: float  # N, how far the trend runs in the hold where the moment of the photo is not known
+    residuals: Array
+    freedom: int
+
+    @classmethod
+    def of(cls, hold: Hold, degree: int) -> _Fit:
+        degree = _possible(hold, degree)
+        t, photo = _scaled(hold)
+        basis = np.polynomial.legendre.legvander(t, degree)
+        at = np.polynomial.legendre.legvander(np.array([0.0 if photo is None else photo]), degree)[0]
+        reference = float(np.mean(hold.forces))  # offsets taken out first: a drift of 1 mN on 100 N keeps its digits
+        coefficients, *_ = np.linalg.lstsq(basis, hold.forces - reference, rcond=None)
+        covariance = np.linalg.pinv(basis.T @ basis)
+        trend = basis @ coefficients
+        return cls(
+            value=reference + float(at @ coefficients),
+            leverage=math.sqrt(float(at @ covariance @ at)),
+            wander=float(np.std(trend)) if photo is None else 0.0,
+            residuals=hold.forces - reference - trend,
+            freedom=len(t) - degree - 1,
+        )
+
+
+def _scaled(hold: Hold) -> tuple[Array, float | None]:
+    """Times of a hold on -1..1; the photo is not allowed outside: no force is extrapolated."""
+    first, last = float(hold.times[0]), float(hold.times[-1])
+    half = (last - first) / 2.0
+    if half <= 0.0:
+        return np.zeros_like(hold.times), None if hold.photo_time is None else 0.0
+    middle = (last + first) / 2.0
+    photo = None if hold.photo_time is None else min(1.0, max(-1.0, (hold.photo_time - middle) / half))
+    return (hold.times - middle) / half, photo
+
+
+def _possible(hold: Hold, degree: int) -> int:
+    """The highest degree a hold supports: at least two samples more than parameters, at distinct times."""
+    return max(0, min(degree, len(hold.times) - 3, len(np.unique(hold.times)) - 2))
+
+
+def _degree(holds: Sequence[Hold], settings: IntakeSettings) -> int:
+    """The lowest degree to which neither one nor two more degrees add significantly, over all holds."""
+    rss, freedom = [], []
+    for degree in range(settings.trend_degree_max + 3):
+        fits = [_Fit.of(hold, degree) for hold in holds]
+        rss.append(sum(float(fit.residuals @ fit.residuals) for fit in fits))
+        freedom.append(sum(fit.freedom for fit in fits))
+    for degree in range(settings.trend_degree_max):
+        steps = (degree + 1, degree + 2)
+        if all(
+            _p_value(rss[degree], freedom[degree], rss[more], freedom[more]) > settings.trend_level for more in steps
+        ):
+            return degree
+    return settings.trend_degree_max
+
+
+def _p_value(rss: float, freedom: int, rss_more: float, freedom_more: int) -> float:
+    """F-test of a larger against a smaller model; 1 where it cannot be made."""
+    added = freedom - freedom_more
+    if added <= 0 or freedom_more <= 0 or rss_more <= 0.0:
+        return 1.0
+    return float(special.fdtrc(added, freedom_more, (rss - rss_more) / added / (rss_more / freedom_more)))
+
+
+def _inflation(fits: Sequence[_Fit]) -> float:
+    """(1 + rho)/(1 - rho) from the residuals of all holds; at least 1.
+
+    A fit of p parameters to n white samples leaves neighbours correlated by about -p/n; that is added back.
+    """
+    products = sum(float(fit.residuals[1:] @ fit.residuals[:-1]) for fit in fits)
+    squares = sum(float(fit.residuals @ fit.residuals) for fit in fits)
+    samples = sum(len(fit.residuals) for fit in fits)
+    parameters = sum(len(fit.residuals) - fit.freedom for fit in fits)
+    if squares <= 0.0:
+        return 1.0
+    rho = products / squares + parameters / samples
+    noticeable = 2.0 / math.sqrt(samples)  # below two standard errors of rho the samples count as independent
+    rho = min(0.95, rho) if rho > noticeable else 0.0
+    return (1.0 + rho) / (1.0 - rho)
+
+
+def _sigmas(fits: Sequence[_Fit], floor: float) -> list[float]:
+    """Standard deviation of a sample in each hold: common to all unless Bartlett's test at 1 % says they differ.
+
+    Where they differ each hold keeps its own, drawn toward the common one with the weight of four samples: a variance
+    from few samples is itself uncertain.
+    """
+    freedom = np.array([fit.freedom for fit in fits], dtype=np.float64)
+    rss = np.array([float(fit.residuals @ fit.residuals) for fit in fits])
+    pooled = max(float(rss.sum() / freedom.sum()), floor**2)
+    used = freedom > 0
+    variances = np.maximum(rss[used] / freedom[used], floor**2)
+    if np.count_nonzero(used) > 1:
+        nu, groups = freedom[used], int(np.count_nonzero(used))
+        correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (groups - 1))
+        statistic = (nu.sum() * math.log(pooled) - float(np.sum(nu * np.log(variances)))) / correction
+        if special.chdtrc(groups - 1, max(statistic, 0.0)) < 0.01:
+            weight = 4.0
+            return [math.sqrt(v) for v in (rss + weight * pooled) / (freedom + weight)]
+    return [math.sqrt(pooled)] * len(fits)

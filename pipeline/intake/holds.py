@@ -1,0 +1,206 @@
+"""Samples -> load steps: which rows form a hold, with which photo and force.
+
+A hold is a run of rows with one step number and branch, or, where the log has no step numbers, with one displacement.
+Signs of the result: force positive in compression, displacement positive toward the other bearing (see `signs`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
+from pipeline.intake.noted import doubtful, inferred
+from pipeline.intake.order import order_findings
+from pipeline.intake.samples import Samples
+from pipeline.intake.signs import force_sign, inferred_branches, signed_displacements
+from pipeline.intake.specimenfile import LogSpec
+from pipeline.records import Array, Finding, LoadStep
+from pipeline.settings.intake import IntakeSettings
+
+
+@dataclass(frozen=True)
+class Run:
+    """Rows ``first`` to ``last`` (exclusive) of the samples that form a hold, and its step number."""
+
+    first: int
+    last: int
+    step: int
+
+    @property
+    def rows(self) -> slice:
+        """The rows, to index arrays with."""
+        return slice(self.first, self.last)
+
+
+def load_steps(
+    samples: Samples, spec: LogSpec, *, path: Path, settings: IntakeSettings
+) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
+    """Group the samples into steps.
+
+    Raises
+    ------
+    InputError
+        ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters.
+    """
+    name = path.name
+    displacements, turned = signed_displacements(samples.displacements, name)
+    travel = float(np.ptp(displacements)) or float(abs(displacements[0])) or 1.0
+    tolerance = settings.same_displacement_relative * travel
+    runs, grouped = _runs(samples, displacements, tolerance, name=name, settings=settings)
+    _check_swapped(samples, runs, path)
+    positions = [_position(samples, displacements, run) for run in runs]
+    means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
+    sign, signed = force_sign(means, np.array(positions), spec, name=name, settings=settings)
+    forces = sign * samples.forces
+    fitted = hold_forces(
+        [_hold(samples, forces, run) for run in runs], resolution=samples.resolution, settings=settings
+    )
+    if samples.branches is None:
+        branches, directed = inferred_branches(positions, fitted.force, tolerance, name=name, settings=settings)
+    else:
+        branches, directed = [samples.branches[run.first] for run in runs], []
+    steps = tuple(
+        LoadStep(
+            step=run.step,
+            branch=branch,
+            displacement_m=position,
+            force_N=force,
+            force_std_N=std,
+            photo_time_s=_photo_time(samples, run),
+            times_s=np.empty(0) if samples.times is None else samples.times[run.rows],
+            forces_N=forces[run.rows],
+            image=next((image for image in samples.images[run.rows] if image), None),
+            line=samples.lines[run.first],
+        )
+        for run, branch, position, force, std in zip(runs, branches, positions, fitted.force, fitted.std, strict=True)
+    )
+    within = _hold_findings(samples, displacements, runs, tolerance, name)
+    order = order_findings(steps, tolerance, name=name)
+    return steps, (*turned, *grouped, *signed, *directed, *_fit_findings(fitted, name, settings), *within, *order)
+
+
+def _runs(
+    samples: Samples, displacements: Array, tolerance: float, *, name: str, settings: IntakeSettings
+) -> tuple[list[Run], list[Finding]]:
+    """Holds in the order of the log, with unique step numbers."""
+    branches = samples.branches or ("",) * len(samples.lines)
+    if samples.steps is not None:
+        marks = list(zip(samples.steps, branches, strict=True))
+        starts = [0, *(row for row in range(1, len(marks)) if marks[row] != marks[row - 1])]
+        return _numbered(samples, starts, displacements, tolerance, name)
+    starts = [0]
+    for row in range(1, len(displacements)):
+        moved = abs(displacements[row] - displacements[starts[-1]]) > tolerance
+        if moved or branches[row] != branches[row - 1]:
+            starts.append(row)
+    stretches = list(pairwise([*starts, len(displacements)]))
+    long = [pair for pair in stretches if pair[1] - pair[0] >= settings.hold_min_samples]
+    held = [pair for pair in stretches if pair in long or any(samples.images[slice(*pair)])] if long else stretches
+    way = f", {len(stretches) - len(held)} shorter ones are the way between them" if len(held) < len(stretches) else ""
+    message = f"{name}: no step numbers; {len(held)} stretches of constant displacement are the steps{way}"
+    runs = [Run(first, last, number) for number, (first, last) in enumerate(held)]
+    return runs, [inferred("log/steps-inferred", message)]
+
+
+def _numbered(
+    samples: Samples, starts: Sequence[int], displacements: Array, tolerance: float, name: str
+) -> tuple[list[Run], list[Finding]]:
+    """Holds by the step column; numbers that are missing or come back are replaced by the order of the log."""
+    labels = samples.steps or ()
+    pairs = list(pairwise([*starts, len(labels)]))
+    numbers = [_number(labels[first]) for first in starts]
+    known = [number for number in numbers if number is not None]
+    if len(set(known)) == len(numbers):
+        return [Run(*pair, number) for pair, number in zip(pairs, known, strict=True)], []
+    message = f"{name}: the step numbers are not unique numbers; the steps were numbered in their order"
+    noted = [inferred("log/steps-renumbered", message)]
+    for place, number in enumerate(numbers):
+        if number is None or number not in numbers[:place]:
+            continue
+        first, again = starts[numbers.index(number)], starts[place]
+        if abs(displacements[again] - displacements[first]) > tolerance:
+            lines = f"lines {samples.lines[first]} and {samples.lines[again]}"
+            places = f"{displacements[first] * 1e3:.4g} and {displacements[again] * 1e3:.4g} mm"
+            noted.append(doubtful("steps/doubled", f"{name}, {lines}: step {number} stands for {places}"))
+    return [Run(*pair, number) for number, pair in enumerate(pairs)], noted
+
+
+def _number(label: str) -> int | None:
+    """Step number of a cell such as ``3``, ``3.0`` or ``Stufe 3``."""
+    found = re.fullmatch(r"\D*?(\d{1,9})(?:[.,]0*)?", label, re.ASCII)
+    return int(found[1]) if found else None
+
+
+def _rows_with_photo(samples: Samples, run: Run) -> list[int]:
+    """Rows that name the (first) photo of a hold."""
+    named = [row for row in range(run.first, run.last) if samples.images[row]]
+    return [row for row in named if samples.images[row] == samples.images[named[0]]]
+
+
+def _position(samples: Samples, displacements: Array, run: Run) -> float:
+    """Displacement at the photo, or the median of the hold."""
+    rows = _rows_with_photo(samples, run) or list(range(run.first, run.last))
+    return float(np.median(displacements[rows]))
+
+
+def _photo_time(samples: Samples, run: Run) -> float | None:
+    rows = _rows_with_photo(samples, run)
+    return float(np.mean(samples.times[rows])) if rows and samples.times is not None else None
+
+
+def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
+    """Forces of a run over time, or over the number of the sample where the log has no time."""
+    rows = _rows_with_photo(samples, run)
+    times = np.arange(len(forces), dtype=np.float64) if samples.times is None else samples.times
+    return Hold(times[run.rows], forces[run.rows], photo_time=float(np.mean(times[rows])) if rows else None)
+
+
+def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
+    """Refuse a log whose force stands still to the last digit in every hold while its displacement scatters."""
+    holds = [run.rows for run in runs if run.last - run.first > 2]
+    if len(holds) < 2 or any(np.ptp(samples.forces[hold]) > 0.0 for hold in holds):
+        return
+    scatter = [float(np.ptp(samples.displacements[hold])) for hold in holds]
+    if min(scatter) > 0.0 and np.ptp(samples.forces) > 0.0:
+        raise InputError(
+            f"the force is constant in each of {len(holds)} holds while the displacement scatters by "
+            f"{max(scatter) * 1e3:.3g} mm: the two columns seem to be swapped",
+            path=path,
+            code="log/swapped-columns",
+            remedy="correct the header, or name the columns in [force_log] of specimen.toml",
+        )
+
+
+def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> Iterator[Finding]:
+    """How the forces and their standard deviations were found, where that is not the plain mean of a hold."""
+    if fitted.degree:
+        message = f"{name}: the force changes while a step is held; it was taken at the moment of the photo"
+        yield inferred("log/trend", f"{message}, from a trend of degree {fitted.degree} in time")
+    if fitted.source != FROM_SAMPLES:
+        share = f"{settings.force_std_relative:.1%} of the largest force, {fitted.std[0]:.3g} N"
+        yield inferred("log/force-std", f"{name}: no repeated samples; standard deviation of a force taken as {share}")
+
+
+def _hold_findings(
+    samples: Samples, displacements: Array, runs: Sequence[Run], tolerance: float, name: str
+) -> Iterator[Finding]:
+    """Contradictions within a hold: a displacement that moves, more than one photo."""
+    for run in runs:
+        place = f"{name}, line {samples.lines[run.first]}"
+        spread = float(np.ptp(displacements[run.rows]))
+        if spread > 5.0 * tolerance:
+            message = (
+                f"the displacement moves by {spread * 1e3:.3g} mm within step {run.step}; that at the photo was taken"
+            )
+            yield doubtful("steps/displacement-spread", f"{place}: {message}")
+        images = list(dict.fromkeys(image for image in samples.images[run.rows] if image))
+        if len(images) > 1:
+            message = f"step {run.step} names {len(images)} photos; {images[0]!r} was taken, {images[1]!r} not"
+            yield doubtful("photo/several", f"{place}: {message}")

@@ -1,0 +1,226 @@
+"""The photos of a specimen folder: which files they are, in which order, and which belongs to which step.
+
+Thumbnails, system files and the calibration folder are left out. Names sort as people count: ``bild_2`` before
+``bild_10``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from pipeline.errors import InputError
+from pipeline.intake.access import check_file, inside, sha256
+from pipeline.intake.noted import doubtful, inferred
+from pipeline.records import Finding, LoadStep
+from pipeline.settings.intake import IntakeSettings
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+FOLDERS = ("images", "bilder", "fotos", "photos", "pictures", "aufnahmen")
+NO_PHOTO = re.compile(r"^\.|^~|^@|thumb|vorschau|preview|^__macosx$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class FoundPhotos:
+    """Photos that exist: ``paths`` by name as the steps use it, their hashes, steps with their photos, findings."""
+
+    paths: dict[str, Path]
+    hashes: dict[str, str]
+    steps: tuple[LoadStep, ...]
+    findings: tuple[Finding, ...]
+
+
+def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
+    """Key by which names sort as people count."""
+    parts = re.split(r"(\d+)", name.casefold())
+    return tuple((0, int(part)) if part.isdecimal() and part.isascii() else (1, part) for part in parts if part)
+
+
+def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings) -> tuple[str, ...]:
+    """Names (relative, with ``/``) of the photos of a folder in natural order.
+
+    Photos lie in ``images`` (or a folder of the like, see ``FOLDERS``) or beside ``specimen.toml``.
+
+    Raises
+    ------
+    InputError
+        ``folder/too-many-photos``.
+    """
+    names = []
+    for place in ("", *(entry for entry in _entries(folder) if entry.casefold() in FOLDERS)):
+        directory = folder / place
+        if without is not None and os.path.realpath(directory) == os.path.realpath(without):
+            continue
+        if place and inside(folder, place, allow_outside=settings.allow_outside) is None:
+            continue
+        names += [str(PurePosixPath(place) / entry) for entry in _entries(directory) if _is_photo(entry)]
+    if len(names) > settings.photos_max:
+        raise InputError(
+            f"holds {len(names)} photos, the limit is {settings.photos_max}",
+            path=folder,
+            code="folder/too-many-photos",
+            remedy="split it or raise intake.photos_max",
+        )
+    return tuple(sorted(names, key=natural_key))
+
+
+def _entries(directory: Path) -> list[str]:
+    """Names in a directory; none if it cannot be read."""
+    try:
+        return sorted(entry.name for entry in directory.iterdir())
+    except OSError:
+        return []
+
+
+def _is_photo(name: str) -> bool:
+    return PurePosixPath(name).suffix.casefold() in SUFFIXES and not NO_PHOTO.search(name)
+
+
+def match_photos(
+    folder: Path, steps: Sequence[LoadStep], *, calibration: Path | None, log_name: str, settings: IntakeSettings
+) -> FoundPhotos:
+    """Find the photo of each step.
+
+    Raises
+    ------
+    InputError
+        ``folder/no-photos`` if there is none at all, ``log/photos-ambiguous`` if the log names none and the number of
+        photos does not fit the steps.
+    """
+    present = list_photos(folder, without=calibration, settings=settings)
+    findings: list[Finding] = []
+    if not any(step.image for step in steps):
+        steps, noted = _by_order(folder, steps, present, log_name)
+        findings += noted
+    paths: dict[str, Path] = {}
+    hashes: dict[str, str] = {}
+    used: dict[str, int] = {}
+    matched = []
+    for step in steps:
+        if step.image is None:
+            matched.append(step)
+            continue
+        name, noted = _present_name(folder, step, present, log_name, settings)
+        findings += noted
+        if name is not None and name in used:
+            findings.append(
+                doubtful("photo/doubled", f"steps {used[name]} and {step.step} name the same photo {name!r}")
+            )
+        if name is not None:
+            used[name] = step.step
+            path, digest, trouble = _checked(folder, name, settings)
+            findings += trouble
+            if path is not None:
+                paths[name], hashes[name] = path, digest
+        matched.append(step if name is None else replace(step, image=name))
+    if not paths:
+        raise InputError(
+            "has no photo that can be used" + (f" ({findings[-1].message})" if findings else ""),
+            path=folder,
+            code="folder/no-photos",
+            remedy="put the photos into its folder images, as named in the force log",
+        )
+    unused = [name for name in present if name not in used]
+    if unused:
+        findings.append(
+            inferred("photo/unused", f"{len(unused)} photos belong to no step and were not measured: {_some(unused)}")
+        )
+    return FoundPhotos(paths, hashes, tuple(matched), (*findings, *_same_contents(hashes)))
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+
+
+def _by_order(
+    folder: Path, steps: Sequence[LoadStep], present: Sequence[str], log_name: str
+) -> tuple[list[LoadStep], list[Finding]]:
+    """Photos for steps of a log that names none: by the step numbers in their names, or one for each in order."""
+    if not present:
+        raise InputError(
+            "has no photos", path=folder, code="folder/no-photos", remedy="put the photos into its folder images"
+        )
+    numbers = [_last_number(name) for name in present]
+    at = {step.step: place for place, step in enumerate(steps)}
+    if len(present) == len(steps):
+        chosen, how = dict(enumerate(present)), "in the natural order of their names"
+    elif None not in numbers and len(set(numbers)) == len(numbers) and set(numbers) <= at.keys():
+        chosen = {at[number]: name for number, name in zip(numbers, present, strict=True) if number is not None}
+        how = "by the step numbers in their names"
+    else:
+        raise InputError(
+            f"names no photos, and {len(present)} photos cannot be told to {len(steps)} steps",
+            path=folder / log_name,
+            code="log/photos-ambiguous",
+            remedy="add a column image with the name of the photo in one row of each step",
+        )
+    assigned = [replace(step, image=chosen.get(place)) for place, step in enumerate(steps)]
+    pairs = ", ".join(f"{step.step}: {step.image}" for step in assigned[:3])
+    message = f"{log_name} names no photos; {len(chosen)} photos were given to the steps {how} ({pairs}, ...)"
+    return assigned, [(inferred if len(chosen) == len(steps) else doubtful)("photo/inferred", message)]
+
+
+def _last_number(name: str) -> int | None:
+    found = re.findall(r"\d{1,9}", PurePosixPath(name).stem)
+    return int(found[-1]) if found else None
+
+
+def _present_name(
+    folder: Path, step: LoadStep, present: Sequence[str], log_name: str, settings: IntakeSettings
+) -> tuple[str | None, list[Finding]]:
+    """Name of the existing file meant by a step; None, with a finding, if there is none."""
+    written = step.image or ""
+    name = str(PurePosixPath(written.replace("\\", "/")))
+    place = f"{log_name}, line {step.line}"
+    path = inside(folder, name, allow_outside=settings.allow_outside)
+    if path is None:
+        return None, [doubtful("photo/outside", f"{place}: photo {written!r} leads out of the folder and was not read")]
+    if _exists(path):
+        return name, []
+    alike = [other for other in present if _loose(other) == _loose(name)]
+    alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]
+    if len(alike) == 1:
+        return alike[0], [inferred("photo/name", f"{place}: photo {written!r} was taken to be {alike[0]}")]
+    return None, [
+        doubtful(
+            "photo/missing",
+            f"{place}: photo {written!r} of step {step.step} does not exist; the step keeps its force only",
+        )
+    ]
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _loose(name: str, *, whole: bool = True) -> str:
+    """A name without capitals, folder and (with ``whole=False``) suffix."""
+    path = PurePosixPath(name.casefold())
+    return path.name if whole or path.suffix not in SUFFIXES else path.stem
+
+
+def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | None, str, list[Finding]]:
+    """Path and hash of a photo; a file that cannot be read is a finding, and the rest of the specimen is measured."""
+    path = folder / name
+    try:
+        check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
+        return path, sha256(path), []
+    except InputError as error:
+        return None, "", [doubtful(f"photo/{error.code.partition('/')[2]}", f"{name}: {error.message}; {error.remedy}")]
+
+
+def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
+    """Warnings for photos that are the same file under two names."""
+    first: dict[str, str] = {}
+    findings = []
+    for name, digest in hashes.items():
+        if digest in first:
+            findings.append(doubtful("photo/doubled", f"{name} and {first[digest]} are the same picture"))
+        first.setdefault(digest, name)
+    return findings

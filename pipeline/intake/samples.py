@@ -1,0 +1,255 @@
+"""Rows of a force log -> arrays of samples in SI units, with everything that was inferred or left out as findings.
+
+Cells that hold no value are left out (a step number, branch or displacement that stands only in the first row of its
+hold is carried down); cells that hold something else are refused with their line.
+"""
+
+from __future__ import annotations
+
+import bisect
+import datetime as dt
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.intake.columns import Columns
+from pipeline.intake.dialect import Decimal, Row, decimal_sign, decimals, is_missing, to_number
+from pipeline.intake.noted import doubtful, inferred
+from pipeline.intake.specimenfile import LogSpec
+from pipeline.records import Array, Branch, Finding
+from pipeline.settings.intake import IntakeSettings
+
+BRANCHES: dict[Branch, str] = {
+    "mounted": "mounted|mount|force-free|start|montiert|eingebaut|kraftfrei|nullmessung",
+    "loading": "loading|load|up|forward|push|belastung|belasten|laden|hin|auf|hub",
+    "unloading": "unloading|unload|down|backward|back|return|entlastung|entlasten|zurück|rück|ab",
+}
+BRANCH_OF: dict[str, Branch] = {word: branch for branch, words in BRANCHES.items() for word in words.split("|")}
+CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)", re.ASCII)
+GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T]+(\d{1,2}:\d{1,2}(?::\d{1,2})?)(?:[.,](\d+))?", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples in the order of the log, one entry a row.
+
+    Attributes
+    ----------
+    lines : (n,)
+        Line of the log, from 1.
+    forces, displacements : (n,) N, m
+        Signs as in the log.
+    times : (n,) s, or None
+    steps : tuple of int or str, or None
+        As written; None if the log has no such column.
+    branches : tuple of Branch or None
+    images : tuple of str
+        Empty where the row names none.
+    resolution : N
+        Value of the last digit of the forces.
+    """
+
+    lines: tuple[int, ...]
+    forces: Array
+    displacements: Array
+    times: Array | None
+    steps: tuple[str, ...] | None
+    branches: tuple[Branch, ...] | None
+    images: tuple[str, ...]
+    resolution: float
+    findings: tuple[Finding, ...]
+
+
+def read_samples(
+    rows: Sequence[Row], columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings
+) -> Samples:
+    """Convert the rows below the header.
+
+    Raises
+    ------
+    InputError
+        ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``.
+    """
+    data = rows[columns.first_row :]
+    lines = [line for line, _ in data]
+    _check_widths(data, columns, path)
+    table = {role: [_cell(cells, place) for _, cells in data] for role, place in columns.index.items()}
+    force = table["force"]
+    displacement, carried = _carry_down(table["displacement"])
+    kept = [row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]]
+    if not kept:
+        raise InputError(
+            "holds no row with a force and a displacement",
+            path=path,
+            code="log/empty",
+            remedy="export the log again, one row per sample",
+        )
+    decimal = decimal_sign([*force, *displacement], path=path, separator=columns.separator, decimal=_decimal(spec))
+    numbers = _Numbers(decimal, columns, path, lines, settings.number_limit)
+    steps = _carry_down(table["step"])[0] if "step" in table else []
+    branches = _branches(table["branch"], lines, path) if "branch" in table else None
+    times, noted = _times(table["time"], kept, numbers, settings) if "time" in table else (None, [])
+    images = _kept_images(table.get("image"), kept, len(data))
+    return Samples(
+        lines=tuple(lines[row] for row in kept),
+        forces=numbers.column("force", force, kept),
+        displacements=numbers.column("displacement", displacement, kept),
+        times=times,
+        steps=tuple(steps[row] for row in kept) if any(steps) else None,
+        branches=None if branches is None else tuple(branches[row] for row in kept),
+        images=tuple(images[row] for row in kept),
+        resolution=columns.factor["force"] * 10.0 ** -max(decimals(force[row], decimal) for row in kept),
+        findings=(*_losses(path.name, lines, force, carried), *noted),
+    )
+
+
+def _losses(name: str, lines: Sequence[int], force: Sequence[str], carried: int) -> list[Finding]:
+    """Rows without a force, and displacements carried down."""
+    findings = []
+    empty = [row for row, cell in enumerate(force) if is_missing(cell)]
+    if empty:
+        message = f"{name}: {len(empty)} of {len(force)} rows have no force and were left out"
+        findings.append(doubtful("log/missing-force", f"{message} (first: line {lines[empty[0]]})"))
+    if carried:
+        message = f"{name}: {carried} rows have no displacement; that of the row above was taken"
+        findings.append(inferred("log/carried-down", message))
+    return findings
+
+
+def _decimal(spec: LogSpec) -> Decimal | None:
+    return "," if spec.decimal == "," else "." if spec.decimal == "." else None
+
+
+def _cell(cells: list[str], place: int) -> str:
+    return cells[place] if place < len(cells) else ""
+
+
+def _check_widths(data: Sequence[Row], columns: Columns, path: Path) -> None:
+    for line, cells in data:
+        if any(cells[columns.width :]):
+            remedy = "remove the surplus cells"
+            if columns.separator == ",":
+                remedy = "if the comma is the decimal sign too, export with semicolons or with decimal points"
+            raise InputError(
+                f"{len(cells)} cells under a header of {columns.width}",
+                path=path,
+                line=line,
+                code="log/row-length",
+                remedy=remedy,
+            )
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Cells -> numbers of one file: notation, factors, and where to complain."""
+
+    decimal: Decimal
+    columns: Columns
+    path: Path
+    lines: list[int]
+    limit: float
+
+    def value(self, role: str, cell: str, row: int) -> float:
+        number = to_number(cell, self.decimal)
+        if number is None or abs(number) > self.limit:
+            trouble = "is no number" if number is None else "is beyond any bending test"
+            sign = "point" if self.decimal == "." else "comma"
+            raise InputError(
+                f"{role} {cell[:40]!r} {trouble} (numbers of this file have a decimal {sign})",
+                path=self.path,
+                line=self.lines[row],
+                code="log/not-a-number",
+                remedy="correct the cell or remove the row",
+            )
+        return number
+
+    def column(self, role: str, cells: Sequence[str], kept: Sequence[int]) -> Array:
+        factor = self.columns.factor[role]
+        return np.array([self.value(role, cells[row], row) * factor for row in kept])
+
+
+def _carry_down(cells: Sequence[str]) -> tuple[list[str], int]:
+    """Cells with the gaps filled from above, and how many were filled."""
+    filled, last, count = [], "", 0
+    for cell in cells:
+        if is_missing(cell):
+            count += bool(last)
+        else:
+            last = cell
+        filled.append(last)
+    return filled, count
+
+
+def _kept_images(cells: Sequence[str] | None, kept: Sequence[int], count: int) -> list[str]:
+    """Photo names by row; a name in a row left out moves to the nearest row above that is kept, or else below."""
+    images = ["" if cells is None or is_missing(cells[row]) else cells[row] for row in range(count)]
+    for row in sorted(set(range(count)) - set(kept)):
+        if images[row]:
+            place = max(bisect.bisect_left(kept, row) - 1, 0)
+            images[kept[place]] = images[kept[place]] or images[row]
+    return images
+
+
+def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Branch] | None:
+    """Branch of each row, or None if the column is empty."""
+    filled, _ = _carry_down(cells)
+    if not any(filled):
+        return None
+    first = next(cell for cell in filled if cell)
+    branches = []
+    for line, cell in zip(lines, filled, strict=True):
+        branch = BRANCH_OF.get((cell or first).casefold())
+        if branch is None:
+            raise InputError(
+                f"branch {cell[:40]!r} is not known",
+                path=path,
+                line=line,
+                code="log/branch",
+                remedy="write mounted, loading or unloading, or leave the column out",
+            )
+        branches.append(branch)
+    return branches
+
+
+def _times(
+    cells: Sequence[str], kept: Sequence[int], numbers: _Numbers, settings: IntakeSettings
+) -> tuple[Array | None, list[Finding]]:
+    """Times of the kept rows in s, relative to the first if they are clock times or count from an epoch."""
+    name, lines = numbers.path.name, numbers.lines
+    empty = [row for row in kept if is_missing(cells[row])]
+    if empty:
+        message = f"{name}: {len(empty)} rows have no time (first: line {lines[empty[0]]}); times are not used"
+        return None, [(inferred if len(empty) == len(kept) else doubtful)("log/missing-time", message)]
+    clock = [time for row in kept if (time := _clock_s(cells[row])) is not None]
+    if len(clock) == len(kept):
+        times = np.array(clock)
+    else:
+        wide = replace(numbers, limit=1e15)  # epochs in milliseconds have 13 digits
+        times = wide.column("time", cells, kept)
+    noted = []
+    if clock or float(np.max(np.abs(times))) > settings.epoch_s:
+        noted.append(inferred("log/clock-time", f"{name}: times count from the first row"))
+        times = times - times[0]
+    if np.any(np.diff(times) < 0.0):
+        line = lines[kept[int(np.argmax(np.diff(times) < 0.0)) + 1]]
+        return None, [doubtful("log/time-order", f"{name}, line {line}: time runs backwards; times are not used")]
+    return times, noted
+
+
+def _clock_s(cell: str) -> float | None:
+    """Seconds of ``12:03:04,5``, of an ISO date with time or of ``21.11.2026 08:01:02``; None for anything else."""
+    if found := CLOCK.fullmatch(cell):
+        return 3600.0 * float(found[1] or 0) + 60.0 * float(found[2]) + float(found[3].replace(",", "."))
+    if found := GERMAN_DATE.fullmatch(cell):
+        cell = f"{found[3]}-{found[2]:0>2}-{found[1]:0>2} {found[4]:0>5}" + (f".{found[5][:6]:0<6}" if found[5] else "")
+    elif not re.fullmatch(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d.*", cell):
+        return None
+    try:
+        stamp = dt.datetime.fromisoformat(cell)
+    except ValueError:
+        return None
+    return (stamp.replace(tzinfo=None) - dt.datetime(2000, 1, 1)).total_seconds()  # naive: only differences count

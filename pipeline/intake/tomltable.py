@@ -1,0 +1,206 @@
+"""TOML files with known keys: text -> checked tables, every complaint with its line.
+
+A table of keys says for each name which values it may hold; an unknown name is an error that gives the nearest known
+one, because a misspelt key that is silently ignored costs a measurement. Used for ``specimen.toml`` and for settings.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.errors import InputError
+from pipeline.intake.access import read_bytes
+
+Check = Callable[[Any], Any]
+HEADER = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]")
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """A parsed file: ``tables`` as `tomllib` gives them, ``lines`` to find where a key stands."""
+
+    path: Path
+    tables: dict[str, Any]
+    lines: tuple[str, ...]
+
+    def line_of(self, table: str, key: str | None = None) -> int | None:
+        """Line (from 1) of a key of a table, or of the table's header; None if it is written some unusual way."""
+        current = ""
+        start = re.compile(rf"^\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key is not None else None
+        for number, line in enumerate(self.lines, 1):
+            if header := HEADER.match(line):
+                current = header[1].strip("\"'")
+                if start is None and current == table:
+                    return number
+            elif start is not None and current == table and start.match(line):
+                return number
+        return None
+
+    def error(self, message: str, *, table: str, key: str | None = None, code: str, remedy: str) -> InputError:
+        """An `InputError` at the line of a key."""
+        return InputError(message, path=self.path, line=self.line_of(table, key), code=code, remedy=remedy)
+
+
+def read_toml(path: Path, *, limit: int) -> TomlFile:
+    """Read and parse a TOML file.
+
+    Raises
+    ------
+    InputError
+        ``file/...`` as in `read_bytes`, ``toml/encoding`` if it is not UTF-8, ``toml/syntax`` if it is not TOML.
+    """
+    data = read_bytes(path, limit=limit, setting="toml_max_bytes")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(
+            "is not UTF-8 text", path=path, line=line, code="toml/encoding", remedy="save it as UTF-8"
+        ) from error
+    text = text.replace("\r\n", "\n")
+    lines = tuple(text.split("\n"))
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # besides TOMLDecodeError: integers of 5000 digits, deep nesting
+        found = re.search(r"at line (\d+)", str(error))
+        number = int(found[1]) if found else None
+        shown = "" if number is None else f" ({lines[min(number, len(lines)) - 1].strip()[:60]!r})"
+        raise InputError(
+            f"is not valid TOML{shown}",
+            path=path,
+            line=number,
+            code="toml/syntax",
+            remedy='write key = value, texts in "double quotes", numbers with a decimal point',
+        ) from error
+    return TomlFile(path, tables, lines)
+
+
+def check_names(file: TomlFile, names: Collection[str], known: Collection[str], *, table: str = "") -> None:
+    """Refuse unknown keys (``toml/unknown-key``) or, with ``table=""``, unknown tables (``toml/unknown-table``)."""
+    for name in names:
+        if name in known:
+            continue
+        near = nearest(name, known)
+        place = f"[{table}]" if table else "this file"
+        raise InputError(
+            f"{'key' if table else 'table'} {name!r} is not known in {place}",
+            path=file.path,
+            line=file.line_of(table, name) or file.line_of(name),
+            code="toml/unknown-key" if table else "toml/unknown-table",
+            remedy=f"rename it to {near} or remove it",
+        )
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """The known name most like a misspelt one; the order of ``known`` decides ties."""
+    plain = name.casefold()
+    return max(known, key=lambda candidate: difflib.SequenceMatcher(None, plain, candidate.casefold()).ratio())
+
+
+def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> dict[str, Any]:
+    """Values of one table, each through its check; keys that are not given are absent.
+
+    Raises
+    ------
+    InputError
+        ``toml/unknown-key``, ``toml/wrong-value``.
+    """
+    values = file.tables.get(table, {})
+    if not isinstance(values, dict):
+        raise file.error(
+            f"{table} must be a table",
+            table="",
+            key=table,
+            code="toml/wrong-value",
+            remedy=f"write [{table}] on a line of its own and its keys below",
+        )
+    check_names(file, values, tuple(checks), table=table)
+    result = {}
+    for key, value in values.items():
+        try:
+            result[key] = checks[key](value)
+        except ValueError as refused:
+            shown = repr(value) if len(repr(value)) <= 60 else repr(value)[:57] + "..."
+            raise file.error(
+                f"{key} = {shown} cannot be used",
+                table=table,
+                key=key,
+                code="toml/wrong-value",
+                remedy=f"give {refused}",
+            ) from refused
+    return result
+
+
+# Checks: value -> value; a ValueError says what is wanted, as the object of "give ...".
+
+
+def number(value: Any) -> float:
+    """A finite number."""
+    wanted = "a number"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(wanted)
+    if abs(value) > 1e300 or not math.isfinite(value):  # compares integers too large for a float as well
+        raise ValueError("a finite number")
+    return float(value)
+
+
+def number_in(low: float, high: float, unit: str) -> Check:
+    """A number within a range; outside, the unit is wrong."""
+
+    def check(value: Any) -> float:
+        given = number(value)
+        if not low <= given <= high:
+            raise ValueError(f"a number from {low:g} to {high:g} {unit}")
+        return given
+
+    return check
+
+
+def whole(low: int, high: int) -> Check:
+    """An integer within a range."""
+
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ValueError(f"a whole number from {low} to {high}")
+        return value
+
+    return check
+
+
+def flag(value: Any) -> bool:
+    """True or false."""
+    if not isinstance(value, bool):
+        raise ValueError("true or false")
+    return value
+
+
+def text(value: Any) -> str:
+    """A text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError('a text in "double quotes"')
+    return value.strip()
+
+
+def free_text(value: Any) -> str:
+    """Anything a person may write as a note: texts, numbers, dates."""
+    if isinstance(value, dict | list):
+        raise ValueError('a text in "double quotes"')
+    return str(value)
+
+
+def one_of(*choices: str) -> Check:
+    """One of a few words."""
+
+    def check(value: Any) -> str:
+        if value not in choices:
+            raise ValueError(" or ".join(f'"{choice}"' for choice in choices))
+        return str(value)
+
+    return check
