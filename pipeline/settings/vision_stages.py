@@ -1,4 +1,4 @@
-"""Settings of the stages of ``vision`` before the sub-pixel measurement: unit in the name, reason in the description."""
+"""Settings of the stages of ``vision`` before the sub-pixel measurement: unit and reason in the description."""
 
 from __future__ import annotations
 
@@ -33,10 +33,128 @@ class SegmentationSettings(StageSettings):
     min_contrast_to_noise: float = Field(
         5.0, gt=0, description="ratio; below it the edges' errors stop being Gaussian and false edges win"
     )
+    reduced_side_cells: int = Field(
+        1000,
+        ge=200,
+        description="cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms",
+    )
+    cells_across: float = Field(
+        8.0, ge=4, description="cells across the cable in the reduced photo: a highlight of a fifth is still one cell"
+    )
+    min_ground_std: float = Field(
+        0.002, gt=0, description="fraction of full range; half a level of 8 bits: no ground is calmer than its rounding"
+    )
+    closing_widths: float = Field(
+        0.45, ge=0, lt=1, description="widths; gaps closed in the mask: a highlight takes up to a third of the width"
+    )
+    opening_widths: float = Field(
+        0.3, ge=0, lt=1, description="widths; specks removed: texture is finer than the cable"
+    )
+    thick_widths: float = Field(
+        1.7, gt=1, description="widths; wider things are objects: a soft shadow widens the mask by up to a half"
+    )
+    max_pieces: int = Field(12, ge=1, description="largest pieces of a mask that are traced; the cable is among them")
+    min_piece_widths: float = Field(2.5, gt=0, description="widths; shorter pieces are writing, dirt or texture")
+    width_ratio_range: tuple[float, float] = Field(
+        (0.5, 1.7), description="ratio to the diameter; mask widths of a cable with shadow or with a rim lost in glare"
+    )
+    max_width_guesses: int = Field(
+        3, ge=1, description="widths tried where the diameter is unknown; 1 was right so far"
+    )
+    joint_gap_widths: float = Field(
+        5.0, ge=0, description="widths; a sticker, glare or crossing interrupts the mask by a few widths"
+    )
+    min_length_share: float = Field(
+        0.2, gt=0, lt=1, description="share of the photo's long side; a shorter strip is not the subject of the photo"
+    )
+    visible_share: float = Field(
+        0.55, gt=0, lt=1, description="share of the known length that must be seen; covers hide up to a quarter"
+    )
+    max_length_ratio: float = Field(
+        1.25, gt=1, description="ratio to the known length; longer strips are rails and edges of the table"
+    )
+    rival_share: float = Field(
+        0.5, gt=0, lt=1, description="share of the longest strip's length from which another strip is a rival"
+    )
+    min_branch_widths: float = Field(
+        2.5,
+        gt=1,
+        description="widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches",
+    )
+    junction_widths: float = Field(2.5, gt=0, description="widths; strips' ends that meet at a crossing are so near")
+    level_factors: tuple[float, ...] = Field(
+        (0.5, 2.0, 0.25), description="ratios to Otsu's level that are tried next: texture may push it up or down"
+    )
+    least_level: float = Field(
+        5.0, gt=0, description="sigmas of the ground; the last level at which a cable may be found"
+    )
+    max_covered_share: float = Field(
+        0.5, gt=0, le=1, description="share of the photo; a mask that covers more is ground, not cable"
+    )
+    smoothing_widths: float = Field(
+        0.8, gt=0, description="widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03"
+    )
+    trimmed_widths: float = Field(
+        0.8, gt=0, description="widths; so much of a skeleton's end runs into a corner of the mask and is replaced"
+    )
+    accepted_width_ratio: tuple[float, float] = Field(
+        (0.75, 1.3), description="ratio of measured width to diameter; shadow and glare leave it within 20 %"
+    )
+    max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
+    seen_share: float = Field(
+        0.4, gt=0, lt=1, description="share of the median contrast from which a section counts as seen"
+    )
+    cover_margin_widths: float = Field(
+        0.1, ge=0, description="widths; the blurred rim of a cover spoils the edges so far beyond its circle"
+    )
+    corridor_widths: float = Field(
+        3.0, gt=2, description="widths; half corridor kept at full resolution: flanks and ramps"
+    )
+    max_blur_widths: float = Field(
+        0.2, gt=0, description="widths; beyond it the spreads of both edges overlap in the middle"
+    )
+    search_margin_share: float = Field(
+        0.12,
+        gt=0,
+        description="share of the cable's extent; a step moves the bow by less, else the whole photo is searched",
+    )
+    joint_angle_deg: float = Field(
+        30.0,
+        gt=0,
+        lt=90,
+        description="degrees; over five widths a cable turns by less unless its bend radius is ten widths",
+    )
 
 
 class BearingSettings(StageSettings):
     """Bearing covers and axes."""
+
+    radius_tolerance: float = Field(
+        0.08,
+        gt=0,
+        lt=0.5,
+        description="relative; cover diameter and scale are known to a few percent before the cross-check",
+    )
+    min_rim: float = Field(
+        0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"
+    )
+    edge_over_texture: float = Field(
+        3.0, gt=0, description="ratio to the median gradient in the window; below it texture votes for centres"
+    )
+    candidates: int = Field(3, ge=1, description="best voted centres that are fitted; the rim decides among them")
+    center_std_floor_px: float = Field(
+        0.02, gt=0, description="px; light and rounding of the cover move the centre by so much whatever the noise"
+    )
+    given_std_px: float = Field(1.0, gt=0, description="px; how well a person reads an axis off a screen")
+    end_std_widths: float = Field(
+        0.1, gt=0, description="widths; a cut or clamped end is found to about a tenth of the cable's width"
+    )
+    vertical_deg: float = Field(
+        10.0,
+        gt=0,
+        lt=45,
+        description="degrees; a chord nearer to the vertical has no left end that a person would agree on",
+    )
 
 
 class SeriesSettings(StageSettings):

@@ -1,6 +1,6 @@
 """Pixels of the photo to metres on the plane of the cable axis, and back: points are carried, never pictures.
 
-``pixel (u, v) -> undistorted pixel (lens) -> plane (x, y) in m (homography) -> scaled about the foot of the camera (height)``
+``pixel (u, v) -> undistorted pixel (lens) -> plane (x, y) in m (homography, at the height of the cable axis)``
 
 Plane axes: right-handed as the pixel axes are (``x`` roughly along ``u``, ``y`` roughly along ``v``, downward on the
 photo), origin anywhere: only differences matter, the chord frame follows from the bearing axes.

@@ -1,4 +1,4 @@
-"""What the search for the cable hands to the sub-pixel measurement: a cable found to about a pixel, and why to trust it.
+"""What the search hands to the sub-pixel measurement: a cable found to about a pixel, and why to trust it.
 
 Pixel coordinates ``(u, v)`` are those of the photo as displayed; (0, 0) is the centre of the top-left pixel, ``u`` runs
 right, ``v`` down. Grey values are fractions of the photo's full range (0 black, 1 white) along one colour projection.
@@ -50,8 +50,9 @@ class RoughCable:
     image : str
         Name relative to the specimen folder.
     path_px : (k, 2) px
-        Polyline ``(u, v)`` from the left to the right bearing axis, smooth, points about evenly spaced (at most a quarter
-        of the cable's width apart). Where the cable is seen it lies within about a tenth of the width of the midline.
+        Polyline ``(u, v)`` from the left to the right bearing axis, smooth, points about evenly spaced (at most a
+        quarter of the cable's width apart). Where the cable is seen it lies within about a tenth of the width of
+        the midline.
     visible : (first, last)
         Indices into ``path_px``, both included: the part in which the cable is seen. Outside, the path runs straight to
         the bearing axis and carries no information.

@@ -1,0 +1,94 @@
+"""The two bearing axes on a photo: round covers, pixels given by the user, or the visible ends of the cable.
+
+Left and right are those of the photo as displayed: the left axis has the smaller ``u``. Where the chord stands
+within ``settings.vertical_deg`` of the vertical (camera turned by 90 degrees), the upper axis is called left on a
+single photo; over a series the bearing that moves decides (`pipeline.vision.series`).
+Units: px.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.covers import find_cover
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import AxisKind, Bearing
+
+PixelPair = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class BearingHints:
+    """What is known about the bearings before the photo is looked at.
+
+    Attributes
+    ----------
+    cover_px : px or None
+        Diameter of the round covers, from their size and the scale.
+    cover_widths : float or None
+        Their diameter in diameters of the cable, where the scale is not known.
+    given_px : pair of (u, v) or None
+        Axes by the user.
+    """
+
+    cover_px: float | None = None
+    cover_widths: float | None = None
+    given_px: PixelPair | None = None
+
+    def cover_radius(self, width_px: float) -> float | None:
+        """Expected radius of a cover in px; None if there are no covers."""
+        if self.cover_px is not None:
+            return 0.5 * self.cover_px
+        return None if self.cover_widths is None else 0.5 * self.cover_widths * width_px
+
+
+@dataclass(frozen=True)
+class CableEnd:
+    """One visible end of the cable: place and outward direction in px, and whether a larger object hides the rest."""
+
+    place: Array
+    outward: Array
+    at_object: bool = False
+
+
+def find_bearings(
+    photo: Photo, ends: tuple[CableEnd, CableEnd], width_px: float, hints: BearingHints, settings: BearingSettings
+) -> tuple[Bearing | None, Bearing | None]:
+    """Axes at the two ends of the cable, in the order of ``ends``; None where a cover should be and is not found."""
+    if hints.given_px is not None:
+        return _assign_given(ends, hints.given_px, settings)
+    radius = hints.cover_radius(width_px)
+    if radius is None:
+        first, second = (_visible_end(end, width_px, settings) for end in ends)
+        return first, second
+    circles = [find_cover(photo, end.place, end.outward, radius, settings) for end in ends]
+    first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
+    return first, second
+
+
+def _assign_given(
+    ends: tuple[CableEnd, CableEnd], given: PixelPair, settings: BearingSettings
+) -> tuple[Bearing, Bearing]:
+    a, b = np.array(given[0], float), np.array(given[1], float)
+    straight = np.hypot(*(a - ends[0].place)) + np.hypot(*(b - ends[1].place))
+    crossed = np.hypot(*(b - ends[0].place)) + np.hypot(*(a - ends[1].place))
+    first, second = (a, b) if straight <= crossed else (b, a)
+    return tuple(Bearing((float(p[0]), float(p[1])), settings.given_std_px, kind="given") for p in (first, second))
+
+
+def _visible_end(end: CableEnd, width_px: float, settings: BearingSettings) -> Bearing:
+    kind: AxisKind = "clamp" if end.at_object else "end"
+    std = settings.end_std_widths * width_px
+    return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)
+
+
+def left_first(first: Array, second: Array, settings: BearingSettings) -> bool:
+    """True if ``first`` (u, v) is the left axis by the convention of this module."""
+    du, dv = np.asarray(second, float) - np.asarray(first, float)
+    if abs(du) <= np.tan(np.radians(settings.vertical_deg)) * abs(dv):
+        return bool(dv > 0)
+    return bool(du > 0)

@@ -1,0 +1,160 @@
+"""Which strip is the cable: levels, polarities and widths tried until one reading of the photo makes sense.
+
+The first reading, everything that differs from the ground at Otsu's level, serves most photos. Others are tried only
+where it finds nothing long enough: other levels, one polarity (a shadow of the other one melts into the cable), one
+colour difference (a grey shadow beside a coloured cable).
+All lengths in cells of the reduced photo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.vision.backdrop import Image, Standout
+from pipeline.vision.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Strips found in one mask, longest first; ``mask`` and ``thick`` are 0/1 pictures, ``level`` in ground sigmas."""
+
+    strips: tuple[Strip, ...]
+    mask: Mask
+    thick: Mask
+    width: float
+    level: float
+
+    @property
+    def longest(self) -> float:
+        """Length of the longest strip, 0 without any."""
+        return self.strips[0].length if self.strips else 0.0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the cable must look like, in cells: ``width`` if known, least length, greatest length if known."""
+
+    width: float | None
+    least_length: float
+    most_length: float = np.inf
+    across_objects: bool = True  # False where covers interrupt the cable: beyond a cover it is not the cable any more
+
+
+def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading:
+    """The first reading with a strip that is long enough and does not branch, or else the best."""
+    best = Reading((), np.zeros((1, 1), np.uint8), np.zeros((1, 1), np.uint8), wanted.width or 0.0, 0.0)
+    for picture, level in _pictures(standout, settings):
+        for reading in _readings(picture, level, wanted, settings):
+            if reading.longest >= wanted.least_length and reading.strips[0].branch < _branch_limit(reading, settings):
+                return reading
+            if reading.longest > best.longest:
+                best = reading
+    return best
+
+
+def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> bool:
+    """True if something of the cable's width leaves the strip, or three strips' ends meet at one of its ends."""
+    if strip.branch >= _branch_limit(reading, settings):
+        return True
+    reach = settings.junction_widths * reading.width
+    long = [other for other in reading.strips if other.length > settings.min_piece_widths * reading.width]
+    ends = np.array([end for other in long for end in (other.path[0], other.path[-1])])
+    at_end = any((np.hypot(*(ends - end).T) < reach).sum() >= 3 for end in (strip.path[0], strip.path[-1]))
+    return at_end or _touched(strip, long, reading, settings)
+
+
+def approaches_itself(path: Array, width: float) -> bool:
+    """True if the path comes back to within 1.2 widths of itself: the cable crosses or touches itself."""
+    thinned = path[:: max(1, int(width / 3.0))]
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(thinned, axis=0).T))])
+    distance = np.hypot(*(thinned[:, None, :] - thinned[None, :, :]).transpose(2, 0, 1))
+    return bool(((distance < 1.2 * width) & (np.abs(s[:, None] - s[None, :]) > 5.0 * width)).any())
+
+
+def _branch_limit(reading: Reading, settings: SegmentationSettings) -> float:
+    return settings.min_branch_widths * reading.width
+
+
+def _touched(strip: Strip, long: list[Strip], reading: Reading, settings: SegmentationSettings) -> bool:
+    """Ends of two other strips on both sides of the same place of the path: another cable crosses."""
+    inner = strip.path[int(4 * reading.width) : -int(4 * reading.width) or None]
+    if len(inner) < 2:
+        return False
+    touching = []
+    for other in long:
+        for end in (other.path[0], other.path[-1]) if other is not strip else ():
+            distance = np.hypot(*(inner - end).T)
+            if distance.min() < settings.junction_widths * reading.width:
+                touching.append(inner[int(np.argmin(distance))])
+    return any(np.hypot(*(a - b)) < 4.0 * reading.width for i, a in enumerate(touching) for b in touching[i + 1 :])
+
+
+def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tuple[Image, float]]:
+    """Pictures in ground sigmas and levels, the likeliest first."""
+    distance = standout.distance()
+    otsu = _otsu(distance)
+    yield distance, otsu
+    for factor in settings.level_factors:
+        yield distance, factor * otsu
+    channels = standout.residual.shape[2]
+    directions = [np.full(channels, 1.0 / channels)]
+    if channels == 3:  # blue, green, red
+        directions += [np.array([0.0, -0.5, 0.5]), np.array([0.5, -0.25, -0.25])]
+    for direction in directions:
+        signed = standout.along(direction)
+        for sign in (-1.0, 1.0):
+            picture = np.maximum(np.float32(sign) * signed, 0.0)
+            level = _otsu(picture)
+            if level > settings.least_level:
+                yield picture, level
+                yield picture, 0.5 * level
+    for level in (settings.least_level, 0.6 * settings.least_level):
+        yield distance, level
+
+
+def _otsu(picture: Image) -> float:
+    """Otsu's threshold on the square root: noise and strong things get a like share of the range."""
+    top = float(picture.max()) + 1e-9
+    coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
+    code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
+    return max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9)
+
+
+def _readings(picture: Image, level: float, wanted: Wanted, settings: SegmentationSettings) -> Iterator[Reading]:
+    above = picture > level
+    if above.mean() > settings.max_covered_share:
+        return
+    widths = [wanted.width] if wanted.width is not None else ridge_widths(above.astype(np.uint8), settings)
+    for width in widths:
+        reading = _read(above, width, level, wanted, settings)
+        yield reading
+        if wanted.width is None and (merged := _split_by_highlight(reading)) is not None:
+            yield _read(above, merged, level, wanted, settings)
+
+
+def _read(above: Array, width: float, level: float, wanted: Wanted, settings: SegmentationSettings) -> Reading:
+    mask = strip_mask(above, width, settings)
+    thick = thick_part(mask, width, settings)
+    strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
+    if not strips or strips[0].length < wanted.least_length or wanted.across_objects:
+        strips = join_strips(strips, width, settings, obstacle=None if wanted.across_objects else thick)
+    if wanted.width is None and strips:
+        width = strips[0].width
+    return Reading(tuple(strips), mask, thick, width, level)
+
+
+def _split_by_highlight(reading: Reading) -> float | None:
+    """Width of the cable if the two longest strips are its two sides along a highlight, else None."""
+    if len(reading.strips) < 2 or reading.strips[1].length < 0.6 * reading.strips[0].length:
+        return None
+    a, b = reading.strips[:2]
+    apart = np.hypot(*(a.path[:, None, :] - b.path[None, ::4, :]).transpose(2, 0, 1)).min(axis=1)
+    distance = float(np.median(apart))
+    calm = float(np.percentile(apart, 80) - np.percentile(apart, 20)) < 0.35 * distance
+    return distance + 0.5 * (a.width + b.width) if calm and distance < 4.0 * max(a.width, b.width) else None

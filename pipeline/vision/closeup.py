@@ -1,0 +1,121 @@
+"""The full-resolution grey window along a cable: projection, pixel noise, edge blur.
+
+Only the corridor along the path is projected; elsewhere the window is zero. That keeps a 12 Mpx colour photo at a few
+bytes a pixel: memory that is never written is never used.
+Units: px and fractions of full range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.vision.crosscut import path_normals
+from pipeline.vision.photo import Photo
+
+_MAD_TO_STD = 1.4826
+
+
+@dataclass(frozen=True)
+class Closeup:
+    """Grey window along the cable and what its pixels are worth.
+
+    Attributes
+    ----------
+    grey : (h, w) float32
+        Zero outside the corridor.
+    origin_px : (u, v)
+        Photo pixel of ``grey[0, 0]``.
+    noise : fraction of full range
+        Standard deviation of one pixel, without texture coarser than two pixels.
+    blur_px : px
+        Standard deviation of the edge spread.
+    """
+
+    grey: NDArray[np.float32]
+    origin_px: tuple[int, int]
+    noise: float
+    blur_px: float
+
+
+def take_closeup(
+    photo: Photo, path_px: Array, width_px: float, weights: Array, settings: SegmentationSettings
+) -> Closeup:
+    """Project the corridor along ``path_px`` (k, 2) to grey and measure its noise and blur."""
+    margin = settings.corridor_widths * width_px + 8.0
+    low = np.maximum(np.floor(path_px.min(axis=0) - margin).astype(int), 0)
+    high = np.minimum(np.ceil(path_px.max(axis=0) + margin).astype(int) + 1, photo.size)
+    grey = np.zeros((high[1] - low[1], high[0] - low[0]), np.float32)
+    scaled = (np.asarray(weights) / photo.full_scale).astype(np.float32)
+    tile = 128
+    reach = margin + tile / np.sqrt(2.0)
+    for top in range(0, grey.shape[0], tile):
+        for left in range(0, grey.shape[1], tile):
+            middle = low + np.array([left + tile / 2.0, top + tile / 2.0])
+            if np.hypot(*(path_px - middle).T).min() > reach:
+                continue
+            rows, columns = slice(top, top + tile), slice(left, left + tile)
+            part = photo.pixels[low[1] : high[1], low[0] : high[0]][rows, columns]
+            grey[rows, columns] = part * scaled[0] if part.ndim == 2 else part.astype(np.float32) @ scaled
+    local = path_px - low
+    return Closeup(
+        grey=grey,
+        origin_px=(int(low[0]), int(low[1])),
+        noise=_pixel_noise(grey, local, width_px),
+        blur_px=_edge_blur(grey, local, width_px),
+    )
+
+
+def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
+    """Second differences along the ground beside the cable: blind to light, texture and edges coarser than a pixel."""
+    _, normal = path_normals(path)
+    values = []
+    for offset in np.linspace(0.9, 1.6, 8) * width:
+        for side in (-offset, offset):
+            spot = np.rint(path + side * normal).astype(int)
+            inside = (spot >= 1).all(axis=1) & (spot < np.array(grey.shape[::-1]) - 1).all(axis=1)
+            u, v = spot[inside].T
+            values.append(grey[v, u - 1] - 2.0 * grey[v, u] + grey[v, u + 1])
+    differences = np.concatenate(values)
+    # 1 + 4 + 1 = 6 pixel variances in each difference
+    return _MAD_TO_STD * float(np.median(np.abs(differences))) / np.sqrt(6.0) if len(differences) else 0.0
+
+
+def _edge_blur(grey: NDArray[np.float32], path: Array, width: float) -> float:
+    """Edge spread by the steepest slope of edges averaged over neighbouring sections.
+
+    A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle.
+    """
+    _, normal = path_normals(path)
+    sections = np.linspace(0.1, 0.9, 96) * (len(path) - 1)
+    centre = np.column_stack([np.interp(sections, np.arange(len(path)), column) for column in path.T])
+    across = normal[np.rint(sections).astype(int)]
+    offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
+    spreads = []
+    for side in (-0.5, 0.5):
+        points = (centre[:, None, :] + (side * width + offsets)[None, :, None] * across[:, None, :]).astype(np.float32)
+        profile = cv2.remap(grey, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        spreads.extend(_spread_of_groups(profile, offsets))
+    return float(np.median(spreads)) if spreads else 0.0
+
+
+def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> list[float]:
+    spacing = float(offsets[1] - offsets[0])
+    plateau = max(2, len(offsets) // 6)
+    step = profile[:, -plateau:].mean(axis=1) - profile[:, :plateau].mean(axis=1)
+    level = 0.5 * (profile[:, -plateau:].mean(axis=1) + profile[:, :plateau].mean(axis=1))
+    above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
+    crossing = offsets[np.argmax(above, axis=1)]
+    spreads = []
+    for group in np.array_split(np.arange(len(profile)), len(profile) // 8):
+        # Lined up at their own crossings, so a path half a pixel off does not count as blur.
+        lined = np.mean([np.interp(offsets + crossing[i], offsets, profile[i]) for i in group], axis=0)
+        slope = np.abs(np.gradient(lined, spacing)[plateau:-plateau]).max(initial=0.0)
+        if slope > 0:
+            spreads.append(float(abs(np.mean(step[group])) / (np.sqrt(2.0 * np.pi) * slope)))
+    return spreads

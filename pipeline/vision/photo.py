@@ -1,0 +1,245 @@
+"""A file to a `Photo`: the one loader for photos and calibration pictures.
+
+png, jpg, bmp and tif; 8 to 16 bit (12 bit stored in 16 too); grey, colour, alpha; any path. The photo is turned as its
+EXIF orientation says, so pixel (0, 0) is the top-left pixel of what a person sees. Broken, empty, truncated or enormous
+files come back as `pipeline.records.Rejected` with one sentence; dimensions are read before anything is decoded.
+
+Colour channels stay in the order of OpenCV (blue, green, red); values stay integers as stored.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from pipeline.records import Rejected
+from pipeline.settings.vision_stages import PhotoSettings
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+# EXIF orientation -> OpenCV operations that turn the stored picture into the displayed one
+_ROTATIONS = {3: cv2.ROTATE_180, 6: cv2.ROTATE_90_CLOCKWISE, 8: cv2.ROTATE_90_COUNTERCLOCKWISE}
+_MIRRORED = {2: (1, None), 4: (0, None), 5: (1, cv2.ROTATE_90_COUNTERCLOCKWISE), 7: (1, cv2.ROTATE_90_CLOCKWISE)}
+_ORIENTATION_TAG = 0x0112
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A photo as displayed.
+
+    Attributes
+    ----------
+    name : str
+        For reports: relative to the specimen folder.
+    pixels : (h, w) or (h, w, 3), uint8 or uint16
+        Grey, or blue, green, red.
+    bit_depth : int
+        Bits that are used: 8, 10, 12, 14 or 16.
+    """
+
+    name: str
+    pixels: Pixels
+    bit_depth: int
+
+    @property
+    def full_scale(self) -> float:
+        """Largest value a pixel can have."""
+        return float(2**self.bit_depth - 1)
+
+    @property
+    def channels(self) -> int:
+        """1 or 3."""
+        return 1 if self.pixels.ndim == 2 else self.pixels.shape[2]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in px."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+
+@dataclass(frozen=True)
+class _Header:
+    kind: str
+    width: int
+    height: int
+    orientation: int
+
+
+def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) -> Photo | Rejected:
+    """Read one photo.
+
+    Parameters
+    ----------
+    path : Path
+        Any file; names outside ASCII are read as well.
+    settings : PhotoSettings
+        Size limits.
+    name : str, optional
+        Name in reports; the file's name if not given.
+
+    Returns
+    -------
+    Photo or Rejected
+        Codes ``photo/missing``, ``photo/empty``, ``photo/too-large``, ``photo/too-small``, ``photo/unreadable``,
+        ``photo/truncated``.
+    """
+    name = path.name if name is None else name
+    try:
+        if path.stat().st_size > settings.max_file_megabytes * 1e6:
+            return _refused(
+                name,
+                "photo/too-large",
+                f"the file has {path.stat().st_size / 1e6:.0f} MB, more than the limit of "
+                f"{settings.max_file_megabytes:.0f} MB",
+                megabytes=path.stat().st_size / 1e6,
+            )
+        # OpenCV opens paths in the system's code page on Windows; bytes work everywhere.
+        data = path.read_bytes()
+    except OSError as error:
+        return _refused(name, "photo/missing", f"the file cannot be opened ({error.strerror})")
+    return decode_photo(data, settings, name=name)
+
+
+def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | Rejected:
+    """Decode the bytes of a photo; see `load_photo`."""
+    if not data:
+        return _refused(name, "photo/empty", "the file is empty")
+    header = _read_header(data)
+    if header is None:
+        return _refused(name, "photo/unreadable", "the file is not a readable png, jpg, bmp or tif")
+    megapixels = header.width * header.height / 1e6
+    if megapixels > settings.max_megapixels:
+        return _refused(
+            name,
+            "photo/too-large",
+            f"the photo has {megapixels:.0f} Mpx, more than the limit of {settings.max_megapixels:.0f} Mpx",
+            megapixels=megapixels,
+        )
+    if min(header.width, header.height) < settings.min_side_px:
+        side = min(header.width, header.height)
+        return _refused(
+            name,
+            "photo/too-small",
+            f"the picture is {side} px small, the least is {settings.min_side_px} px",
+            side_px=side,
+        )
+    if not _complete(data, header.kind):
+        return _refused(name, "photo/truncated", "the file ends before the picture does; copy it again")
+    pixels = _decode(data, header)
+    if pixels is None:
+        return _refused(name, "photo/unreadable", f"the {header.kind} file is damaged or of an unknown variant")
+    return Photo(name=name, pixels=pixels, bit_depth=_bit_depth(pixels))
+
+
+def _refused(name: str, code: str, reason: str, **figure: float) -> Rejected:
+    return Rejected(image=name, code=code, reason=f"{name}: {reason}.", figure=figure)
+
+
+def _read_header(data: bytes) -> _Header | None:
+    """Kind, size and orientation without decoding; None if no decoder knows the file."""
+    with warnings.catch_warnings():
+        # The limit is ours and is checked by the caller; Pillow's own would be a warning without the file's name.
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        # Damaged metadata is no reason to refuse the pixels.
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "MPO", "BMP", "TIFF")) as image:
+                kind = {"MPO": "jpg", "JPEG": "jpg", "TIFF": "tif"}.get(
+                    image.format or "", (image.format or "").lower()
+                )
+                return _Header(kind, image.width, image.height, _orientation(image))
+        except Image.DecompressionBombError:
+            return _Header("picture", 10**9, 10**9, 1)
+        except (UnidentifiedImageError, OSError, ValueError, SyntaxError, struct.error):
+            return None
+
+
+def _orientation(image: Image.Image) -> int:
+    try:
+        return int(image.getexif().get(_ORIENTATION_TAG, 1))
+    except (OSError, ValueError, SyntaxError, TypeError, struct.error):
+        return 1
+
+
+def _complete(data: bytes, kind: str) -> bool:
+    """True unless the file was cut: decoders return grey areas for the missing part of a jpg."""
+    if kind == "jpg":
+        # The end mark cannot occur inside the coded picture, but a thumbnail before it has one of its own.
+        start = _start_of_scan(data)
+        return start is not None and data.find(b"\xff\xd9", start) >= 0
+    if kind == "png":
+        return data.rfind(b"IEND") >= 0
+    if kind == "bmp":
+        return len(data) >= int.from_bytes(data[10:14], "little") + 1
+    return True
+
+
+def _start_of_scan(data: bytes) -> int | None:
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xDA:
+            return place
+        place += 1 if marker == 0xFF else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return None
+
+
+def _decode(data: bytes, header: _Header) -> Pixels | None:
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
+    # IMREAD_UNCHANGED leaves jpg and png as stored; the tif decoder of OpenCV turns them itself.
+    orientation = 1 if header.kind == "tif" else header.orientation
+    if pixels is None:
+        return _decode_by_pillow(data)
+    if pixels.dtype not in (np.uint8, np.uint16):
+        return None
+    if pixels.ndim == 3:
+        pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else _without_alpha(pixels)
+    return _turn(pixels, orientation)
+
+
+def _without_alpha(pixels: Pixels) -> Pixels:
+    # A copy in place of a view: OpenCV refuses interleaved views, and the four-channel original is freed.
+    return pixels if pixels.shape[2] == 3 else np.ascontiguousarray(pixels[..., :3])
+
+
+def _decode_by_pillow(data: bytes) -> Pixels | None:
+    """Variants that OpenCV does not know (4-bit tif, odd palettes)."""
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            turned = ImageOps.exif_transpose(image)
+            if turned.mode in ("I;16", "I;16B", "I;16L"):
+                return np.asarray(turned).astype(np.uint16)
+            if turned.mode in ("1", "L", "LA"):
+                return np.asarray(turned.convert("L"))
+            if turned.mode in ("P", "RGB", "RGBA", "CMYK", "YCbCr"):
+                return np.ascontiguousarray(np.asarray(turned.convert("RGB"))[..., ::-1])
+    except (OSError, ValueError, SyntaxError, EOFError, struct.error, Image.DecompressionBombError):
+        return None
+    return None
+
+
+def _turn(pixels: Pixels, orientation: int) -> Pixels:
+    if orientation in _MIRRORED:
+        axis, rotation = _MIRRORED[orientation]
+        pixels = cv2.flip(pixels, axis)
+        return pixels if rotation is None else cv2.rotate(pixels, rotation)
+    return cv2.rotate(pixels, _ROTATIONS[orientation]) if orientation in _ROTATIONS else pixels
+
+
+def _bit_depth(pixels: Pixels) -> int:
+    """Bits in use: cameras store 10 to 14 bits in 16-bit files without saying so."""
+    if pixels.dtype == np.uint8:
+        return 8
+    peak = int(pixels.max())
+    return next((bits for bits in (8, 10, 12, 14) if peak < 2**bits), 16)

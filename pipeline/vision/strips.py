@@ -1,0 +1,225 @@
+"""A picture of what stands out to strips of constant width: mask, skeleton, path.
+
+``mask -> closed (highlights, writing) -> thick things removed -> skeleton of each thin piece -> longest path ->
+pieces that continue each other joined``
+
+All lengths in cells of the reduced photo; points are ``(u, v)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from skimage.morphology import skeletonize
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import SegmentationSettings
+
+Mask = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A piece of the picture that is much longer than wide.
+
+    Attributes
+    ----------
+    path : (k, 2) cells
+        Along the middle, from one end to the other.
+    width : cells
+        Median along the path.
+    width_scatter : relative
+        Robust standard deviation of the width along the path.
+    branch : cells
+        Length of the longest part of the skeleton that leaves the path.
+    """
+
+    path: Array
+    width: float
+    width_scatter: float
+    branch: float
+
+    @property
+    def length(self) -> float:
+        """Length of the path in cells."""
+        return float(np.hypot(*np.diff(self.path, axis=0).T).sum())
+
+
+def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSettings) -> Mask:
+    """Mask of what stands out, closed over highlights and filled where writing leaves holes."""
+    mask = above.astype(np.uint8)
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(settings.closing_widths * width))
+    contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    small = [
+        contour
+        for contour, (_, _, _, parent) in zip(contours, tree[0] if tree is not None else (), strict=True)
+        if parent >= 0 and cv2.contourArea(contour) < width**2
+    ]
+    cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
+    # Specks of noise and texture are thinner than any cable.
+    return cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
+
+
+def thick_part(mask: Mask, width: float, settings: SegmentationSettings) -> Mask:
+    """Things clearly wider than the cable: clamps, covers, the holder."""
+    return cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(settings.thick_widths * width))
+
+
+def find_strips(mask: Mask, thick: Mask, width: float, settings: SegmentationSettings) -> list[Strip]:
+    """Strips of about the given width (cells), longest first."""
+    grown = cv2.dilate(thick, _disc(3.0))
+    thin = mask & (1 - grown)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    largest = 1 + np.argsort(areas)[::-1][: settings.max_pieces]
+    strips = []
+    for label in largest[areas[largest - 1] >= settings.min_piece_widths * width**2]:
+        u, v, w, h = stats[label, :4]
+        piece = np.pad((labels[v : v + h, u : u + w] == label).astype(np.uint8), 1)
+        strip = _trace(piece, width)
+        if strip is not None:
+            low, high = settings.width_ratio_range
+            if low * width <= strip.width <= high * width:
+                strips.append(
+                    Strip(strip.path + np.array([u - 1, v - 1]), strip.width, strip.width_scatter, strip.branch)
+                )
+    return sorted(strips, key=lambda strip: -strip.length)
+
+
+def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[float]:
+    """Widths (cells) that strips in the mask have, the one with the greatest length first.
+
+    The distance transform at the ridge is half the width; long strips of constant width pile up in its histogram.
+    """
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
+    ridge = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.3)
+    widths = 2.0 * depth[ridge]
+    edges = np.geomspace(2.0, max(mask.shape) / 10.0, 24)
+    counts = np.histogram(widths, edges)[0].astype(np.float64)
+    # A ridge is up to as thick as the strip's cells allow; neighbouring bins belong to the same strip.
+    pooled = np.convolve(counts, [0.5, 1.0, 0.5], mode="same")
+    order = [i for i in np.argsort(pooled)[::-1] if pooled[i] >= max(pooled[max(i - 1, 0) : i + 2])]
+    return [float(np.sqrt(edges[i] * edges[i + 1])) for i in order[: settings.max_width_guesses] if pooled[i] > 0]
+
+
+def join_strips(
+    strips: list[Strip], width: float, settings: SegmentationSettings, *, obstacle: Mask | None = None
+) -> list[Strip]:
+    """Join strips whose ends face each other across a gap (glare, a sticker), but not across an obstacle."""
+    strips = list(strips)
+    while True:
+        best = _best_joint(strips, width, settings, obstacle)
+        if best is None:
+            return sorted(strips, key=lambda strip: -strip.length)
+        i, j, first, second = best
+        a, b = strips[i], strips[j]
+        share = np.array([a.length, b.length]) / (a.length + b.length)
+        joined = Strip(
+            np.vstack([first, second]),
+            float(share @ (a.width, b.width)),
+            float(share @ (a.width_scatter, b.width_scatter)),
+            max(a.branch, b.branch),
+        )
+        strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
+
+
+def _best_joint(
+    strips: list[Strip], width: float, settings: SegmentationSettings, obstacle: Mask | None
+) -> tuple[int, int, Array, Array] | None:
+    best, least = None, settings.joint_gap_widths * width
+    for i, a in enumerate(strips):
+        for j in range(i + 1, len(strips)):
+            for first in (a.path, a.path[::-1]):
+                for second in (strips[j].path, strips[j].path[::-1]):
+                    gap = float(np.hypot(*(second[0] - first[-1])))
+                    free = obstacle is None or not _blocked(first[-1], second[0], obstacle)
+                    if gap < least and free and _continues(first, second, width, settings):
+                        best, least = (i, j, first, second), gap
+    return best
+
+
+def _blocked(start: Array, stop: Array, obstacle: Mask) -> bool:
+    u, v = np.rint(np.linspace(start, stop, 50)).astype(int).T
+    return bool(obstacle[v, u].any())
+
+
+def _continues(first: Array, second: Array, width: float, settings: SegmentationSettings) -> bool:
+    """True if ``second`` goes on where ``first`` ends, by the directions of both and of the gap."""
+    leaving, arriving = end_direction(first, width), -end_direction(second[::-1], width)
+    gap = second[0] - first[-1]
+    length = float(np.hypot(*gap))
+    # Skeletons end up to half a width short and aside, so the direction of a short gap means nothing.
+    along = gap / length if length > width else (leaving + arriving) / (np.hypot(*(leaving + arriving)) + 1e-12)
+    limit = np.cos(np.radians(settings.joint_angle_deg))
+    return bool(leaving @ arriving > limit and leaving @ along > limit and arriving @ along > limit)
+
+
+def end_direction(path: Array, width: float) -> Array:
+    """Unit vector in which the path leaves at its last point, over three widths, without the last half width."""
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    far, near = np.searchsorted(s, [s[-1] - 3.5 * width, s[-1] - 0.5 * width])
+    piece = path[max(far, 0) : max(near, far + 2)]
+    piece = path if len(piece) < 2 else piece
+    chord = piece[-1] - piece[0]
+    return np.asarray(chord / (np.hypot(*chord) + 1e-12))
+
+
+def _trace(piece: Mask, width: float) -> Strip | None:
+    """Skeleton of one connected piece -> its longest shortest path."""
+    skeleton = skeletonize(piece.astype(bool))
+    vu = np.argwhere(skeleton)
+    if len(vu) < 3:
+        return None
+    graph = _skeleton_graph(skeleton, vu)
+    start = int(np.argmax(np.where(np.isfinite(d := dijkstra(graph, indices=0)), d, -1.0)))
+    reach, before = dijkstra(graph, indices=start, return_predecessors=True)
+    node = int(np.argmax(np.where(np.isfinite(reach), reach, -1.0)))
+    nodes = []
+    while node >= 0:
+        nodes.append(node)
+        node = int(before[node])
+    path = vu[nodes][:, ::-1].astype(np.float64)
+    depth = cv2.distanceTransform(piece, cv2.DIST_L2, 5)
+    along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
+    inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
+    median = float(np.median(inner))
+    scatter = 1.4826 * float(np.median(np.abs(inner - median))) / max(median, 1e-9)
+    return Strip(path, median, scatter, _longest_branch(skeleton, vu[nodes], width))
+
+
+def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_matrix:
+    index = np.full(skeleton.shape, -1)
+    index[tuple(vu.T)] = np.arange(len(vu))
+    rows, columns, weights = [], [], []
+    for dv, du in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        # the piece is padded by one cell, so neighbours never leave the array
+        other = index[vu[:, 0] + dv, vu[:, 1] + du]
+        near = np.flatnonzero(other >= 0)
+        rows.append(near)
+        columns.append(other[near])
+        weights.append(np.full(len(near), np.hypot(dv, du)))
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    weight = np.concatenate(weights)
+    return coo_matrix(
+        (np.tile(weight, 2), (np.concatenate([row, column]), np.concatenate([column, row]))), shape=(len(vu),) * 2
+    ).tocsr()
+
+
+def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], width: float) -> float:
+    """Number of skeleton cells in the longest piece farther than a width from the path."""
+    near = np.zeros(skeleton.shape, np.uint8)
+    near[tuple(path_vu.T)] = 1
+    near = cv2.dilate(near, _disc(2.0 * width))
+    rest = (skeleton & (near == 0)).astype(np.uint8)
+    count, _, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    return float(stats[1:, cv2.CC_STAT_AREA].max()) if count > 1 else 0.0
+
+
+def _disc(diameter: float) -> Mask:
+    size = max(1, round(diameter)) | 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
