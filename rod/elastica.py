@@ -9,8 +9,8 @@ V the energy per length of the law,
     P (cos theta - cos theta_end) = W(K),    ds = m'(K) dK / (P sin theta),    y = m / P.
 
 Symmetric shapes only: one bow, K between K0 at the bearings and K_mid in the middle. Two unknowns, the end slope
-theta_end and K_mid, follow from length and chord; P = W(K_mid) / (1 - cos theta_end). With K = K0 + (K_mid - K0) sin(phi)
-every integrand is smooth; panels of Gauss points resolve the knots of a spline.
+theta_end and K_mid, follow from length and chord; P = W(K_mid) / (1 - cos theta_end). With
+K = K0 + (K_mid - K0) sin(phi) every integrand is smooth; panels of Gauss points resolve the knots of a spline.
 
 It ends where K0(s), EI(s), friction, springs or loads begin: there `rod.equilibrium` works.
 

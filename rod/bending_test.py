@@ -1,0 +1,180 @@
+"""The experiment: from a cable, its supports and a list of displacement steps to the equilibria of all steps.
+
+A cable lies between two bearings; one is pushed toward the other in steps, forth and perhaps back, and at each step the
+force at the right bearing is read. `BendingTest` says once what the cable and the rig are, `simulate` runs the steps in
+order and carries the memory of friction and set from one to the next.
+
+What is imposed at a step, one of three:
+
+* ``displacements`` d (m): the axes are commanded to the distance zero - (d + displacement_offset); the rig yields, so
+  the chord reaching the cable is longer by compliance * P;
+* ``chords`` (m): the distance of the axes as measured, e.g. on the photo; offset and compliance do not enter;
+* ``forces`` P (N): the bearing is loaded, not moved.
+
+The zero of displacement is the chord of the mounted, force-free cable (``natural``), or the cable's length, or given.
+
+Signs and units: chord frame, SI; P positive in compression; d positive where the bearings approach.
+
+Source: Secs. 3.1 and 3.2 of the paper; `table_1` is its virtual experiment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rod.characteristic import Array, Characteristic, MomentCurve, Reading
+from rod.discretisation import Along, Rod, joint_values
+from rod.equilibrium import Branch, Equilibrium, Start, solve
+from rod.reduction import Hold
+from rod.section import InternalFriction, Section
+from rod.support import BEARING, Support
+
+Control = Literal["displacements", "chords", "forces"]
+
+#: Table 1 of the paper: length (m), pre-curvature (1/m), step (m), knots (1/m) and ordinates (N m^2).
+TABLE_1 = {"length": 0.2, "pre_curvature": 2.0, "step": 5e-3}
+TABLE_1_KNOTS, TABLE_1_ORDINATES = (0.0, 5.0, 10.0), (5e-3, 3e-3, 2e-3)
+
+
+@dataclass(frozen=True, eq=False)
+class BendingTest:
+    """A cable on a rig. Everything but length and characteristic has the value of the ideal test by default.
+
+    Attributes
+    ----------
+    length : m
+        Between the bearing axes, rigid pieces included.
+    characteristic : MomentCurve
+        `Characteristic`, or a law in closed form.
+    pre_curvature : 1/m
+        K0: a number, (elements + 1,) values at the joints, or a function of the relative position 0..1 along the free
+        cable.
+    stiffness_profile : same kinds, or None
+        EI(s) relative: a factor on the moment of the characteristic.
+    left, right : Support
+        Springs, Coulomb moments, rigid pieces, clamps; see `rod.support`.
+    load : (2,) N/m
+        Distributed dead load along x and y of the chord frame.
+    compliance : m/N
+        Of the rig.
+    friction : InternalFriction or None
+    plastic_rate : 1/m per 1/m
+        Growth of K0 with the largest curvature reached.
+    zero : "natural", "length" or m
+        Distance of the axes at displacement zero.
+    displacement_offset : m
+        Error of the zero: added to every displacement.
+    elements : int or (n,)
+        Number of equal elements, or relative element lengths of sum one (see `rod.discretisation.graded`).
+    axial_stiffness, shear_stiffness : N or None
+        EA and GA; None for stiff without influence (`rod.discretisation.RIGIDITY`).
+    """
+
+    length: float
+    characteristic: MomentCurve
+    pre_curvature: Along = 0.0
+    stiffness_profile: Along | None = None
+    left: Support = BEARING
+    right: Support = BEARING
+    load: tuple[float, float] = (0.0, 0.0)
+    compliance: float = 0.0
+    friction: InternalFriction | None = None
+    plastic_rate: float = 0.0
+    zero: Literal["natural", "length"] | float = "natural"
+    displacement_offset: float = 0.0
+    elements: int | Array = 100
+    axial_stiffness: float | None = None
+    shear_stiffness: float | None = None
+
+    @cached_property
+    def rod(self) -> Rod:
+        """The discrete rod of this test."""
+        n = self.elements
+        elements = np.full(n, 1.0 / n) if isinstance(n, int) else np.asarray(n, float) / np.sum(n)
+        K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
+        given = self.stiffness_profile
+        profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
+        section = Section(self.characteristic, K0, profile, self.friction, self.plastic_rate)
+        return Rod(
+            self.length,
+            elements,
+            section,
+            self.left,
+            self.right,
+            self.load,
+            self.axial_stiffness,
+            self.shear_stiffness,
+        )
+
+    @property
+    def zero_chord(self) -> float:
+        """Distance of the axes at displacement zero, m."""
+        if self.zero == "natural":
+            return self.rod.mounted.chord
+        return self.length if self.zero == "length" else float(self.zero)
+
+    def hold(self, control: Control, value: float) -> Hold:
+        """What is imposed at a step."""
+        if control == "displacements":
+            return Hold(chord=self.zero_chord - (value + self.displacement_offset), compliance=self.compliance)
+        return Hold(chord=value) if control == "chords" else Hold(force=value)
+
+
+def simulate(
+    test: BendingTest,
+    displacements: ArrayLike | None = None,
+    *,
+    chords: ArrayLike | None = None,
+    forces: ArrayLike | None = None,
+    branch: Branch = "natural",
+    starts: Sequence[Equilibrium | Start | None] | None = None,
+) -> tuple[Equilibrium, ...]:
+    """Equilibria of all steps, in order; friction and set remember the steps before.
+
+    Parameters
+    ----------
+    test : BendingTest
+    displacements, chords : (steps,) m, forces : (steps,) N
+        Exactly one of them; see the module.
+    branch : {"natural", "opposite", "up", "down"}
+        Side of the bow, see `rod.equilibrium`.
+    starts : (steps,) of Equilibrium, Start or None
+        Warm starts, for example the equilibria of a nearby test. By default each step starts from the one before.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        One per step; look at ``outcome``.
+
+    Raises
+    ------
+    ValueError
+        If not exactly one of the controls is given, or ``starts`` has another length.
+    """
+    given: dict[Control, ArrayLike | None] = {"displacements": displacements, "chords": chords, "forces": forces}
+    controls = [control for control, values in given.items() if values is not None]
+    if len(controls) != 1:
+        raise ValueError("give exactly one of displacements, chords and forces")
+    control = controls[0]
+    values = np.atleast_1d(np.asarray(given[control], float))
+    if starts is not None and len(starts) != values.size:
+        raise ValueError(f"{len(starts)} starts for {values.size} steps")
+    memory, last, steps = test.rod.virgin, None, []
+    for index, value in enumerate(values):
+        start = last if starts is None else starts[index]
+        here = solve(test.rod, test.hold(control, float(value)), memory=memory, start=start, branch=branch)
+        memory, last = here.after, here if here.good else None
+        steps.append(here)
+    return tuple(steps)
+
+
+def table_1(reading: Reading, *, elements: int = 100) -> BendingTest:
+    """The virtual experiment of Sec. 3.2, with f_EI of Table 1 in the given reading; steps of ``TABLE_1["step"]``."""
+    law = Characteristic.from_ordinates(TABLE_1_KNOTS, TABLE_1_ORDINATES, reading=reading)
+    return BendingTest(TABLE_1["length"], law, TABLE_1["pre_curvature"], elements=elements)

@@ -1,0 +1,201 @@
+"""The discrete rod: from a cable on two supports to edges, joints and weights.
+
+The chain from bearing to bearing has n + 2 edges and n + 1 joints:
+
+    axis = edge 0 (rigid piece) = joint 0 = edge 1 = joint 1 = ... = edge n = joint n = edge n+1 (rigid piece) = axis
+
+Edges carry the tangent angle alpha (rad, from x toward y) and the strains Gamma, joints carry the curvature
+
+    K_i = -(alpha_{i+1} - alpha_i) / w_i,   w = (h_1/2, (h_1 + h_2)/2, ..., h_n/2),
+
+positive in the direction of the bow. The rigid pieces do not bend; of length zero they are the bearing itself, and
+their angle is the angle of the bearing. So free pins, springs, friction, clamps and rigid ends are one mechanism, of
+second order in the grid. Dead loads are lumped to the vertices (axis, joints, axis).
+
+Source: Eqs. (2) and (4) of the paper ("vertices carry r and K, edges carry alpha and Gamma").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rod.characteristic import Array
+from rod.section import Memory, Section
+from rod.support import BEARING, Support
+
+#: EA = GA = this times the stiffness scale over length^2 unless given. The chord that elongation takes from the bow is
+#: then P/EA = 1e-8 of the length for P = 10 EI/L^2; even for a cable of K0 L = 0.2 the force changes by less than 1e-6.
+RIGIDITY = 1e9
+
+
+def graded(elements: int, ratio: float) -> Array:
+    """Relative element lengths, (elements,) of sum one: at mid-span ``ratio`` times as long as at the ends."""
+    if elements < 2 or not ratio > 0.0:
+        raise ValueError(f"need at least two elements and a positive ratio, got {elements} and {ratio}")
+    centre = (np.arange(elements) + 0.5) / elements
+    size = ratio ** (1.0 - np.abs(2.0 * centre - 1.0))
+    return np.asarray(size / size.sum())
+
+
+class Mounted(NamedTuple):
+    """The force-free rod in its chord frame: angles (n + 2,) rad and chord, m."""
+
+    angles: Array
+    chord: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rod:
+    """A discrete rod, ready to be brought into equilibrium.
+
+    Attributes
+    ----------
+    length : m
+        From axis to axis, rigid pieces included.
+    elements : (n,)
+        Relative element lengths of the free cable, positive, of sum one.
+    section : Section
+        On the n + 1 joints.
+    left, right : Support
+    load : (2,) N/m
+        Dead load per length along x and y.
+    axial_stiffness, shear_stiffness : N or None
+        EA and GA; None: see `RIGIDITY`.
+    """
+
+    length: float
+    elements: Array
+    section: Section
+    left: Support = BEARING
+    right: Support = BEARING
+    load: tuple[float, float] = (0.0, 0.0)
+    axial_stiffness: float | None = None
+    shear_stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.elements.ndim != 1 or self.elements.size < 2 or np.any(self.elements <= 0.0):
+            raise ValueError("elements must be at least two positive relative lengths")
+        if self.section.pre_curvature.shape != (self.elements.size + 1,):
+            raise ValueError(f"the section needs one pre-curvature per joint, {self.elements.size + 1}")
+        if not self.free_length > 0.0:
+            raise ValueError(f"rigid pieces leave nothing of the length {self.length} m")
+        if self.left.kind == "free":
+            raise ValueError("only the right end can be free")
+        if any(value is not None and not value > 0.0 for value in (self.axial_stiffness, self.shear_stiffness)):
+            raise ValueError("axial and shear stiffness must be positive")
+
+    @property
+    def free_length(self) -> float:
+        """Length that bends, m."""
+        return self.length - self.left.rigid_length - self.right.rigid_length
+
+    @cached_property
+    def edges(self) -> Array:
+        """Edge lengths h, (n + 2,) m, the rigid pieces first and last."""
+        return np.concatenate(([self.left.rigid_length], self.elements * self.free_length, [self.right.rigid_length]))
+
+    @cached_property
+    def weights(self) -> Array:
+        """Length w that each joint stands for, (n + 1,) m."""
+        inner = self.edges[1:-1]
+        return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
+
+    @cached_property
+    def arc_length(self) -> Array:
+        """Arc length of the n + 1 joints from the left axis, m."""
+        return np.asarray(np.cumsum(self.edges[:-1]))
+
+    @cached_property
+    def stiffness_scale(self) -> float:
+        """Typical bending stiffness, N m^2: size of the law times the largest profile value."""
+        profile = self.section.profile
+        scale = self.section.law.stiffness_scale * (1.0 if profile is None else float(np.max(np.abs(profile))))
+        friction = self.section.friction
+        scale += 0.0 if friction is None else friction.half_width / friction.stick_curvature
+        if not (np.isfinite(scale) and scale > 0.0):
+            raise ValueError("the characteristic has no stiffness")
+        return scale
+
+    @cached_property
+    def flexibility(self) -> tuple[float, float]:
+        """1/EA and 1/GA, 1/N."""
+        default = self.length**2 / (RIGIDITY * self.stiffness_scale)
+        axial = default if self.axial_stiffness is None else 1.0 / self.axial_stiffness
+        shear = default if self.shear_stiffness is None else 1.0 / self.shear_stiffness
+        return axial, shear
+
+    @cached_property
+    def vertex_load(self) -> Array | None:
+        """Dead load lumped to the n + 3 vertices, (n + 3, 2) N; None without load."""
+        if self.load == (0.0, 0.0):
+            return None
+        half = 0.5 * np.concatenate(([0.0], self.edges)) + 0.5 * np.concatenate((self.edges, [0.0]))
+        return np.asarray(half[:, None] * np.asarray(self.load))
+
+    @cached_property
+    def load_beyond(self) -> Array | None:
+        """Dead load to the right of each edge, (2, n + 2) N: the force in an edge is the right reaction plus this."""
+        load = self.vertex_load
+        return None if load is None else np.ascontiguousarray(np.cumsum(load[:0:-1], axis=0)[::-1].T)
+
+    @cached_property
+    def mounted(self) -> Mounted:
+        """Shape without force, moment and load."""
+        relative = -np.concatenate(([0.0], np.cumsum(self.weights * self.section.pre_curvature)))
+        X, Y = float(self.edges @ np.cos(relative)), float(self.edges @ np.sin(relative))
+        return Mounted(relative - np.arctan2(Y, X), float(np.hypot(X, Y)))
+
+    @cached_property
+    def rest_angles(self) -> tuple[float, float]:
+        """Rest angle of the springs, or the angle of a clamp, left and right, rad."""
+        angles = self.mounted.angles
+        left = float(angles[0]) if self.left.angle is None else self.left.angle
+        right = float(angles[-1]) if self.right.angle is None else self.right.angle
+        return left, right
+
+    @cached_property
+    def virgin(self) -> Memory:
+        """Memory of the mounted cable."""
+        relaxed, reached = self.section.virgin()
+        angles = self.mounted.angles
+        return Memory(relaxed, reached, float(angles[0]), float(angles[-1]))
+
+    def curvature(self, angles: Array) -> Array:
+        """Curvature at the joints, (n + 1,) 1/m."""
+        return np.asarray((angles[:-1] - angles[1:]) / self.weights)
+
+    def advanced(self, angles: Array, memory: Memory) -> Memory:
+        """Memory after a step that ended with these angles."""
+        relaxed, reached = self.section.advanced(self.curvature(angles), memory)
+        return Memory(
+            relaxed,
+            reached,
+            self.left.advanced(float(angles[0]), memory.left_angle),
+            self.right.advanced(float(angles[-1]), memory.right_angle),
+        )
+
+
+Along = float | Array | Callable[[Array], ArrayLike]
+
+
+def joint_values(values: Along, elements: Array, *, name: str) -> Array:
+    """Values at the joints: a number, (n + 1,) values, or a function of the relative position 0..1 on the free cable.
+
+    Raises
+    ------
+    ValueError
+        For another shape, or values that are not finite; the message carries ``name``.
+    """
+    position = np.concatenate(([0.0], np.cumsum(elements)))
+    given = np.asarray(values(position) if callable(values) else values, float)
+    if given.shape not in ((), position.shape):
+        raise ValueError(f"{name} has shape {given.shape}; a number, ({position.size},) values or a function is needed")
+    if not np.all(np.isfinite(given)):
+        raise ValueError(f"{name} is not finite")
+    return np.broadcast_to(given, position.shape).copy()

@@ -1,0 +1,240 @@
+"""The translations eliminated exactly: from Eq. (4) in (r, alpha) to angles and two reaction components.
+
+Under dead loads the force in every edge is known up to the reaction R = (R_x, R_y) of the right support on the cable,
+f_j = R + load beyond edge j, and the strains follow: Gamma = (1, 0) + C^-1 rot(alpha)^T f. What is left of Eq. (4) is
+
+    Lambda(alpha, R) = sum_i w_i V(K_i) - sum_j h_j [f.t + (f.t)^2/(2 EA) + (f.n)^2/(2 GA)] + R.(right axis)
+
+with t = (cos alpha, sin alpha) and n = (-sin alpha, cos alpha); stationary in the angles (moment balance) and in R (the
+chain ends at the right axis). Its Hessian is tridiagonal in alpha, bordered by R, and well conditioned for any EA:
+
+    [ H    B ]   H_ii = sum of dm/dK / w + h (f.t + ...),  B = d(gradient)/dR,
+    [ B^T -S ]   S = sum h rot C^-1 rot^T (+ rig compliance).
+
+A state is a minimum of Eq. (4) under the imposed positions exactly if this matrix has as many negative eigenvalues as
+there are imposed position components (Haynsworth; the positions r alone are always a minimum).
+H alone is singular in the force-free state (the rod turns as a whole), so it is factorised with a stiff spring on its
+middle edge, which a third border column takes out again.
+
+Signs and units as in `rod.discretisation`; P = -R_x is the force along the chord, positive in compression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dgtsv
+
+from rod.characteristic import Array
+from rod.discretisation import Rod
+from rod.section import Memory
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What is imposed at the right end.
+
+    Attributes
+    ----------
+    chord : m or None
+        Position of the right axis on the x axis; with compliance, the position commanded.
+    force : N or None
+        Instead of the chord: P, compression positive; the right axis slides on the x axis.
+    tip : (2,) N or None
+        Instead of both: dead force on a free end (cantilever).
+    compliance : m/N
+        Of the rig: the chord reaching the cable is chord + compliance * P.
+    """
+
+    chord: float | None = None
+    force: float | None = None
+    tip: tuple[float, float] | None = None
+    compliance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if sum(given is not None for given in (self.chord, self.force, self.tip)) != 1:
+            raise ValueError("exactly one of chord, force and tip must be given")
+        if not self.compliance >= 0.0:
+            raise ValueError(f"compliance must not be negative, got {self.compliance}")
+
+    @property
+    def imposed(self) -> tuple[bool, bool]:
+        """Whether the x and the y position of the right axis are imposed."""
+        return self.chord is not None, self.tip is None
+
+    def reaction(self, R: Array) -> Array:
+        """The reaction with the components that are prescribed by force put in."""
+        if self.force is not None:
+            return np.array([-self.force, R[1]])
+        return R if self.tip is None else np.asarray(self.tip, float)
+
+
+class Balance(NamedTuple):
+    """Residuals and Hessian of Lambda at one state; see the module for the symbols.
+
+    ``gradient`` (n + 2,) N m; ``diagonal`` (n + 2,) and ``off`` (n + 1,) N m/rad; ``border`` (2, n + 2) m; ``softness``
+    (2, 2) m/N without compliance; ``gap`` (2,) m: imposed minus actual position; ``K``, ``m``, ``tangent`` (n + 1,).
+    """
+
+    gradient: Array
+    diagonal: Array
+    off: Array
+    border: Array
+    softness: Array
+    gap: Array
+    K: Array
+    m: Array
+    tangent: Array
+
+
+class System:
+    """Residuals and Newton steps of one rod, hold and memory; built once per equilibrium, immutable afterwards."""
+
+    def __init__(self, rod: Rod, hold: Hold, memory: Memory) -> None:
+        self.rod, self.hold, self.memory = rod, hold, memory
+        self._response = rod.section.response(memory)
+        self._inverse_weights = 1.0 / rod.weights
+        self._axial, self._shear = rod.flexibility
+        self.moment_scale = rod.stiffness_scale / rod.length
+        self.force_scale = rod.stiffness_scale / rod.length**2
+        self._middle = rod.edges.size // 2
+        self._spring = 3.0 * self.moment_scale
+        self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
+        units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
+        self._scale = np.sqrt(units)
+
+    def edge_forces(self, R: Array) -> Array:
+        """Force in every edge, (2, n + 2) N, or (2, 1) without load."""
+        beyond = self.rod.load_beyond
+        return R[:, None] if beyond is None else R[:, None] + beyond
+
+    def balance(self, angles: Array, R: Array) -> Balance:
+        """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
+        h = self.rod.edges
+        cos, sin = np.cos(angles), np.sin(angles)
+        K = (angles[:-1] - angles[1:]) * self._inverse_weights
+        m, tangent = self._response(K)
+        fx, fy = self.edge_forces(R)
+        along, across = fx * cos + fy * sin, fy * cos - fx * sin
+        axial, shear = self._axial, self._shear
+        x_rate, y_rate = cos, sin
+        turn, restoring = across, along
+        border = np.array((sin, -cos))
+        if axial == shear:
+            softness = np.array([[axial, 0.0], [0.0, axial]]) * self.rod.length
+            x_rate, y_rate = cos + fx * axial, sin + fy * axial
+        else:
+            difference = axial - shear
+            turn = across * (1.0 + along * difference)
+            restoring = along + (along**2 - across**2) * difference
+            border = border * (1.0 + along * difference) - np.array((cos, sin)) * across * difference
+            x_rate, y_rate = (
+                cos + along * axial * cos - across * shear * sin,
+                sin + along * axial * sin + across * shear * cos,
+            )
+            mixed = float(h @ (cos * sin)) * difference
+            xx = float(h @ (cos**2 * axial + sin**2 * shear))
+            softness = np.array([[xx, mixed], [mixed, float(h.sum()) * (axial + shear) - xx]])
+        gradient = -h * turn
+        gradient[:-1] += m
+        gradient[1:] -= m
+        off = -tangent * self._inverse_weights
+        diagonal = h * restoring
+        diagonal[:-1] -= off
+        diagonal[1:] -= off
+        self._hold_ends(angles, gradient, diagonal, off, border := border * h)
+        gap = -np.array((h @ x_rate, h @ y_rate))
+        if self.hold.chord is not None:
+            gap[0] += self.hold.chord - self.hold.compliance * R[0]
+        return Balance(gradient, diagonal, off, border, softness, gap, K, m, tangent)
+
+    def edge_directions(self, angles: Array, R: Array) -> Array:
+        """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
+        cos, sin = np.cos(angles), np.sin(angles)
+        fx, fy = self.edge_forces(R)
+        stretch, shear = 1.0 + (fx * cos + fy * sin) * self._axial, (fy * cos - fx * sin) * self._shear
+        return np.array((stretch * cos - shear * sin, stretch * sin + shear * cos))
+
+    def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
+        """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
+        rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
+        ends = ((0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0))
+        for end, support, rest_angle, slip, sign in ends:
+            if support.kind == "clamp":
+                gradient[end], diagonal[end], off[end], border[:, end] = angles[end] - rest_angle, 1.0, 0.0, 0.0
+                gradient[end] *= self.moment_scale
+                diagonal[end] *= self.moment_scale
+            elif support.stiffness or support.friction_moment or support.moment:
+                moment, slope = support.moment_at(float(angles[end]), rest_angle, slip)
+                gradient[end] += moment + sign * support.moment
+                diagonal[end] += slope
+
+    def solve(self, balance: Balance, rhs: Array, gap: Array) -> tuple[Array, Array]:
+        """Solve the bordered system for several right-hand sides.
+
+        Parameters
+        ----------
+        balance : Balance
+        rhs : (n + 2, p) N m
+        gap : (2, p) m
+            [H B; B^T -S] [dalpha; dR] = [rhs; gap]; rows of position components that are not imposed are dropped.
+
+        Returns
+        -------
+        dalpha : (n + 2, p) rad, dR : (2, p) N
+            Not a number if the matrix is singular.
+        """
+        columns, solved, schur = self._eliminated(balance, rhs)
+        k, p = len(self._imposed), rhs.shape[1]
+        low = columns[:, : k + 1].T @ -solved[:, k + 1 :]
+        low[:k] += gap if k == 2 else gap[self._imposed]
+        try:
+            multipliers = self._scale[:, None] * np.linalg.solve(schur, self._scale[:, None] * low)
+        except np.linalg.LinAlgError:
+            multipliers = np.full((k + 1, p), np.nan)
+        dR = np.zeros((2, p))
+        dR[self._imposed] = multipliers[:k]
+        return solved[:, k + 1 :] - solved[:, : k + 1] @ multipliers, dR
+
+    def excess_negatives(self, balance: Balance) -> int:
+        """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
+        _, _, schur = self._eliminated(balance, np.zeros((balance.gradient.size, 0)))
+        if not np.all(np.isfinite(schur)):
+            return 1
+        diagonal = balance.diagonal.copy()
+        diagonal[self._middle] += self._spring
+        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
+        return count - len(self._imposed)
+
+    def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
+        """Border columns and right-hand sides, both solved by the stiffened H, and the scaled Schur complement."""
+        k, p = len(self._imposed), rhs.shape[1]
+        columns = np.zeros((rhs.shape[0], k + 1 + p), order="F")
+        columns[:, :k] = balance.border.T if k == 2 else balance.border[self._imposed].T
+        columns[self._middle, k] = -self._spring
+        columns[:, k + 1 :] = rhs
+        diagonal = balance.diagonal.copy()
+        diagonal[self._middle] += self._spring
+        *_, solved, info = dgtsv(balance.off, diagonal, balance.off, columns)
+        if info != 0:
+            solved = np.full_like(columns, np.nan)
+        schur = columns[:, : k + 1].T @ -solved[:, : k + 1]
+        softness = balance.softness.copy()
+        softness[0, 0] += self.hold.compliance
+        schur[:k, :k] -= softness[self._imposed][:, self._imposed]
+        schur[k, k] += self._spring
+        return columns, solved, schur * self._scale * self._scale[:, None]
+
+
+def negative_pivots(diagonal: Array, off: Array) -> int:
+    """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
+    count, pivot, tiny = 0, 1.0, np.finfo(float).tiny
+    squares = np.concatenate(([0.0], off**2)).tolist()
+    for d, b2 in zip(diagonal.tolist(), squares, strict=True):
+        pivot = d - b2 / pivot
+        if pivot == 0.0:
+            pivot = tiny
+        count += int(pivot < 0.0)
+    return count

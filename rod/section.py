@@ -1,0 +1,193 @@
+"""What a cross-section answers to its curvature: law, stiffness profile, internal friction, plastic set, and memory.
+
+From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and tangent dm/dK (N m^2):
+
+    m = profile * m_law(K, K0_set) + sum_e M_e clip((K - z_e) / c_e, -1, 1)
+
+* Internal friction (wires that rub): parallel elasto-plastic elements (Prandtl-Ishlinskii). Element e sticks over a
+  curvature change c_e and slips at the moment M_e; z_e is its relaxed curvature, its memory. At the start z_e = K0.
+* Plastic set: K0_set = K0 + rate * max(reached, K - K0), where ``reached`` is the largest excess K - K0 so far.
+
+Within one displacement step the response is a function of K alone with the memory of the step's start: an increment is
+a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
+
+Source: constitutive extension of Eq. (5) of the paper; Prandtl-Ishlinskii model as in plasticity text books.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rod.characteristic import Array, MomentCurve
+
+Response = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class InternalFriction:
+    """Friction between the wires, as parallel elasto-plastic elements of equal moment.
+
+    Attributes
+    ----------
+    half_width : N m
+        Moment when all elements slip: half the width of the hysteresis loop. Zero is allowed (derivatives at zero).
+    stick_curvature : 1/m
+        Curvature change from the relaxed state after which all elements slip; positive.
+    elements : int
+        Elements slip one after the other at stick_curvature * (1..elements) / elements: one is a sharp stick-slip,
+        several a rounded loop. Three follow a smooth loop to a few per cent.
+    """
+
+    half_width: float
+    stick_curvature: float
+    elements: int = 3
+
+    def __post_init__(self) -> None:
+        if not (self.half_width >= 0.0 and self.stick_curvature > 0.0 and self.elements >= 1):
+            raise ValueError(f"need half_width >= 0, stick_curvature > 0 and elements >= 1, got {self}")
+
+    @property
+    def stick(self) -> Array:
+        """Curvature change c_e to slip of each element, (elements, 1) 1/m."""
+        return self.stick_curvature * np.arange(1, self.elements + 1)[:, None] / self.elements
+
+    @property
+    def share(self) -> float:
+        """Slip moment M_e of one element, N m."""
+        return self.half_width / self.elements
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What the cable and its bearings remember of the steps before.
+
+    Attributes
+    ----------
+    relaxed : (elements, n) 1/m
+        Curvature at which each friction element is free of moment; (0, n) without friction.
+    reached : (n,) 1/m
+        Largest excess curvature K - K0 so far, not below zero.
+    left_angle, right_angle : rad
+        Angle at which the friction of each bearing is free of moment.
+    """
+
+    relaxed: Array
+    reached: Array
+    left_angle: float
+    right_angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Constitutive data at the n joints of the rod.
+
+    Attributes
+    ----------
+    law : MomentCurve
+    pre_curvature : (n,) 1/m
+        K0(s).
+    profile : (n,) or None
+        Factor on the moment of the law, EI(s) relative; None for 1.
+    friction : InternalFriction or None
+    plastic_rate : float
+        Growth of K0 with the largest curvature reached, 1/m per 1/m.
+    """
+
+    law: MomentCurve
+    pre_curvature: Array
+    profile: Array | None = None
+    friction: InternalFriction | None = None
+    plastic_rate: float = 0.0
+
+    @cached_property
+    def _elastic(self) -> Response:
+        """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
+        K0 = self.pre_curvature
+        bound = self.law.bound(K0[:1] if np.ptp(K0) == 0.0 else K0)
+        if self.profile is None:
+            return bound
+        profile = self.profile
+
+        def scaled(K: Array) -> tuple[Array, Array]:
+            m, tangent = bound(K)
+            return profile * m, profile * tangent
+
+        return scaled
+
+    def virgin(self) -> tuple[Array, Array]:
+        """``relaxed`` and ``reached`` of the mounted cable."""
+        elements = 0 if self.friction is None else self.friction.elements
+        return np.repeat(self.pre_curvature[None], elements, axis=0), np.zeros_like(self.pre_curvature)
+
+    def rest_curvature(self, K: Array, memory: Memory) -> Array:
+        """Pre-curvature with the set that goes with curvature K, (n,) 1/m."""
+        excess = np.maximum(memory.reached, K - self.pre_curvature)
+        return self.pre_curvature + self.plastic_rate * excess
+
+    def response(self, memory: Memory) -> Response:
+        """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
+        elastic = self._set_response(memory) if self.plastic_rate else self._elastic
+        if self.friction is None:
+            return elastic
+        stick, share, relaxed = self.friction.stick, self.friction.share, memory.relaxed
+
+        def with_friction(K: Array) -> tuple[Array, Array]:
+            m, tangent = elastic(K)
+            u = (K - relaxed) / stick
+            sticking = np.abs(u) < 1.0
+            return m + share * np.clip(u, -1.0, 1.0).sum(axis=0), tangent + share * (sticking / stick).sum(axis=0)
+
+        return with_friction
+
+    def _set_response(self, memory: Memory) -> Response:
+        law, rate, K0 = self.law, self.plastic_rate, self.pre_curvature
+        profile = np.ones(1) if self.profile is None else self.profile
+
+        def with_set(K: Array) -> tuple[Array, Array]:
+            rest = self.rest_curvature(K, memory)
+            growing = rate * np.greater(K - K0, memory.reached)
+            tangent = law.tangent(K, rest) + growing * law.moment_by_pre_curvature(K, rest)
+            return profile * law.moment(K, rest), profile * tangent
+
+        return with_set
+
+    def advanced(self, K: Array, memory: Memory) -> tuple[Array, Array]:
+        """``relaxed`` and ``reached`` after a step that ended at curvature K."""
+        reached = np.maximum(memory.reached, K - self.pre_curvature)
+        if self.friction is None:
+            return memory.relaxed, reached
+        stick = self.friction.stick
+        return np.clip(memory.relaxed, K - stick, K + stick), reached
+
+    def stored_energy(self, K: Array, memory: Memory) -> Array:
+        """Recoverable energy per length at the end of a step, (n,) N: law and sticking friction elements."""
+        energy = self.law.energy(K, self.rest_curvature(K, memory))
+        energy = energy if self.profile is None else self.profile * energy
+        if self.friction is None:
+            return energy
+        u = np.clip((K - memory.relaxed) / self.friction.stick, -1.0, 1.0)
+        return np.asarray(energy + 0.5 * self.friction.share * (self.friction.stick * u**2).sum(axis=0))
+
+    def potential(self, K: Array, memory: Memory) -> Array:
+        """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
+        rest = self.rest_curvature(K, memory)
+        if self.plastic_rate:
+            # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
+            turn = np.minimum(K, self.pre_curvature + memory.reached)
+            kept = self.pre_curvature + self.plastic_rate * memory.reached
+            nodes, weights = np.polynomial.legendre.leggauss(12)
+            k = turn + 0.5 * (K - turn) * (nodes[:, None] + 1.0)
+            growing = self.law.moment(k, self.rest_curvature(k, memory))
+            energy = self.law.energy(turn, kept) + 0.5 * (K - turn) * (weights @ growing)
+        else:
+            energy = self.law.energy(K, rest)
+        energy = energy if self.profile is None else self.profile * energy
+        if self.friction is None:
+            return np.asarray(energy)
+        u = np.abs((K - memory.relaxed) / self.friction.stick)
+        element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * self.friction.stick
+        return np.asarray(energy + self.friction.share * element.sum(axis=0))

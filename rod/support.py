@@ -1,0 +1,86 @@
+"""How the ends of the cable are held: bearings with springs, friction and rigid pieces; clamps; a free end.
+
+Each end carries an angle of its own (rad, from x toward y). What acts on that angle is written as the bending moment at
+the end of the cable, in the sign of the curvature; "against the turning direction" makes it negative at both ends
+when the cable is bent further, since the left angle then grows and the right one falls:
+
+    left end   m = moment - stiffness (angle - rest) - friction_moment clip((angle - slip) / stick_angle, -1, 1)
+    right end  m = moment + stiffness (angle - rest) + friction_moment clip((angle - slip) / stick_angle, -1, 1)
+
+``rest`` is the angle in the mounted, force-free position unless given; ``slip`` is the memory of the friction, at the
+start the mounted angle. A Coulomb moment that sticks over a small angle instead of none keeps every step a smooth
+minimisation; once the bearing has turned by ``stick_angle`` the moment is exactly the Coulomb moment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["bearing", "clamp", "free"]
+
+
+@dataclass(frozen=True)
+class Support:
+    """One end of the cable.
+
+    Attributes
+    ----------
+    kind : {"bearing", "clamp", "free"}
+        A bearing turns, a clamp keeps its angle, a free end also moves (right end only; cantilever).
+    angle : rad or None
+        Angle of a clamp, or rest angle of a bearing's spring. None: as mounted.
+    stiffness : N m/rad
+        Rotational spring of a bearing.
+    friction_moment : N m
+        Coulomb moment of a bearing.
+    stick_angle : rad
+        Turn over which the friction builds up. The default is a hundredth of the turn of a usual displacement step
+        (0.1 rad), small enough not to matter, large enough for a well-conditioned step.
+    rigid_length : m
+        Stiff piece between the bearing axis (or clamp) and the free cable.
+    moment : N m
+        Applied bending moment, in the sign of the curvature.
+    """
+
+    kind: Kind = "bearing"
+    angle: float | None = None
+    stiffness: float = 0.0
+    friction_moment: float = 0.0
+    stick_angle: float = 1e-3
+    rigid_length: float = 0.0
+    moment: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("bearing", "clamp", "free"):
+            raise ValueError(f"unknown kind of support {self.kind!r}")
+        if not self.stick_angle > 0.0:
+            raise ValueError(f"stick_angle must be positive, got {self.stick_angle}")
+        if not self.rigid_length >= 0.0:
+            raise ValueError(f"rigid_length must not be negative, got {self.rigid_length}")
+
+    def moment_at(self, angle: float, rest: float, slip: float) -> tuple[float, float]:
+        """Moment against turning (spring and friction, N m) and its derivative by the angle (N m/rad)."""
+        u = (angle - slip) / self.stick_angle
+        sticking = -1.0 < u < 1.0
+        moment = self.stiffness * (angle - rest) + self.friction_moment * min(1.0, max(-1.0, u))
+        return moment, self.stiffness + (self.friction_moment / self.stick_angle if sticking else 0.0)
+
+    def stored_energy(self, angle: float, rest: float, slip: float) -> float:
+        """Energy of the spring and of the sticking friction, J."""
+        u = min(1.0, max(-1.0, (angle - slip) / self.stick_angle))
+        return 0.5 * self.stiffness * (angle - rest) ** 2 + 0.5 * self.friction_moment * self.stick_angle * u**2
+
+    def potential(self, angle: float, rest: float, slip: float) -> float:
+        """Incremental potential, J: its derivative by the angle is `moment_at`."""
+        u = abs(angle - slip) / self.stick_angle
+        friction = self.friction_moment * self.stick_angle * (0.5 * u**2 if u < 1.0 else u - 0.5)
+        return 0.5 * self.stiffness * (angle - rest) ** 2 + friction
+
+    def advanced(self, angle: float, slip: float) -> float:
+        """Memory of the friction after a step that ended at ``angle``."""
+        return min(max(slip, angle - self.stick_angle), angle + self.stick_angle)
+
+
+#: The ideal, moment-free bearing.
+BEARING = Support()
