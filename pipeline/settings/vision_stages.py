@@ -26,6 +26,38 @@ class PhotoSettings(StageSettings):
 class CalibrationSettings(StageSettings):
     """Scale and plane of the photos."""
 
+    given_scale_std: float = Field(
+        0.001, gt=0, description="relative; a scale bar read on a photo: one pixel in a thousand"
+    )
+    cover_diameter_std: float = Field(
+        0.004, gt=0, description="relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit"
+    )
+    length_scale_std: float = Field(
+        0.005, gt=0, description="relative; 1 mm on 200 mm: how well the length between the axes is known"
+    )
+    max_scale_std: float = Field(
+        0.01, gt=0, description="relative; a source of scale worse than that is no better than the cable's length"
+    )
+    board_std: float = Field(
+        3e-4, gt=0, description="relative; a printed board measured with a ruler: 0.1 mm on 300 mm"
+    )
+    board_search_px: int = Field(
+        2000, ge=500, description="px; long side at which the board is searched, corners are refined at full resolution"
+    )
+    lens_photos: int = Field(10, ge=3, description="photos; from so many on they may show the board in any position")
+    lens_sigmas: float = Field(3.0, gt=0, description="sigmas; a weaker lens term adds more error than it removes")
+    max_board_rms_px: float = Field(0.5, gt=0, description="px; real boards reach 0.12 to 0.16 px, bent ones do not")
+    max_focal_std: float = Field(
+        0.05, gt=0, description="relative; photos all in one plane do not tell the focal length and so no distance"
+    )
+    usual_distance_m: float = Field(
+        0.4, gt=0, description="m; camera above the cable where nobody says: half the height of a bench stand"
+    )
+    check_sigmas: float = Field(3.0, gt=0, description="sigmas; one false finding in 400 checks")
+    check_floor: float = Field(
+        0.005, gt=0, description="relative; smaller deviations change the stiffness by less than one percent"
+    )
+
 
 class SegmentationSettings(StageSettings):
     """Search for the cable."""
@@ -160,9 +192,24 @@ class BearingSettings(StageSettings):
 class SeriesSettings(StageSettings):
     """Photos of one specimen together."""
 
+    min_travel_m: float = Field(
+        2e-4, gt=0, description="m; below it rounding of the log and play of the bearings hide which bearing moves"
+    )
+    max_fixed_shift_m: float = Field(
+        2e-4, gt=0, description="m; the fixed bearing may rock by its play; more means that camera or frame moved"
+    )
+    max_length_spread: float = Field(
+        0.005, gt=0, description="relative; a cable's length is constant, tracing repeats within a tenth of this"
+    )
+    max_length_deviation: float = Field(
+        0.01, gt=0, description="relative; length_mm is measured to about half a percent and so is the scale"
+    )
+
 
 class PreviewSettings(StageSettings):
     """Pictures for people."""
 
     long_side_px: int = Field(1200, ge=200, description="px; as wide as a report's column on a dense screen")
+    strip_widths: float = Field(1.0, gt=0.5, description="cable widths shown on each side of the middle of the strip")
+    strip_height_px: int = Field(160, ge=40, description="px; a bend of a hundredth of the width is a pixel high")
     jpeg_quality: int = Field(80, ge=10, le=100, description="percent; about 80 kB a photo without visible blocks")

@@ -1,0 +1,159 @@
+"""Where the scale comes from, how sure it is, and how it checks out against everything else that is known.
+
+``camera of specimen.toml -> Calibration (plane map, scale)``; without any: the found bearings and covers give it.
+Sources, the first that is given: a number of px/mm; photos of a board in the plane of the cable
+(`pipeline.vision.board`); the travel of the moving bearing against the displacement log; the diameter of the covers;
+the length of the cable.
+
+Standard deviations are relative and common to all photos of the specimen. SI units; scales in px/m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.records import Array, Finding, Scale, Specimen
+from pipeline.settings.vision_stages import CalibrationSettings
+from pipeline.vision.plane import PlaneMap
+from pipeline.vision.rough import RoughCable
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Map from photo pixels to the plane of the cable axis, and what is known about its scale."""
+
+    plane: PlaneMap
+    scale: Scale
+    findings: tuple[Finding, ...] = ()
+
+
+def from_number(px_per_m: float, settings: CalibrationSettings) -> Calibration:
+    """Scale as given in specimen.toml."""
+    scale = Scale(px_per_m, settings.given_scale_std, "number given in specimen.toml")
+    return Calibration(PlaneMap.from_scale(px_per_m), scale)
+
+
+def from_found(
+    specimen: Specimen, found: list[RoughCable], displacements: Array, settings: CalibrationSettings
+) -> Calibration | None:
+    """Scale without any given: the best of the travel by the log, the covers' diameter and the cable's length.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    found : list of RoughCable
+        At least one.
+    displacements : (n,) m
+        By the log, of the same photos; NaN where unknown.
+
+    Returns
+    -------
+    Calibration or None
+        None without any photo.
+    """
+    if not found:
+        return None
+    estimates = [_by_travel(found, displacements), _by_covers(found, specimen, settings)]
+    known = [estimate for estimate in estimates if estimate is not None]
+    precise = [scale for scale in known if scale.std_relative < settings.max_scale_std]
+    if precise:
+        scale = min(precise, key=lambda estimate: estimate.std_relative)
+    else:
+        lengths = np.array([_length(cable.path_px) for cable in found])
+        scale = Scale(
+            float(np.median(lengths)) / specimen.length_m,
+            settings.length_scale_std,
+            "length of the cable on the photos",
+        )
+    message = f"No scale is given; {scale.px_per_m / 1e3:.4g} px/mm follow from the {scale.source}."
+    finding = Finding("scale/source", "info", message)
+    return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,))
+
+
+def _length(path: Array) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def chords_px(found: list[RoughCable]) -> Array:
+    """Distance ``(n,)`` of the bearing axes on each photo, px."""
+    return np.array([np.hypot(*np.subtract(cable.right.center_px, cable.left.center_px)) for cable in found])
+
+
+def _by_travel(found: list[RoughCable], displacements: Array) -> Scale | None:
+    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one."""
+    known = np.isfinite(displacements)
+    travel = displacements[known] - displacements[known].mean() if known.any() else displacements
+    if known.sum() < 2 or not np.ptp(travel) > 0:
+        return None
+    chords = chords_px(found)[known]
+    slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
+    axis_std = np.array([np.hypot(cable.left.std_px, cable.right.std_px) for cable in found])[known]
+    residual = chords - chords.mean() + slope * travel
+    free = len(chords) - 2
+    spread = max(float(np.median(axis_std)), float(np.sqrt(residual @ residual / free)) if free > 0 else 0.0)
+    std = spread / float(np.sqrt(travel @ travel))
+    if slope <= 0:
+        return None
+    return Scale(slope, std / slope, "travel of the moving bearing against the displacement log")
+
+
+def cover_radii_px(found: list[RoughCable]) -> Array:
+    """Radii ``(k,)`` of all covers that were measured, px."""
+    axes = [axis for cable in found for axis in (cable.left, cable.right)]
+    return np.array([axis.radius_px for axis in axes if axis.radius_px is not None])
+
+
+def _by_covers(found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings) -> Scale | None:
+    radii = cover_radii_px(found)
+    if specimen.rig.marker_diameter_m is None or not len(radii):
+        return None
+    scatter = float(np.std(radii) / np.mean(radii))
+    std = float(np.hypot(settings.cover_diameter_std, scatter))
+    return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
+
+
+def check_scale(
+    specimen: Specimen,
+    calibration: Calibration,
+    found: list[RoughCable],
+    displacements: Array,
+    settings: CalibrationSettings,
+) -> tuple[Finding, ...]:
+    """Hold the scale against the covers' diameter and the travel of the moving bearing; what fails is a finding."""
+    findings = []
+    local = _local_scale(calibration, found)
+    for other, code in (
+        (_by_covers(found, specimen, settings), "scale/covers"),
+        (_by_travel_on_plane(calibration, found, displacements), "scale/displacement"),
+    ):
+        if other is None or other.source == calibration.scale.source:
+            continue
+        ratio = other.px_per_m / (local if code == "scale/covers" else 1.0)
+        std = float(np.hypot(other.std_relative, calibration.scale.std_relative))
+        if abs(ratio - 1.0) > max(settings.check_sigmas * std, settings.check_floor):
+            text = (
+                f"The {other.source} says the scale should be {100 * (ratio - 1):+.2f} ± {100 * std:.2f} % "
+                f"of the one used ({calibration.scale.source})"
+            )
+            findings.append(Finding(code, "warning", text.replace("of the one", "away from the one") + "."))
+    return tuple(findings)
+
+
+def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
+    axes = np.array([axis.center_px for cable in found for axis in (cable.left, cable.right)])
+    return float(np.median(calibration.plane.local_scale(axes))) if len(axes) else calibration.scale.px_per_m
+
+
+def _by_travel_on_plane(calibration: Calibration, found: list[RoughCable], displacements: Array) -> Scale | None:
+    """As `_by_travel`, with chords in m: the slope is then the ratio of true scale to the scale used."""
+    estimate = _by_travel(found, displacements)
+    known = np.isfinite(displacements)
+    if estimate is None:
+        return None
+    ends = [calibration.plane.to_plane(np.array([cable.left.center_px, cable.right.center_px])) for cable in found]
+    chords = np.array([np.hypot(*(right - left)) for left, right in ends])[known]
+    travel = displacements[known] - displacements[known].mean()
+    slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
+    return Scale(slope, estimate.std_relative, estimate.source)

@@ -1,0 +1,74 @@
+"""Pictures for people: the photo reduced, and the cable straightened along its centerline and magnified across.
+
+If the tracing is right, the cable in the strip is a straight band between the two measured edges; whatever it follows
+wrongly shows as a bend of the band, magnified.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records import Array, Centerline, Preview
+from pipeline.settings.vision_stages import PreviewSettings
+from pipeline.vision.crosscut import path_normals
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import RoughCable
+
+# Okabe and Ito's orange and sky blue (blue, green, red): told apart by colour-blind readers and on dark and bright.
+_MIDDLE, _EDGE = (0, 159, 230), (233, 180, 86)
+
+
+def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
+    """The photo at the size of a report's column, as JPEG; levels stretched to the range it uses."""
+    factor = max(1.0, max(photo.size) / settings.long_side_px)
+    size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
+    small = cv2.resize(photo.pixels, size, interpolation=cv2.INTER_AREA)
+    if small.dtype != np.uint8:
+        small = np.clip(small.astype(np.float32) * np.float32(255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    return Preview(_jpeg(small, settings), size[0], size[1], photo.size[0] / size[0])
+
+
+def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: PreviewSettings) -> Preview:
+    """Add the straightened strip of a traced cable."""
+    return replace(preview, strip=straightened_strip(line, rough, settings))
+
+
+def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSettings) -> bytes:
+    """JPEG: arc length to the right from the left bearing axis, the side of the bow downward, magnified across."""
+    path = np.column_stack([line.u_px, line.v_px])
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    along = np.linspace(0.0, s[-1], settings.long_side_px)
+    points = np.column_stack([np.interp(along, s, path[:, 0]), np.interp(along, s, path[:, 1])])
+    _, normal = path_normals(points)
+    normal *= -1.0 if line.mirrored else 1.0
+    half = settings.strip_widths * 2.0 * rough.half_width_px
+    across = np.linspace(-half, half, settings.strip_height_px)
+    grid = points[None, :, :] + across[:, None, None] * normal[None, :, :] - np.array(rough.origin_px)
+    u, v = (grid[..., axis].astype(np.float32) for axis in (0, 1))
+    strip = cv2.remap(rough.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    picture = cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR)
+    zoom = (settings.strip_height_px - 1) / (2.0 * half)
+    middle = 0.5 * (settings.strip_height_px - 1)
+    picture[round(middle), ::2] = _MIDDLE
+    for side in (-1.0, 1.0):
+        picture[round(middle + side * rough.half_width_px * zoom), ::4] = _EDGE
+    return _jpeg(picture, settings)
+
+
+def _stretched(strip: NDArray[np.float32], line: Centerline, s: Array, along: Array) -> NDArray[np.uint8]:
+    seen = np.interp(along, s, line.shape.seen.astype(float)) > 0.5
+    part = strip[:, seen] if seen.any() else strip
+    low, high = np.percentile(part, (0.5, 99.5))
+    scaled = (strip - low) * (255.0 / max(float(high - low), 1e-6))
+    return np.clip(scaled, 0, 255).astype(np.uint8)
+
+
+def _jpeg(picture: NDArray[np.uint8], settings: PreviewSettings) -> bytes:
+    done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, settings.jpeg_quality])
+    if not done:
+        raise ValueError("a picture of uint8 grey or colour can always be coded")
+    return data.tobytes()
