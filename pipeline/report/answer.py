@@ -1,0 +1,143 @@
+"""The first screen in words: what f_EI is, how sure, whether the model was adequate, and what to do next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.report.curves import best, curves
+from pipeline.report.figures import stiffness_unit
+from pipeline.report.words import Words
+from pipeline.result import Result
+from pipeline.settings import ReportSettings
+
+TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer in a few sentences.
+
+    Attributes
+    ----------
+    sentence : str
+        f_EI and K0, or why there is none.
+    agreement : str
+        Whether the two ways agree.
+    model : str
+        Whether the simulation explains the data.
+    advice : str
+        What to do next.
+    verdict, tone : str
+        Label of the verdict and how to colour it: ``good``, ``warn`` or ``bad``.
+    pre_curvatures : tuple of (way, value ± std)
+    """
+
+    sentence: str
+    agreement: str
+    model: str
+    advice: str
+    verdict: str
+    tone: str
+    pre_curvatures: tuple[tuple[str, str], ...]
+
+
+def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
+    """The answer of a result in the language of the words."""
+    model, adequate = _model(result, words, settings)
+    diagnosis = result.diagnosis
+    if result.status == "failed":
+        verdict, tone = words("status_failed"), "bad"
+    elif diagnosis is not None:
+        verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
+    else:
+        verdict, tone = words("verdict_none"), "good" if adequate else "warn"
+    return Answer(
+        sentence=_sentence(result, words),
+        agreement=_agreement(result, words),
+        model=model,
+        advice=_advice(result, words),
+        verdict=verdict,
+        tone=tone,
+        pre_curvatures=tuple(
+            (words(f"k0_{way}") if way in ("photo", "balance", "inverse") else way, words.measured(value, std))
+            for way, (value, std) in pre_curvatures(result).items()
+        ),
+    )
+
+
+def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
+    """K0 and its standard deviation by every way that gave one, in 1/m."""
+    found: dict[str, tuple[float, float | None]] = {}
+    if result.agreement is not None:
+        found.update(result.agreement.pre_curvature)
+    for way, part in (("balance", result.balance), ("inverse", result.inverse)):
+        if part is not None and part.pre_curvature_per_m is not None:
+            found.setdefault(way, (part.pre_curvature_per_m, part.pre_curvature_std_per_m))
+    return found
+
+
+def _sentence(result: Result, words: Words) -> str:
+    """f_EI at both ends of the visited range and K0."""
+    name, curve = result.specimen.id, best(result)
+    if curve is None:
+        reason = next((f.message for f in result.findings if f.level == "error"), "")
+        key = "answer_failed" if result.status == "failed" and reason else "answer_none"
+        return words(key, id=name, reason=reason) if key == "answer_failed" else words(key, id=name)
+    unit = stiffness_unit(result, words)
+    change = curve.tangent[-1] - curve.tangent[0]
+    beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
+    text = words(
+        "answer_constant" if not beyond else "answer_falls" if change < 0.0 else "answer_rises",
+        id=name,
+        first=unit.text(curve.tangent[0], curve.tangent_std[0]),
+        last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
+        low=words.number(curve.kappa[0]),
+        high=words.number(curve.kappa[-1]),
+    )
+    known = pre_curvatures(result)
+    way = next((way for way in ("inverse", "balance", "photo") if way in known), None)
+    return text if way is None else f"{text} {words('answer_pre_curvature', value=words.measured(*known[way]))}"
+
+
+def _agreement(result: Result, words: Words) -> str:
+    """Difference of the two ways against what their bands allow."""
+    part, found = result.agreement, curves(result)
+    if part is None or part.rms_relative is None or not {"inverse", "balance"} <= found.keys():
+        return words("agree_none")
+    one, two = found["inverse"], found["balance"]
+    low, high = part.range_per_m or (max(one.kappa[0], two.kappa[0]), min(one.kappa[-1], two.kappa[-1]))
+    grid = np.linspace(low, high, 50)
+    mean = 0.5 * (np.interp(grid, one.kappa, one.tangent) + np.interp(grid, two.kappa, two.tangent))
+    noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
+    expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
+    key = {True: "agree_yes", False: "agree_no", None: "agree_open"}[part.compatible]
+    text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
+    return text if part.p_value is None else f"{text} {words('agree_p', p=words.number(part.p_value, 2))}."
+
+
+def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
+    """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
+    if result.diagnosis is not None:
+        return result.diagnosis.headline, result.diagnosis.verdict == "adequate"
+    misfit = result.inverse.misfit if result.inverse else None
+    if misfit is None or misfit.degrees_of_freedom <= 0:
+        return words("model_unknown"), False
+    ratio, std = misfit.chi2 / misfit.degrees_of_freedom, math.sqrt(2.0 / misfit.degrees_of_freedom)
+    good = ratio < 1.0 + settings.misfit_sigma * std
+    return words("model_ok" if good else "model_bad", chi2=words.number(ratio), std=words.number(std, 2)), good
+
+
+def _advice(result: Result, words: Words) -> str:
+    """The next experiment, else the warnings, else nothing."""
+    if result.status == "failed":
+        return words("next_failed")
+    experiment = result.diagnosis.next_experiment if result.diagnosis else None
+    if experiment is not None:
+        names = ", ".join(words.cause(name) for name in experiment.separates)
+        return words("next_what", what=experiment.what, causes=names) if names else experiment.what
+    if any(finding.level != "info" for finding in result.findings):
+        return words("next_findings")
+    return words("next_none")

@@ -1,0 +1,214 @@
+"""From a drawing by matplotlib to a compact piece of SVG that follows the page: its colours, its font, its width.
+
+Every figure is drawn once on matplotlib axes in the light colours of `PALETTE`; report.pdf takes it as it is. For the
+page the colours are replaced by the names of CSS variables, so that dark mode is a matter of the style sheet, letters
+stay letters, and identifiers get the figure's name in front, because many figures share one page.
+
+Units: 1 unit of the SVG is 1 px at the width in which the figure was designed (matplotlib at 72 dots per inch).
+Colours: Okabe and Ito (2008), "Color Universal Design", told apart by readers with any of the three colour blindnesses;
+lines differ in their dashes as well. Steps of a test are ordered, so they run along the map cividis.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from pipeline.rounding import plain
+
+# role: (in light, in dark). The light colours differ in every role: they are how a role is found again in the SVG.
+PALETTE = {
+    "ink": ("#1c2127", "#e8eaed"),
+    "muted": ("#5b6570", "#a3adb8"),
+    "grid": ("#dfe3e8", "#343b44"),
+    "paper": ("#fffffe", "#15191e"),
+    "inverse": ("#0072b2", "#56b4e9"),
+    "balance": ("#d55e00", "#f0a13c"),
+    "extended": ("#009e73", "#2fd0a2"),
+    "measured": ("#1b2026", "#f2f4f6"),
+    "alarm": ("#b3261e", "#ff8a80"),
+    "unvisited": ("#8a949f", "#77818c"),
+}
+LIGHT = {role: colours[0] for role, colours in PALETTE.items()}
+DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": (0, (6, 2, 1.5, 2))}
+# cividis ends in a blue and a yellow that vanish on dark and white paper: these parts of it can be seen on either
+STEP_RANGE_LIGHT, STEP_RANGE_DARK = (0.0, 0.82), (0.22, 1.0)
+
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cablebend",
+    "font.family": "sans-serif",
+    "font.size": 11.0,
+    "axes.titlesize": 11.0,
+    "axes.labelsize": 11.0,
+    "legend.fontsize": 10.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "axes.edgecolor": LIGHT["muted"],
+    "axes.labelcolor": LIGHT["ink"],
+    "axes.titlecolor": LIGHT["ink"],
+    "text.color": LIGHT["ink"],
+    "legend.labelcolor": LIGHT["ink"],
+    "xtick.color": LIGHT["muted"],
+    "ytick.color": LIGHT["muted"],
+    "xtick.labelcolor": LIGHT["ink"],
+    "ytick.labelcolor": LIGHT["ink"],
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": LIGHT["grid"],
+    "grid.linewidth": 0.8,
+    "axes.linewidth": 0.8,
+    "lines.linewidth": 1.8,
+    "hatch.linewidth": 0.6,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.unicode_minus": True,
+    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure ready for the page.
+
+    Attributes
+    ----------
+    name : str
+        Identifier on the page.
+    svg : str
+        The ``<svg>`` element.
+    frame : dict
+        Where the data are in it: ``box`` = [left, top, right, bottom] in SVG units, ``x`` and ``y`` = the limits there.
+    """
+
+    name: str
+    svg: str
+    frame: dict[str, list[float]] = field(default_factory=dict)
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The look of all figures, and only while they are drawn."""
+    with mpl.rc_context(STYLE):
+        yield
+
+
+def drawing(
+    name: str,
+    draw: Callable[[FigureBase], Axes],
+    *,
+    size: tuple[float, float] = (460.0, 300.0),
+    title: str,
+    description: str,
+) -> Drawing:
+    """Draw a figure and turn it into SVG.
+
+    Parameters
+    ----------
+    name : str
+        Identifier, unique on the page.
+    draw : callable
+        Fills a matplotlib figure and returns the axes whose data the page may point at.
+    size : (width, height) px
+    title, description : str
+        What a reader who cannot see the figure is told.
+
+    Returns
+    -------
+    Drawing
+    """
+    with style():
+        figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72)
+        axes = draw(figure)
+        file = io.StringIO()
+        FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None})
+        box = axes.get_position()
+        frame = {
+            "box": [size[0] * box.x0, size[1] * (1 - box.y1), size[0] * box.x1, size[1] * (1 - box.y0)],
+            "x": [float(v) for v in axes.get_xlim()],
+            "y": [float(v) for v in axes.get_ylim()],
+        }
+    return Drawing(name, _compact(file.getvalue(), name, size, title, description), frame)
+
+
+def step_colours(count: int) -> list[str]:
+    """Light colours of so many steps in order; `step_variables` gives their CSS variables."""
+    return [_along("cividis", STEP_RANGE_LIGHT, i, count) for i in range(count)]
+
+
+def step_variables(count: int) -> dict[str, tuple[str, str]]:
+    """CSS variables of the steps: name without the dashes, and (light, dark) colour."""
+    return {
+        f"step{i}": (_along("cividis", STEP_RANGE_LIGHT, i, count), _along("cividis", STEP_RANGE_DARK, i, count))
+        for i in range(count)
+    }
+
+
+def _along(name: str, part: tuple[float, float], index: int, count: int) -> str:
+    share = index / max(1, count - 1)
+    return str(mpl.colors.to_hex(mpl.colormaps[name](part[0] + (part[1] - part[0]) * share)))
+
+
+def plot_area(figure: FigureBase, *, left: float = 62.0, right: float = 14.0, top: float = 34.0, bottom: float = 46.0) -> Axes:
+    """One pair of axes with margins in px: a fixed layout costs a tenth of matplotlib's constrained one."""
+    width, height = figure.bbox.width, figure.bbox.height  # in px, for all figures are drawn at 72 dots per inch
+    return figure.add_axes(
+        (left / width, bottom / height, (width - left - right) / width, (height - top - bottom) / height)
+    )
+
+
+def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes:
+    """Name the axes with their units, write the ticks in the reader's number format, put the legend above."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6))
+        axis.set_major_formatter(number_ticks(decimal))
+    axes.tick_params(length=3)
+    if legend:
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=legend, borderaxespad=0.1, columnspacing=1.4)
+    return axes
+
+
+def number_ticks(decimal: str) -> FuncFormatter:
+    """Tick labels with the decimal sign of the language and a true minus."""
+    return FuncFormatter(lambda value, _: plain(float(f"{value:.6g}"), 4, decimal=decimal))
+
+
+def _compact(svg: str, name: str, size: tuple[float, float], title: str, description: str) -> str:
+    """Inline SVG: colours become variables, numbers lose invisible digits, identifiers get the figure's name."""
+    body = svg[svg.index("<defs") : svg.rindex("</svg>")]
+    body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.DOTALL)
+    for role, (light, _) in PALETTE.items():
+        body = body.replace(light, f"var(--{role})")
+    used = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', body))
+    kept = {a or b for a, b in used}
+    body = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in kept else "", body)
+    body = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', body)
+    body = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", body)
+    body = re.sub(r"xlink:href", "href", body)
+    body = re.sub(r"-?\d+\.\d{2,}", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), body)
+    body = re.sub(r"font: ([\d.]+)px [^;\"]+", r"font-size: \1px", body)
+    body = re.sub(r"\s*\n\s*", " ", body)
+    body = re.sub(r"> <", "><", body)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size[0]:g} {size[1]:g}" role="img" class="plot" '
+        f'id="{name}" aria-labelledby="{name}-title {name}-desc"><title id="{name}-title">{escape(title)}</title>'
+        f'<desc id="{name}-desc">{escape(description)}</desc>{body}</svg>'
+    )

@@ -1,0 +1,176 @@
+"""The diagnosis on the page: causes named, ranking, twins, maps before and after, gain, blind spots, next experiment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from pipeline.report import maps, ranking
+from pipeline.report.canvas import Drawing, drawing
+from pipeline.report.evidence import map_rms
+from pipeline.report.figures import force_unit
+from pipeline.report.units import suited
+from pipeline.report.words import Words
+from pipeline.result import CauseRow, DiagnosisPart, ResidualMap, Result
+from pipeline.settings import ReportSettings
+
+# A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
+SHARE_DIGITS = 2
+
+
+@dataclass(frozen=True)
+class DiagnosisView:
+    """Texts, rows and figures of the section on the diagnosis."""
+
+    named: list[str] = field(default_factory=list)
+    gain: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+    blind_spots: list[str] = field(default_factory=list)
+    next_what: str = ""
+    next_separates: str = ""
+    leftover: list[str] = field(default_factory=list)
+    figures: dict[str, Drawing] = field(default_factory=dict)
+
+
+def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> DiagnosisView | None:
+    """Everything the page says about the diagnosis; None if there was none."""
+    part = result.diagnosis
+    if part is None:
+        return None
+    following = part.next_experiment
+    return DiagnosisView(
+        named=_named(part, words),
+        gain=_gain(part, result, words),
+        rows=[_row(row, words) for row in sorted(part.table, key=lambda row: -abs(row.z))],
+        blind_spots=[
+            words(
+                "blind_row",
+                name=words.cause(spot.name),
+                bias=words.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), SHARE_DIGITS),
+                settled=spot.settled_by,
+            )
+            for spot in part.blind_spots
+        ],
+        next_what=following.what if following else "",
+        next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
+        leftover=_scalars(part.leftover),
+        figures=_figures(part, words, settings),
+    )
+
+
+def _named(part: DiagnosisPart, words: Words) -> list[str]:
+    """One line a cause: name, probability, estimate, and what it cannot be told from."""
+    lines = []
+    for cause in part.causes:
+        size = suited([cause.estimate], cause.unit, decimal=words.decimal) if cause.unit[:1] == "N" else None
+        estimate = (
+            size.text(cause.estimate, cause.std)
+            if size
+            else f"{words.measured(cause.estimate, cause.std)} {cause.unit if cause.unit != '-' else ''}".rstrip()
+        )
+        share = f"{words('col_probability')} {words.number(100.0 * cause.probability, SHARE_DIGITS)}"
+        twins = [words.cause(name) for name in cause.class_ if name != cause.name]
+        tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
+        lines.append(f"{words.cause(cause.name)}: {estimate} ({share}){tail}")
+    return lines
+
+
+def _gain(part: DiagnosisPart, result: Result, words: Words) -> list[str]:
+    """What the extension bought on held-out steps."""
+    gain = part.gain
+    if gain is None:
+        return []
+    force = force_unit(result, words)
+    length = suited(gain.shape_rmse_m, "m", decimal=words.decimal)
+
+    def pair(values: tuple[float, float], factor: float) -> str:
+        return " → ".join(words.number(factor * v) for v in values)
+
+    percent = [words.number(100.0 * v, 3) for v in (gain.heldout_excess_removed, *gain.ci95)]
+    return [
+        words("gain_text", share=percent[0], low=percent[1], high=percent[2]),
+        words(
+            "gain_rmse",
+            force=pair(gain.force_rmse_N, force.factor),
+            unit=force.symbol,
+            shape=pair(gain.shape_rmse_m, length.factor),
+            length=length.symbol,
+        ),
+    ]
+
+
+def _row(row: CauseRow, words: Words) -> list[str]:
+    """Row of the table of causes."""
+
+    def percent(value: float | None) -> str:
+        return "–" if value is None else words.number(100.0 * value, SHARE_DIGITS)
+
+    unit = "" if row.unit == "-" else f" {row.unit}"
+    twin = f"{words.cause(row.nearest_twin)} ({words.number(abs(row.twin_cosine), 3)})" if row.nearest_twin else "–"
+    return [
+        words.cause(row.name),
+        f"{words.number(row.z, 2)} ± 1",
+        words.number(row.p_adjusted, 2),
+        f"{words.measured(row.estimate, row.std)}{unit}",
+        "–" if row.minimal_detectable is None else f"{words.number(row.minimal_detectable, 2)}{unit}",
+        percent(row.surviving_fraction),
+        twin,
+        percent(row.heldout_excess_removed),
+        percent(row.stiffness_shift),
+    ]
+
+
+def _scalars(leftover: dict[str, Any] | None) -> list[str]:
+    """Sentences and single numbers of the leftover; arrays stay in result.json."""
+    if not leftover:
+        return []
+    message = [str(leftover["message"])] if "message" in leftover else []
+    rest = [f"{k.replace('_', ' ')}: {v}" for k, v in leftover.items() if k != "message" and isinstance(v, str)]
+    return message + rest
+
+
+def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:
+    """Typed residual map of the diagnosis; None if there is none."""
+    return ResidualMap.model_validate(values) if values else None
+
+
+def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
+    """Ranking, cosines, maps before and after."""
+    drawn: dict[str, Drawing] = {}
+    if part.table:
+        drawn["ranking"] = drawing(
+            "ranking",
+            lambda f: ranking.draw_ranking(f, part, words, settings),
+            size=(460.0, ranking.ranking_height(part, settings)),
+            title=words("fig_ranking"),
+            description=words("fig_ranking_alt"),
+        )
+    if part.twins:
+        drawn["cosines"] = drawing(
+            "cosines",
+            lambda f: maps.draw_cosines(f, part.twins, words),
+            size=(460.0, 400.0),
+            title=words("fig_cosines"),
+            description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
+        )
+    for key, values in (("before", part.residuals_before), ("after", part.residuals_after)):
+        residuals = residual_map(values)
+        if residuals is not None and residuals.steps:
+            drawn[key] = drawing(
+                f"map-{key}",
+                partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
+                size=(460.0, 90.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+                title=words(f"fig_map_{key}"),
+                description=words("fig_map_alt", rms=map_rms(residuals, words)),
+            )
+    return drawn
+
+
+def _closest(twins: dict[str, dict[str, float]], words: Words) -> str:
+    """The pair of causes that are most alike."""
+    pairs = [(abs(c), a, b) for a, row in twins.items() for b, c in row.items() if a != b]
+    if not pairs:
+        return "–"
+    cosine, a, b = max(pairs)
+    return f"{words.cause(a)}, {words.cause(b)} ({words.number(cosine)})"

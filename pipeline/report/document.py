@@ -1,0 +1,143 @@
+"""``report.html``: one file that answers first and proves after, without network.
+
+Result -> views (texts, rows, figures) -> templates. Every text is escaped by the template engine; only the SVG drawn here is
+not, and its texts were escaped by matplotlib. Order of the page: the answer in a sentence and a figure; what was wrong and
+what was done; evidence; what simulation programs need; data and provenance.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from pipeline.report.answer import answer
+from pipeline.report.canvas import PALETTE, step_variables
+from pipeline.report.curves import best, equivalent, smallest_radius
+from pipeline.report.diagnosed import diagnosis_view
+from pipeline.report.evidence import (
+    force_rows,
+    knot_rows,
+    main_figure,
+    mechanics_figures,
+    photo_rows,
+    photo_views,
+    pointer_data,
+)
+from pipeline.report.figures import force_unit, stiffness_unit
+from pipeline.report.files import write_atomic
+from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
+from pipeline.report.words import Words
+from pipeline.result import Result
+from pipeline.settings import ReportSettings
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+@cache
+def environment() -> Environment:
+    """Template engine of report and index: escapes everything, refuses names that do not exist."""
+    engine = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    engine.filters["svg"] = lambda drawn: Markup(drawn.svg)
+    return engine
+
+
+def palette_css(steps: int) -> Markup:
+    """CSS variables of all colours: light, dark by the reader's system, and light again on paper."""
+    colours: dict[str, tuple[str, str]] = {**PALETTE, **step_variables(steps)}
+    light = "".join(f"--{name}:{pair[0]};" for name, pair in colours.items())
+    dark = "".join(f"--{name}:{pair[1]};" for name, pair in colours.items())
+    return Markup(f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}")
+
+
+def asset(name: str) -> Markup:
+    """Style sheet or script of this project, put into the page as it is."""
+    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
+
+
+def report_html(result: Result, settings: ReportSettings | None = None) -> str:
+    """Text of ``report.html``.
+
+    Parameters
+    ----------
+    result : Result
+        Measured, partly measured or failed.
+    settings : ReportSettings, optional
+
+    Returns
+    -------
+    str
+    """
+    settings = settings or ReportSettings()
+    words = Words(settings.language)
+    main = main_figure(result, words, settings)
+    levels = {level: [f for f in result.findings if f.level == level] for level in ("error", "warning", "info")}
+    return environment().get_template("report.html").render(
+        result=result,
+        words=words,
+        settings=settings,
+        answer=answer(result, words, settings),
+        main=main,
+        pointer=pointer_data(result, main, words, settings),
+        levels=levels,
+        photos=photo_views(result, words, settings),
+        figures=mechanics_figures(result, words, settings),
+        diagnosis=diagnosis_view(result, words, settings),
+        tables={"forces": force_rows(result, words), "photos": photo_rows(result, words), "knots": knot_rows(result, words)},
+        force_symbol=force_unit(result, words).symbol,
+        stiffness_symbol=stiffness_unit(result, words).symbol,
+        use=simulation_texts(result, words, settings),
+        specimen_rows=specimen_rows(result, words),
+        fit_rows=fit_rows(result, words),
+        provenance=provenance_rows(result),
+        palette=palette_css(sum(bool(photo.kappa_per_m) for photo in result.photos)),
+        css=asset("page.css") + asset("report.css"),
+        js=asset("page.js") + asset("report.js"),
+    )
+
+
+def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> dict[str, Any]:
+    """Equivalent constant stiffness and smallest radius in words; empty where there is none."""
+    texts: dict[str, Any] = {}
+    curve = best(result)
+    constant = equivalent(curve, settings.equivalent_range_per_m) if curve else None
+    if curve is not None and constant is not None:
+        unit = stiffness_unit(result, words)
+        texts["equivalent"] = words(
+            "use_equivalent_row",
+            value=unit.text(constant.stiffness, constant.std),
+            low=words.number(constant.low),
+            high=words.number(constant.high),
+        )
+        texts["bound"] = words("use_bound") if constant.bound else ""
+        texts["departure"] = words("use_departure", departure=words.number(100.0 * constant.departure, 2))
+        texts["method"] = curve.method
+        texts["range"] = (constant.low, constant.high)
+    radius = smallest_radius(result)
+    if radius is not None:
+        value = words.measured(1e3 * radius[0], 1e3 * radius[1])
+        texts["radius"] = words("use_radius_row", value=value, step=radius[2])
+    return texts
+
+
+def write_report(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
+    """Write ``report.html`` into a folder, at once or not at all.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    return write_atomic(Path(folder) / "report.html", report_html(result, settings))
+
+
+

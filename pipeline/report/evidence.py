@@ -1,0 +1,236 @@
+"""The evidence as figures and rows of tables: photos, forces, curvatures, moments, residuals.
+
+Everything comes from `pipeline.result.Result`; a figure whose data are missing is left out, never drawn empty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.report import figures, maps, photos
+from pipeline.report.canvas import Drawing, drawing
+from pipeline.report.curves import curves, seen_range
+from pipeline.report.units import suited
+from pipeline.report.words import Words
+from pipeline.result import PhotoPart, PreviewPart, Result
+from pipeline.settings import ReportSettings
+
+TALL = (460.0, 360.0)
+
+
+@dataclass(frozen=True)
+class PhotoView:
+    """One photo on the page: its picture with the paths over it, and its curvature figure."""
+
+    index: int
+    step: int
+    image: str
+    status: str
+    reason: str
+    preview: PreviewPart | None
+    seen_path: str
+    hidden_path: str
+    bearings: list[tuple[float, float]]
+    kappa: Drawing | None
+
+
+def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawing | None:
+    """f_EI by every way."""
+    parts = curves(result)
+    if not parts:
+        return None
+    unit = figures.stiffness_unit(result, words)
+    lines = " ".join(
+        words(
+            "fig_line_alt",
+            way=words(f"way_{method}"),
+            first=unit.text(curve.tangent[0], curve.tangent_std[0]),
+            last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
+        )
+        for method, curve in parts.items()
+    )
+    low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
+    return drawing(
+        "characteristic",
+        lambda figure: figures.draw_characteristic(figure, result, words, settings),
+        size=(480.0, 330.0),
+        title=words("fig_characteristic"),
+        description=words("fig_characteristic_alt", low=words.number(low), high=words.number(high), lines=lines),
+    )
+
+
+def pointer_data(result: Result, main: Drawing | None, words: Words, settings: ReportSettings) -> dict[str, object]:
+    """What the page needs to answer a pointer over the main figure: frame, values, bands, supporting photos."""
+    if main is None:
+        return {}
+    unit, half = figures.stiffness_unit(result, words), figures.band_width(settings)
+    ways = [
+        {
+            "method": method,
+            "name": words(f"way_{method}"),
+            "kappa": _short(curve.kappa),
+            "value": _short(unit.factor * curve.tangent),
+            "std": _short(unit.factor * curve.tangent_std),
+            "factor": [_short(unit.factor * column) for column in curve.factor.T],
+        }
+        for method, curve in curves(result).items()
+    ]
+    ranges = {photo.step: seen_range(photo) for photo in result.photos}
+    return {
+        "frame": main.frame,
+        "unit": unit.symbol,
+        "half": half,
+        "decimal": words.decimal,
+        "ways": ways,
+        "photos": [{"step": step, "low": r[0], "high": r[1]} for step, r in ranges.items() if r],
+        "words": {key: words(f"hover_{key}") for key in ("photos", "no_photos", "band", "unvisited")},
+    }
+
+
+def _short(values: np.ndarray) -> list[float]:
+    """Five digits: more than any band here supports, and a third of the bytes."""
+    return [float(f"{v:.5g}") for v in values]
+
+
+def mechanics_figures(result: Result, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
+    """Forces, moment curve, curvatures of all photos, pointwise graph and residual map, as far as there are data."""
+    drawn: dict[str, Drawing] = {}
+    if result.steps:
+        drawn["forces"] = drawing(
+            "forces",
+            lambda f: figures.draw_forces(f, result, words, settings),
+            size=TALL,
+            title=words("fig_forces"),
+            description=words("fig_forces_alt"),
+        )
+    if curves(result):
+        drawn["moment"] = drawing(
+            "moment",
+            lambda f: figures.draw_moment(f, result, words, settings),
+            title=words("fig_moment"),
+            description=words("fig_moment_alt"),
+        )
+    tops = [r[1] for r in map(seen_range, result.photos) if r]
+    if tops:
+        drawn["curvatures"] = drawing(
+            "curvatures",
+            lambda f: figures.draw_curvatures(f, result, words),
+            title=words("fig_curvatures"),
+            description=words("fig_curvatures_alt", top=words.number(max(tops))),
+        )
+    if result.balance and result.balance.pointwise and result.balance.curve:
+        drawn["pointwise"] = drawing(
+            "pointwise",
+            lambda f: figures.draw_pointwise(f, result, words, settings),
+            title=words("fig_pointwise"),
+            description=words("fig_pointwise_alt"),
+        )
+    residuals = maps.measured_map(result)
+    if residuals is not None:
+        drawn["map"] = drawing(
+            "residual-map",
+            lambda f: maps.draw_map(f, residuals, words, settings),
+            size=(460.0, 90.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            title=words("fig_map"),
+            description=words("fig_map_alt", rms=map_rms(residuals, words)),
+        )
+    return drawn
+
+
+def map_rms(residuals: maps.ResidualMap, words: Words) -> str:
+    """Root mean square of a residual map by step, as text."""
+    texts = []
+    for step, row in zip(residuals.steps, residuals.shape_sigma, strict=True):
+        known = np.array([v for v in row if v is not None])
+        if known.size:
+            texts.append(f"{step}: {words.number(float(np.sqrt(np.mean(known**2))), 2)}")
+    return "; ".join(texts)
+
+
+def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[PhotoView]:
+    """All photos in the order of the test."""
+    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(result.photos)]
+
+
+def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
+    seen, hidden = photos.overlay_paths(photo)
+    kappa, seen_kappa = None, seen_range(photo)
+    if len(photo.s_m) > 1:
+        low, high = seen_kappa or (min(photo.kappa_per_m), max(photo.kappa_per_m))
+        kappa = drawing(
+            f"kappa-{index}",
+            lambda f: photos.draw_photo_curvature(f, photo, words, settings),
+            size=TALL,
+            title=words("fig_kappa"),
+            description=words("fig_kappa_alt", low=words.number(low), high=words.number(high)),
+        )
+    return PhotoView(
+        index,
+        photo.step,
+        photo.image,
+        photo.status,
+        photo.reason or "",
+        photo.preview,
+        seen,
+        hidden,
+        photos.bearing_marks(photo),
+        kappa,
+    )
+
+
+def force_rows(result: Result, words: Words) -> list[list[str]]:
+    """Rows of the table of forces: step, branch, displacement, measured, simulated, left over, in sigma."""
+    unit, rows = figures.force_unit(result, words), []
+    for step in result.steps:
+        sigma = figures.force_residual(step)
+        rest = None if step.force_fit_N is None else step.force_N - step.force_fit_N
+        rows.append(
+            [
+                str(step.step),
+                words(f"branch_{step.branch}") if step.branch in figures.MARKERS else step.branch,
+                words.number(1e3 * step.displacement_m, 5),
+                unit.number(step.force_N, step.force_std_N),
+                "–" if step.force_fit_N is None else words.number(unit.factor * step.force_fit_N, 5),
+                "–" if rest is None else unit.number(rest, step.force_std_N),
+                "–" if sigma is None else words.number(sigma, 2),
+            ]
+        )
+    return rows
+
+
+def photo_rows(result: Result, words: Words) -> list[list[str]]:
+    """Rows of the table of photos: step, photo, outcome, chord, traced length, width, curvature seen."""
+    millimetres = suited([], "m", decimal=words.decimal)
+    rows = []
+    for photo in result.photos:
+        seen = seen_range(photo)
+        lengths = (
+            (photo.chord_m, photo.chord_std_m),
+            (photo.traced_length_m, photo.traced_length_std_m),
+            (photo.width_m, photo.width_std_m),
+        )
+        rows.append(
+            [
+                str(photo.step),
+                photo.image,
+                words(f"status_{photo.status}") + (f": {photo.reason}" if photo.reason else ""),
+                *(millimetres.number(_times(1e3, v), _times(1e3, std)) for v, std in lengths),
+                "–" if seen is None else f"{words.number(seen[0])} … {words.number(seen[1])}",
+            ]
+        )
+    return rows
+
+
+def _times(factor: float, value: float | None) -> float | None:
+    return None if value is None else factor * value
+
+
+def knot_rows(result: Result, words: Words) -> list[list[str]]:
+    """Rows of the table of control points: curvature, tangent."""
+    unit = figures.stiffness_unit(result, words)
+    knots = result.inverse.knots if result.inverse else []
+    return [
+        [f"{words.number(k.kappa_per_m)} ({words('exact')})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots
+    ]

@@ -1,0 +1,228 @@
+"""The figures of mechanics: characteristic, moment curve, pointwise graph, forces, curvature of all photos.
+
+Each function fills a matplotlib figure (or a part of one) and returns the axes with the data. Axes: curvature kappa in
+1/m, tangent bending stiffness f_EI = dm/dkappa in N m^2 with a prefix, moment m in N m, force P in N (compression
+positive), displacement in mm. Bands hold the share of normal errors named in the settings.
+"""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.ticker import MaxNLocator
+
+from pipeline.report.canvas import DASHES, LIGHT, finish, plot_area, step_colours
+from pipeline.report.curves import Visited, curves
+from pipeline.report.units import Unit, suited
+from pipeline.report.words import Words
+from pipeline.result import Result, StepPart
+from pipeline.settings import ReportSettings
+
+MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
+# Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.
+POINTWISE_HEADROOM = 2.0
+
+
+def band_width(settings: ReportSettings) -> float:
+    """Half width of a band in standard deviations."""
+    return NormalDist().inv_cdf(0.5 + settings.band_coverage / 2.0)
+
+
+def stiffness_unit(result: Result, words: Words) -> Unit:
+    """Unit of bending stiffness for all of a report."""
+    return suited((v for curve in curves(result).values() for v in curve.tangent), "N m²", decimal=words.decimal)
+
+
+def moment_unit(result: Result, words: Words) -> Unit:
+    """Unit of bending moment for all of a report."""
+    return suited((v for curve in curves(result).values() for v in curve.moment), "N m", decimal=words.decimal)
+
+
+def force_unit(result: Result, words: Words) -> Unit:
+    """Unit of force for all of a report."""
+    return suited((step.force_N for step in result.steps), "N", decimal=words.decimal)
+
+
+def draw_characteristic(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw f_EI by every way with its band; what was never visited is shaded."""
+    axes, parts, unit = plot_area(figure), curves(result), stiffness_unit(result, words)
+    low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
+    margin = 0.14 * (high - low)
+    left = min(0.0, low) if abs(low) < 0.5 * (high - low) else low - margin
+    left = min(left, low - 0.04 * (high - low))
+    shade = {"facecolor": LIGHT["unvisited"], "alpha": 0.14, "linewidth": 0.0}
+    axes.axvspan(left, low, label=words("unvisited"), **shade)
+    axes.axvspan(high, high + margin, **shade)
+    for method, curve in parts.items():
+        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
+    if result.inverse and "inverse" in parts:
+        knots = [k for k in result.inverse.knots if low <= k.kappa_per_m <= high]
+        axes.plot(
+            [k.kappa_per_m for k in knots],
+            [unit.factor * k.tangent_Nm2 for k in knots],
+            ls="none",
+            marker="o",
+            ms=4.5,
+            mfc=LIGHT["paper"],
+            mec=LIGHT["inverse"],
+        )
+    top = max(
+        float(np.max(c.tangent + np.minimum(band_width(settings) * c.tangent_std, c.tangent))) for c in parts.values()
+    )
+    bottom = min(0.0, *(float(np.min(c.tangent)) for c in parts.values()))
+    axes.set_xlim(left, high + margin)
+    axes.set_ylim(1.1 * unit.factor * bottom, 1.08 * unit.factor * top)
+    return finish(
+        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=4
+    )
+
+
+def _banded(
+    axes: Axes,
+    kappa: np.ndarray,
+    value: np.ndarray,
+    std: np.ndarray,
+    method: str,
+    unit: Unit,
+    words: Words,
+    settings: ReportSettings,
+) -> None:
+    """A curve of one way with its band, in its colour and dash."""
+    half = band_width(settings) * std
+    axes.fill_between(
+        kappa, unit.factor * (value - half), unit.factor * (value + half), color=LIGHT[method], alpha=0.2, lw=0.0
+    )
+    axes.plot(kappa, unit.factor * value, color=LIGHT[method], ls=DASHES[method], lw=2.2, label=words(f"way_{method}"))
+
+
+def draw_moment(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
+    axes, parts, unit = plot_area(figure), curves(result), moment_unit(result, words)
+    if result.balance and result.balance.points_kappa_per_m:
+        count = len(result.balance.points_kappa_per_m)
+        chosen = slice(None, None, max(1, count // 300))  # more points than that only fill the picture
+        axes.plot(
+            result.balance.points_kappa_per_m[chosen],
+            [unit.factor * m for m in result.balance.points_moment_Nm[chosen]],
+            ls="none",
+            marker=".",
+            ms=3.0,
+            color=LIGHT["muted"],
+            alpha=0.7,
+            label=words("points_balance"),
+        )
+    for method, curve in parts.items():
+        _banded(axes, curve.kappa, curve.moment, curve.moment_std, method, unit, words, settings)
+    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    return finish(
+        axes, x=words("axis_kappa"), y=words("axis_moment", unit=unit.symbol), decimal=words.decimal, legend=4
+    )
+
+
+def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw the paper's (kappa, f_EI)-graph, Eq. (14) point by point and photo by photo, under the balance curve."""
+    axes, unit = plot_area(figure), stiffness_unit(result, words)
+    pointwise = result.balance.pointwise if result.balance else []
+    for colour, part in zip(step_colours(len(pointwise)), pointwise, strict=True):
+        values = [unit.factor * v for v in part.tangent_Nm2]
+        label = f"{words('step')} {part.step}" if len(pointwise) <= 6 else None
+        axes.plot(part.kappa_per_m, values, ls="none", marker=".", ms=3.5, color=colour, label=label)
+    parts: dict[str, Visited] = {m: c for m, c in curves(result).items() if m == "balance"}
+    for method, curve in parts.items():
+        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
+        axes.set_ylim(min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max()))
+    return finish(
+        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=4
+    )
+
+
+def draw_forces(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
+    height = figure.bbox.height
+    axes = plot_area(figure, bottom=0.38 * height)
+    rest = plot_area(figure, top=0.68 * height)
+    unit, half = force_unit(result, words), band_width(settings)
+    for branch in MARKERS:
+        steps = [step for step in result.steps if step.branch == branch]
+        if steps:
+            _branch(axes, rest, branch, steps, unit, half, words)
+    fitted = [step for step in result.steps if step.force_fit_N is not None]
+    for branch in ("loading", "unloading"):
+        line = _line_of_branch(fitted, branch)
+        axes.plot(
+            [1e3 * step.displacement_m for step in line],
+            [unit.factor * (step.force_fit_N or 0.0) for step in line],
+            color=LIGHT["inverse"],
+            lw=1.4,
+            ls="-" if branch == "loading" else (0, (4, 2)),
+            label=words("simulated") if branch == "loading" else None,
+        )
+    noise = settings.residual_noise_sigma
+    rest.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in fitted)])
+    rest.set_ylim(-limit, limit)
+    rest.sharex(axes)
+    finish(rest, x=words("axis_displacement"), y=words("axis_sigma"), decimal=words.decimal)
+    rest.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+    finish(axes, x="", y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=4)
+    axes.tick_params(labelbottom=False)
+    return axes
+
+
+def _branch(
+    axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words
+) -> None:
+    """Measured forces of one branch with error bars, and their residuals below."""
+    look = {
+        "ls": "none",
+        "marker": MARKERS[branch],
+        "ms": 5.5,
+        "color": LIGHT["measured"],
+        "mfc": LIGHT["paper"] if branch == "unloading" else LIGHT["measured"],
+    }
+    axes.errorbar(
+        [1e3 * step.displacement_m for step in steps],
+        [unit.factor * step.force_N for step in steps],
+        yerr=[unit.factor * half * step.force_std_N for step in steps],
+        capsize=3.0,
+        elinewidth=1.2,
+        label=words(f"branch_{branch}"),
+        **look,
+    )
+    left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
+    rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **look)
+
+
+def _line_of_branch(steps: list[StepPart], branch: str) -> list[StepPart]:
+    """The simulated steps of one branch; unloading starts where loading ended."""
+    loading = [step for step in steps if step.branch != "unloading"]
+    if branch == "loading":
+        return sorted(loading, key=lambda step: step.displacement_m)
+    unloading = [step for step in steps if step.branch == "unloading"]
+    turning = max(loading, key=lambda step: step.displacement_m, default=None)
+    return sorted([*unloading, *([turning] if turning and unloading else [])], key=lambda step: step.displacement_m)
+
+
+def force_residual(step: StepPart) -> float | None:
+    """Measured minus simulated force in standard deviations; None without a simulated force or a known noise."""
+    if step.force_fit_N is None or step.force_std_N <= 0.0:
+        return None
+    return (step.force_N - step.force_fit_N) / step.force_std_N
+
+
+def draw_curvatures(figure: FigureBase, result: Result, words: Words) -> Axes:
+    """Draw kappa(s) of the visible cable on all photos in one picture; later steps are brighter."""
+    axes = plot_area(figure)
+    traced = [photo for photo in result.photos if photo.kappa_per_m]
+    for colour, photo in zip(step_colours(len(traced)), traced, strict=True):
+        kappa = np.where(photo.seen, photo.kappa_per_m, np.nan)
+        label = f"{photo.step}" if len(traced) <= 10 else None
+        axes.plot(1e3 * np.asarray(photo.s_m), kappa, color=colour, lw=1.6, label=label)
+    if len(traced) > 10:
+        axes.set_title(words("steps_dark_to_bright"), loc="left")
+    finish(axes, x=words("axis_s"), y=words("axis_kappa"), decimal=words.decimal, legend=10 if len(traced) <= 10 else 0)
+    return axes

@@ -1,0 +1,109 @@
+"""A result as pandas frames with the unit in every column's name: for notebooks, and what the tables are written from.
+
+One row a point of a curve, a force, a photo or a cause. SI units. Names of the columns are those of the contract.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline.report.curves import METHODS, best, equivalent, smallest_radius
+from pipeline.result import Curve, Result
+
+CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
+
+
+def characteristic_frame(result: Result) -> pd.DataFrame:
+    """Moment curve and both readings by every way, with their standard deviations; ``supported`` marks what was visited."""
+    whole: dict[str, Curve | None] = {
+        "inverse": result.inverse.curve if result.inverse else None,
+        "balance": result.balance.curve if result.balance else None,
+        "extended": result.diagnosis.extended if result.diagnosis else None,
+    }
+    columns = [
+        "kappa_per_m",
+        "moment_Nm",
+        "tangent_Nm2",
+        "tangent_std_Nm2",
+        "secant_Nm2",
+        "supported",
+        "moment_std_Nm",
+        "secant_std_Nm2",
+    ]
+    parts = []
+    for method in METHODS:
+        curve = whole[method]
+        if curve is not None:
+            part = pd.DataFrame({name: getattr(curve, name) for name in columns})
+            part.insert(0, "method", method)
+            parts.append(part)
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", *columns])
+
+
+def centerlines_frame(result: Result) -> pd.DataFrame:
+    """Centerlines of all traced photos; ``seen`` is false where the cable was hidden and extended by the model."""
+    parts = [
+        pd.DataFrame({"image": photo.image, **{name: getattr(photo, name) for name in CENTERLINE}, "seen": photo.seen})
+        for photo in result.photos
+        if photo.s_m
+    ]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["image", *CENTERLINE, "seen"])
+
+
+def forces_frame(result: Result) -> pd.DataFrame:
+    """Forces measured and simulated by step; compression positive."""
+    names = ("step", "branch", "displacement_m", "force_N", "force_std_N", "force_fit_N", "image")
+    return pd.DataFrame([{name: getattr(step, name) for name in names} for step in result.steps], columns=list(names))
+
+
+def photos_frame(result: Result) -> pd.DataFrame:
+    """Outcome of every photo with its lengths."""
+    names = ("image", "step", "status", "reason", "chord_m", "chord_std_m", "traced_length_m", "traced_length_std_m")
+    names += ("width_m", "width_std_m")
+    return pd.DataFrame([{name: getattr(photo, name) for name in names} for photo in result.photos], columns=list(names))
+
+
+def causes_frame(result: Result) -> pd.DataFrame:
+    """All causes examined; estimates in the unit of the column ``unit``."""
+    rows = result.diagnosis.table if result.diagnosis else []
+    return pd.DataFrame([row.model_dump() for row in rows])
+
+
+def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) -> pd.DataFrame:
+    """Constants a simulation program asks for: equivalent EI over a range of curvature, K0, smallest radius seen.
+
+    Parameters
+    ----------
+    result : Result
+    bounds : (low, high) in 1/m, optional
+        Range of the equivalent stiffness; the whole visited range by default.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns quantity, value, std, unit, note.
+    """
+    rows: list[tuple[str, float, float | None, str, str]] = []
+    curve = best(result)
+    constant = equivalent(curve, bounds) if curve else None
+    if curve is not None and constant is not None:
+        note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
+        note += ", std is an upper bound" if constant.bound else ""
+        rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
+    for way, part in (("inverse", result.inverse), ("balance", result.balance)):
+        if part is not None and part.pre_curvature_per_m is not None:
+            rows.append(("pre_curvature", part.pre_curvature_per_m, part.pre_curvature_std_per_m, "1/m", way))
+    radius = smallest_radius(result)
+    if radius is not None:
+        rows.append(("smallest_bend_radius_seen", radius[0], radius[1], "m", f"photo of step {radius[2]}"))
+    return pd.DataFrame(rows, columns=["quantity", "value", "std", "unit", "note"])
+
+
+def moment_frame(result: Result) -> pd.DataFrame:
+    """Moment over curvature of the best way on the visited range: the table a nonlinear beam element asks for."""
+    curve = best(result)
+    if curve is None:
+        return pd.DataFrame(columns=["kappa_per_m", "moment_Nm", "moment_std_Nm"])
+    return pd.DataFrame(
+        {"kappa_per_m": curve.kappa, "moment_Nm": curve.moment, "moment_std_Nm": curve.moment_std},
+    )

@@ -1,0 +1,115 @@
+"""Maps of what is left: shape residuals over arc length and step, and cosines between causes.
+
+A residual map shows (measured - simulated) / standard deviation: rows are steps in the order of the test, columns are arc
+length from the left bearing axis. Purple and orange (map PuOr) are told apart in all colour blindnesses; white is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import FigureBase
+from numpy.typing import NDArray
+
+from pipeline.report.canvas import LIGHT, finish, number_ticks, plot_area
+from pipeline.report.words import Words
+from pipeline.result import ResidualMap, Result
+from pipeline.settings import ReportSettings
+
+Array = NDArray[np.float64]
+# More names than this on an axis cannot be annotated at 440 px.
+ANNOTATED_NAMES = 9
+
+
+def measured_map(result: Result) -> ResidualMap | None:
+    """Residual map of the fitted simulation, from the photos themselves; None if no photo has residuals."""
+    photos = [p for p in result.photos if p.shape_residual_m and len(p.shape_residual_std_m) == len(p.shape_residual_m)]
+    if not photos:
+        return None
+    branches = {step.step: step.branch for step in result.steps}
+    grid = np.linspace(0.0, max(p.s_m[-1] for p in photos), 201)
+    rows: list[list[float | None]] = []
+    for photo in photos:
+        std = np.asarray(photo.shape_residual_std_m)
+        sigma = np.divide(photo.shape_residual_m, std, out=np.full(std.size, np.nan), where=(std > 0.0) & photo.seen)
+        row = np.interp(grid, photo.s_m, sigma, left=np.nan, right=np.nan)
+        rows.append([float(v) if np.isfinite(v) else None for v in row])
+    return ResidualMap(
+        s_m=grid.tolist(),
+        steps=[p.step for p in photos],
+        branches=[branches.get(p.step, "") for p in photos],
+        shape_sigma=rows,
+    )
+
+
+def draw_map(
+    figure: FigureBase, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = ""
+) -> Axes:
+    """Draw shape residuals in sigma over s and step."""
+    axes = plot_area(figure, left=96.0, right=70.0)
+    s, limit = 1e3 * np.asarray(residuals.s_m), settings.map_limit_sigma
+    columns = np.linspace(s[0], s[-1], settings.map_columns)
+    table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
+    image = axes.imshow(
+        np.ma.masked_invalid(table),
+        cmap="PuOr_r",
+        vmin=-limit,
+        vmax=limit,
+        aspect="auto",
+        interpolation="nearest",
+        extent=(s[0], s[-1], len(residuals.steps) - 0.5, -0.5),
+    )
+    finish(axes, x=words("axis_s"), y="", decimal=words.decimal)
+    axes.set_facecolor(LIGHT["grid"])
+    axes.grid(False)
+    branches = residuals.branches or [""] * len(residuals.steps)
+    every = max(1, len(residuals.steps) // 12)
+    axes.set_yticks(
+        range(0, len(residuals.steps), every),
+        [f"{step} {words(f'branch_{b}') if b else ''}" for step, b in zip(residuals.steps, branches, strict=True)][::every],
+    )
+    axes.set_title(title, loc="left")
+    _scale(figure, axes, image, words("axis_sigma"), words)
+    return axes
+
+
+def _numbers(row: list[float | None]) -> Array:
+    return np.array([np.nan if v is None else v for v in row])
+
+
+def _scale(figure: FigureBase, axes: Axes, image: ScalarMappable, label: str, words: Words) -> None:
+    """Colour bar right of the axes."""
+    box, width = axes.get_position(), figure.bbox.width
+    bar = figure.add_axes((box.x1 + 12.0 / width, box.y0, 12.0 / width, box.height))
+    figure.colorbar(image, cax=bar, format=number_ticks(words.decimal))
+    bar.set_ylabel(label)
+    bar.grid(False)
+
+
+def draw_cosines(figure: FigureBase, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
+    """Draw how alike the signatures of causes are: |cos| = 1 cannot be told apart by this test."""
+    names = list(dict.fromkeys([*cosines, *(other for row in cosines.values() for other in row)]))
+    axes = plot_area(figure, left=140.0, right=66.0, top=14.0, bottom=112.0)
+    table = np.array([[_cosine(cosines, a, b) for b in names] for a in names])
+    image = axes.imshow(np.ma.masked_invalid(table), cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
+    labels = [words.cause(name) for name in names]
+    axes.set_xticks(range(len(names)), labels, rotation=40, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), labels)
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+    if len(names) <= ANNOTATED_NAMES:
+        for (row, column), value in np.ndenumerate(table):
+            if np.isfinite(value):
+                text = words.number(value, 2)
+                axes.text(column, row, text, ha="center", va="center", color="#000000" if value > 0.5 else "#fdfdfd", size=9)
+    _scale(figure, axes, image, words("axis_cosine"), words)
+    return axes
+
+
+def _cosine(cosines: dict[str, dict[str, float]], a: str, b: str) -> float:
+    """Magnitude of the cosine of two causes; not a number where it was not computed."""
+    if a == b:
+        return 1.0
+    return abs(cosines.get(a, {}).get(b, cosines.get(b, {}).get(a, float("nan"))))

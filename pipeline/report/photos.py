@@ -1,0 +1,110 @@
+"""One photo as evidence: its centerline drawn over it, its curvature with band and fit, what is left between them.
+
+The centerline is drawn in the pixels of the preview: preview px = displayed px / reduction. Pixel (0, 0) is the centre of the
+top-left pixel, while SVG counts from its corner, hence half a displayed pixel is added.
+Parts of the cable that no photo shows (under a bearing cover) are drawn dashed and shaded.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+
+from pipeline.report.canvas import LIGHT, finish, plot_area
+from pipeline.report.figures import band_width
+from pipeline.report.units import suited
+from pipeline.report.words import Words
+from pipeline.result import PhotoPart
+from pipeline.settings import ReportSettings
+
+# A centerline of 200 points over a preview of 1000 px: more points than this cannot be told apart.
+LARGEST_PATH = 400
+
+
+def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
+    """SVG paths of the seen and the extended centerline, in px of the preview.
+
+    Returns
+    -------
+    seen, extended : str
+        Values of the attribute ``d``; empty where there is nothing to draw.
+    """
+    if photo.preview is None or not photo.u_px:
+        return "", ""
+    every = max(1, len(photo.u_px) // LARGEST_PATH)
+    u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction
+    v = (np.asarray(photo.v_px) + 0.5) / photo.preview.reduction
+    seen = np.asarray(photo.seen, dtype=bool)
+    return _path(u, v, seen, every), _path(u, v, ~seen, every)
+
+
+def _path(u: np.ndarray, v: np.ndarray, chosen: np.ndarray, every: int) -> str:
+    """Runs of chosen points as sub-paths; a run reaches to the neighbour on its right so that runs touch."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    parts = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        stop = min(int(last) + 1, u.size)
+        index = sorted({*range(int(first), stop, every), stop - 1})
+        if len(index) > 1:
+            parts.append("M" + "L".join(f"{u[i]:.1f} {v[i]:.1f}" for i in index))
+    return "".join(parts)
+
+
+def bearing_marks(photo: PhotoPart) -> list[tuple[float, float]]:
+    """Bearing axes in px of the preview."""
+    if photo.preview is None:
+        return []
+    axes = (photo.left_px, photo.right_px)
+    return [((p[0] + 0.5) / photo.preview.reduction, (p[1] + 0.5) / photo.preview.reduction) for p in axes if p]
+
+
+def draw_photo_curvature(figure: FigureBase, photo: PhotoPart, words: Words, settings: ReportSettings) -> Axes:
+    """Draw kappa(s) of one photo with its band and the fit; below, the position left over along the normal."""
+    height, s = figure.bbox.height, 1e3 * np.asarray(photo.s_m)
+    residual = bool(photo.shape_residual_m)
+    axes = plot_area(figure, bottom=0.42 * height if residual else 46.0)
+    kappa, half = np.asarray(photo.kappa_per_m), band_width(settings) * np.asarray(photo.kappa_std_per_m)
+    axes.fill_between(s, kappa - half, kappa + half, color=LIGHT["measured"], alpha=0.18, lw=0.0)
+    axes.plot(s, kappa, color=LIGHT["measured"], lw=1.6, label=words("measured"))
+    if photo.kappa_fit_per_m:
+        fit = photo.kappa_fit_per_m
+        axes.plot(s, fit, color=LIGHT["inverse"], ls=(0, (5, 2)), lw=1.6, label=words("simulated"))
+    seen = np.asarray(photo.seen, dtype=bool)
+    if seen.any():  # under a cover the band widens without bound; what is seen decides the scale
+        low, high = (kappa - half)[seen].min(), (kappa + half)[seen].max()
+        axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+    all_axes = [axes]
+    if residual:
+        all_axes.append(_residual(figure, photo, s, words, settings))
+        all_axes[1].sharex(axes)
+    for each in all_axes:
+        for left, right in _hidden(s, seen):
+            each.axvspan(left, right, color=LIGHT["unvisited"], alpha=0.18, lw=0.0)
+        each.set_xlim(s[0], s[-1])
+    label = "" if residual else words("axis_s")
+    finish(axes, x=label, y=words("axis_kappa"), decimal=words.decimal, legend=3)
+    axes.tick_params(labelbottom=not residual)
+    return axes
+
+
+def _residual(figure: FigureBase, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> Axes:
+    """Measured minus simulated position along the normal, with the noise of the photo as a band around zero."""
+    axes = plot_area(figure, top=0.66 * figure.bbox.height)
+    unit = suited([float(np.max(np.abs(photo.shape_residual_m)))], "m", decimal=words.decimal)
+    if photo.shape_residual_std_m:
+        half = unit.factor * band_width(settings) * np.asarray(photo.shape_residual_std_m)
+        axes.fill_between(s, -half, half, color=LIGHT["unvisited"], alpha=0.2, lw=0.0)
+    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    axes.plot(s, unit.factor * np.asarray(photo.shape_residual_m), color=LIGHT["measured"], lw=1.2)
+    finish(axes, x=words("axis_s"), y=words("axis_residual", unit=unit.symbol), decimal=words.decimal)
+    axes.locator_params(axis="y", nbins=4)
+    return axes
+
+
+def _hidden(s: np.ndarray, seen: np.ndarray) -> list[tuple[float, float]]:
+    """Intervals of s that the photo does not show."""
+    edges = [0, *(np.flatnonzero(np.diff(seen.astype(int))) + 1).tolist(), seen.size]
+    return [(float(s[a]), float(s[min(b, s.size - 1)])) for a, b in pairwise(edges) if a < seen.size and not seen[a]]

@@ -1,0 +1,58 @@
+"""Ranking of causes: how loud each is (pull) and how much it would change the answer (impact), one row a cause.
+
+Pull is the score z of the omitted cause, about N(0, 1) if it is absent. Impact is the relative shift of f_EI if the cause
+is put into the model. The two are unrelated, so both stand side by side, as in the rankings of particle physics.
+"""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+
+from pipeline.report.canvas import LIGHT, finish, plot_area
+from pipeline.report.words import Words
+from pipeline.result import CauseRow, DiagnosisPart
+from pipeline.settings import ReportSettings
+
+ROW_PX = 21.0
+
+
+def ranked(diagnosis: DiagnosisPart, settings: ReportSettings) -> list[CauseRow]:
+    """Causes by pull, loudest first."""
+    return sorted(diagnosis.table, key=lambda row: -abs(row.z))[: settings.ranked_causes]
+
+
+def ranking_height(diagnosis: DiagnosisPart, settings: ReportSettings) -> float:
+    """Height of the figure in px."""
+    return 84.0 + ROW_PX * len(ranked(diagnosis, settings))
+
+
+def draw_ranking(figure: FigureBase, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
+    """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
+    rows, width = ranked(diagnosis, settings), figure.bbox.width
+    named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}
+    left = 150.0
+    middle = left + 0.5 * (width - left - 30.0)
+    pull = plot_area(figure, left=left, right=width - middle + 10.0)
+    impact = plot_area(figure, left=middle + 10.0)
+    colours = [LIGHT["alarm"] if row.name in named else LIGHT["muted"] for row in rows]
+    places = range(len(rows))
+    noise = settings.residual_noise_sigma
+    pull.axvspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    pull.barh(places, [row.z for row in rows], color=colours, height=0.62)
+    shifts = [100.0 * (row.stiffness_shift or 0.0) for row in rows]
+    impact.barh(places, shifts, color=colours, height=0.62)
+    limit = max(2.0 * noise, *(1.1 * abs(row.z) for row in rows)) if rows else 2.0 * noise
+    pull.set_xlim(-limit, limit)
+    reach = max([1.0, *(1.1 * abs(shift) for shift in shifts)])
+    impact.set_xlim(-reach, reach)
+    finish(pull, x=words("axis_pull"), y="", decimal=words.decimal)
+    finish(impact, x=words("axis_impact"), y="", decimal=words.decimal)
+    for axes in (pull, impact):
+        axes.locator_params(axis="x", nbins=5)
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.grid(axis="y", visible=False)
+        axes.axvline(0.0, color=LIGHT["muted"], lw=0.8)
+        axes.set_yticks(list(places), [words.cause(row.name) for row in rows] if axes is pull else [])
+    pull.tick_params(axis="y", length=0)
+    return pull

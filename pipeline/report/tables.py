@@ -1,0 +1,58 @@
+"""The tables beside the report, as any spreadsheet or program reads them: comma, decimal point, UTF-8, SI units.
+
+``characteristic.csv`` and ``centerlines.csv`` are fixed by the contract; ``moment_curve.csv`` (kappa, m) and
+``simulation.csv`` (constants with errors) are what simulation programs ask for. Text that a spreadsheet would run as a formula
+gets an apostrophe in front (CWE-1236).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from pipeline.report.files import write_atomic
+from pipeline.report.frames import centerlines_frame, characteristic_frame, moment_frame, simulation_frame
+from pipeline.result import Result, to_json
+from pipeline.settings import ReportSettings
+
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
+# Nine digits: below a nanometre on a metre and beyond any band here.
+FLOATS = "%.9g"
+
+
+def write_result(result: Result, folder: Path) -> Path:
+    """Write ``result.json``, at once or not at all."""
+    return write_atomic(Path(folder) / "result.json", to_json(result))
+
+
+def write_tables(result: Result, folder: Path, settings: ReportSettings | None = None) -> tuple[Path, ...]:
+    """Write the tables of a result into a folder; a failed specimen gets tables with heads only.
+
+    Returns
+    -------
+    tuple of Path
+        characteristic.csv, centerlines.csv, moment_curve.csv, simulation.csv.
+    """
+    bounds = (settings or ReportSettings()).equivalent_range_per_m
+    frames = {
+        "characteristic.csv": characteristic_frame(result),
+        "centerlines.csv": centerlines_frame(result),
+        "moment_curve.csv": moment_frame(result),
+        "simulation.csv": simulation_frame(result, bounds),
+    }
+    return tuple(write_atomic(Path(folder) / name, csv_text(frame)) for name, frame in frames.items())
+
+
+def csv_text(frame: pd.DataFrame) -> str:
+    """Text of a table, safe to open in a spreadsheet; numbers are left as they are."""
+    safe = frame.copy()
+    for name in safe.columns:
+        if not pd.api.types.is_numeric_dtype(safe[name]):
+            safe[name] = safe[name].map(neutral)
+    return safe.to_csv(index=False, float_format=FLOATS, lineterminator="\n")
+
+
+def neutral(cell: object) -> object:
+    """Text that no spreadsheet takes for a formula; anything but text unchanged."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA_STARTS) else cell

@@ -1,0 +1,71 @@
+"""The words of report and index in English and German; the numbers in the reader's format.
+
+The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences made
+by other rooms (findings, headline of the diagnosis) are English and are marked as such on a German page.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from pipeline.rounding import plain, rounded
+
+TABLE = Path(__file__).parent / "templates" / "words.toml"
+LANGUAGES = {"en": (0, "."), "de": (1, ",")}
+
+
+@cache
+def _table() -> dict[str, dict[str, list[str]]]:
+    return tomllib.loads(TABLE.read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class Words:
+    """Words and numbers of one language.
+
+    Parameters
+    ----------
+    language : str
+        ``en`` or ``de``.
+
+    Raises
+    ------
+    ValueError
+        For another language.
+    """
+
+    language: str = "en"
+
+    def __post_init__(self) -> None:
+        if self.language not in LANGUAGES:
+            raise ValueError(f"language {self.language!r}: one of {', '.join(LANGUAGES)}")
+
+    @property
+    def decimal(self) -> str:
+        """Decimal sign."""
+        return LANGUAGES[self.language][1]
+
+    def __call__(self, key: str, **values: object) -> str:
+        """Words for a key with values put in; a key that is not in the table is a ``KeyError``."""
+        text = _table()["words"][key][LANGUAGES[self.language][0]]
+        return text.format(**values) if values else text
+
+    def tip(self, key: str) -> str:
+        """Meaning of a term: symbol, unit, one sentence."""
+        return _table()["tips"][key][LANGUAGES[self.language][0]]
+
+    def cause(self, name: str) -> str:
+        """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
+        row = _table()["causes"].get(name)
+        return row[LANGUAGES[self.language][0]] if row else name.replace("_", " ")
+
+    def number(self, value: float, digits: int = 3) -> str:
+        """A chosen or exact number."""
+        return plain(value, digits, decimal=self.decimal)
+
+    def measured(self, value: float | None, std: float | None) -> str:
+        """A measured number with its standard deviation."""
+        return rounded(value, std, decimal=self.decimal)
