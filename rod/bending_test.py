@@ -122,7 +122,8 @@ class BendingTest:
     def hold(self, control: Control, value: float) -> Hold:
         """What is imposed at a step."""
         if control == "displacements":
-            return Hold(chord=self.zero_chord - (value + self.displacement_offset), compliance=self.compliance)
+            chord = self.zero_chord - (value + self.displacement_offset)
+            return Hold(chord=chord, compliance=self.compliance, from_zero=True)
         return Hold(chord=value) if control == "chords" else Hold(force=value)
 
 

@@ -46,12 +46,15 @@ class Hold:
         Instead of both: dead force on a free end (cantilever).
     compliance : m/N
         Of the rig: the chord reaching the cable is chord + compliance * P.
+    from_zero : bool
+        The chord was commanded as a displacement from the zero position, so it moves when that does.
     """
 
     chord: float | None = None
     force: float | None = None
     tip: tuple[float, float] | None = None
     compliance: float = 0.0
+    from_zero: bool = False
 
     def __post_init__(self) -> None:
         if sum(given is not None for given in (self.chord, self.force, self.tip)) != 1:
@@ -156,6 +159,20 @@ class System:
         fx, fy = self.edge_forces(R)
         stretch, shear = 1.0 + (fx * cos + fy * sin) * self._axial, (fy * cos - fx * sin) * self._shear
         return np.array((stretch * cos - shear * sin, stretch * sin + shear * cos))
+
+    def edge_softness(self, angles: Array) -> Array:
+        """Change of the extent of every edge per force, (2, 2, n + 2) m/N: h rot C^-1 rot^T."""
+        cos, sin, h = np.cos(angles), np.sin(angles), self.rod.edges
+        mixed = h * cos * sin * (self._axial - self._shear)
+        xx, yy = h * (cos**2 * self._axial + sin**2 * self._shear), h * (sin**2 * self._axial + cos**2 * self._shear)
+        return np.array([[xx, mixed], [mixed, yy]])
+
+    def turning(self, angles: Array, R: Array) -> Array:
+        """Moment per length that the edge forces exert on the angles, (n + 2,) N: -dLambda/dalpha without bending."""
+        cos, sin = np.cos(angles), np.sin(angles)
+        fx, fy = self.edge_forces(R)
+        along, across = fx * cos + fy * sin, fy * cos - fx * sin
+        return np.asarray(across * (1.0 + along * (self._axial - self._shear)))
 
     def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
         """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""

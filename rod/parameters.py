@@ -1,0 +1,175 @@
+"""Parameters of a bending test by name, as directions in which rod and rig change.
+
+From a list of parameters to `Directions`: how much every ingredient of the discrete rod (pre-curvature at the joints,
+edge lengths, ordinates, ...) changes per unit of each parameter. `rod.sensitivity` turns directions into derivatives.
+
+A parameter is a name, or a pair of a name and a basis along the cable:
+
+=======================  ======================================================================  =============
+name                     what changes                                                            unit
+=======================  ======================================================================  =============
+``ordinates``            every control point of the characteristic, one column each              N m^2
+``pre_curvature``        K0, uniformly; or a basis of K0(s)                                      1/m
+``stiffness_profile``    EI(s) relative, uniformly; or a basis                                   -
+``chord``                imposed distance of the axes, of each step                              m
+``force``                imposed force, of each step under force control                         N
+``displacement_offset``  zero of the displacement                                                m
+``rig_compliance``       yielding of the frame                                                   m/N
+``length``               cable length                                                            m
+``rigid_ends``           stiff piece at both ends; ``rigid_left``, ``rigid_right`` one each      m
+``bearing_stiffness``    rotational spring in both bearings; ``.._left``, ``.._right`` one each  N m/rad
+``bearing_friction``     Coulomb moment in both bearings; ``.._left``, ``.._right`` one each     N m
+``end_moment_left``      applied end moments; ``end_moment_right``                               N m
+``clamp_angle_left``     angle of a clamp or spring given by value; ``clamp_angle_right``        rad
+``load_x``, ``load_y``   distributed dead load                                                   N/m
+``hysteresis``           half width of the internal friction                                     N m
+``stick_curvature``      its curvature change to slip                                            1/m
+``plastic_set``          growth of K0 with the largest curvature                                 1/m per 1/m
+``axial_flexibility``    1/EA; ``shear_flexibility`` 1/GA                                        1/N
+=======================  ======================================================================  =============
+
+A basis is (elements + 1,) or (elements + 1, q) values at the joints, a function of the relative position 0..1, or a
+sequence of functions; it gives q columns. Derivatives at the value zero of a cause are meaningful: friction needs a
+test with ``InternalFriction(0.0, stick_curvature)``, everything else is there by default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rod.bending_test import BendingTest
+from rod.characteristic import Array, Characteristic
+
+Basis = ArrayLike | Callable[[Array], ArrayLike] | Sequence[Callable[[Array], ArrayLike]]
+Parameter = str | tuple[str, Basis]
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Change of the ingredients per unit of each of q parameters; n joints, n + 1 edges, p control points.
+
+    Attributes
+    ----------
+    names : (q,)
+    pre_curvature, profile : (n, q)
+    ordinates : (p, q)
+    edges : (n + 1, q)
+        Edge lengths, rigid pieces first and last.
+    scalars : dict of (q,)
+        Everything that is one number, under the names of the table.
+    """
+
+    names: tuple[str, ...]
+    pre_curvature: Array
+    profile: Array
+    ordinates: Array
+    edges: Array
+    scalars: dict[str, Array] = field(default_factory=dict)
+
+    def scalar(self, name: str) -> Array:
+        """Change of one number per parameter, (q,); zeros if it is none of them."""
+        return self.scalars.get(name, np.zeros(len(self.names)))
+
+    def has(self, *names: str) -> bool:
+        """Whether one of these numbers is a parameter."""
+        return any(name in self.scalars for name in names)
+
+
+#: Names that stand for the same change at both ends, and names of one number.
+_BOTH_ENDS = ("bearing_stiffness", "bearing_friction")
+_SCALARS = (
+    "chord",
+    "force",
+    "displacement_offset",
+    "rig_compliance",
+    "length",
+    "end_moment_left",
+    "end_moment_right",
+    "clamp_angle_left",
+    "clamp_angle_right",
+    "load_x",
+    "load_y",
+    "hysteresis",
+    "stick_curvature",
+    "plastic_set",
+    "axial_flexibility",
+    "shear_flexibility",
+    *(f"{name}_{side}" for name in _BOTH_ENDS for side in ("left", "right")),
+)
+_GEOMETRY = {"length": (0.0, 0.0, 1.0), "rigid_ends": (1.0, 1.0, 0.0), "rigid_left": (1.0, 0.0, 0.0)}
+_GEOMETRY["rigid_right"] = (0.0, 1.0, 0.0)
+NAMES = ("ordinates", "pre_curvature", "stiffness_profile", *_GEOMETRY, *_BOTH_ENDS, *_SCALARS)
+
+
+def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions:
+    """Directions of the ``parameters`` at ``test``.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, a basis of the wrong shape or where none belongs, ordinates of a law that has none, or
+        friction parameters of a test without friction.
+    """
+    blocks = [_block(test, parameter) for parameter in parameters]
+    names = tuple(name for block in blocks for name in block[0])
+    q, joints = len(names), test.rod.section.pre_curvature.size
+    law = test.characteristic
+    p = law.knots.size if isinstance(law, Characteristic) else 0
+    made = Directions(names, np.zeros((joints, q)), np.zeros((joints, q)), np.zeros((p, q)), np.zeros((joints + 1, q)))
+    fields = {"pre_curvature": made.pre_curvature, "stiffness_profile": made.profile, "ordinates": made.ordinates}
+    column = 0
+    for labels, name, basis in blocks:
+        columns = slice(column, column + len(labels))
+        column += len(labels)
+        if basis is not None:
+            fields[name][:, columns] = basis
+            continue
+        if name in _GEOMETRY:
+            left, right, length = _GEOMETRY[name]
+            made.edges[0, columns], made.edges[-1, columns] = left, right
+            made.edges[1:-1, columns] = (test.rod.elements * (length - left - right))[:, None]
+        for scalar in (f"{name}_left", f"{name}_right") if name in _BOTH_ENDS else (name,):
+            if scalar in _SCALARS:
+                made.scalars.setdefault(scalar, np.zeros(q))[columns] = 1.0
+    return made
+
+
+def _block(test: BendingTest, parameter: Parameter) -> tuple[tuple[str, ...], str, Array | None]:
+    """Column names, name and basis (rows, columns) of one parameter; None for a plain number."""
+    name, given = (parameter, None) if isinstance(parameter, str) else parameter
+    if name not in NAMES:
+        raise ValueError(f"unknown parameter {name!r}; known are {', '.join(NAMES)}")
+    if name in ("hysteresis", "stick_curvature") and test.friction is None:
+        raise ValueError(f"{name} needs a test with internal friction; InternalFriction(0.0, ...) will do")
+    if name in ("pre_curvature", "stiffness_profile"):
+        joints = test.rod.section.pre_curvature.size
+        if given is None:
+            return (name,), name, np.ones((joints, 1))
+        basis = _basis(given, test.rod.elements)
+        if basis.shape[0] != joints:
+            raise ValueError(f"basis of {name} has {basis.shape[0]} rows; one per joint is needed, {joints}")
+        return tuple(f"{name}[{i}]" for i in range(basis.shape[1])), name, basis
+    if given is not None:
+        raise ValueError(f"{name} takes no basis")
+    if name == "ordinates":
+        if not isinstance(test.characteristic, Characteristic):
+            raise ValueError("only a Characteristic has ordinates")
+        p = test.characteristic.knots.size
+        return tuple(f"ordinates[{i}]" for i in range(p)), name, np.eye(p)
+    return (name,), name, None
+
+
+def _basis(given: Basis, elements: Array) -> Array:
+    """Basis values at the joints, (n, q)."""
+    position = np.concatenate(([0.0], np.cumsum(elements)))
+    if callable(given):
+        given = [given]
+    if isinstance(given, Sequence) and given and callable(given[0]):
+        columns = [np.broadcast_to(np.asarray(f(position), float), position.shape) for f in given if callable(f)]
+        return np.column_stack(columns)
+    values = np.asarray(given, float)
+    return values[:, None] if values.ndim == 1 else values
