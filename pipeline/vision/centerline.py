@@ -44,11 +44,11 @@ def measure_centerline(
         Of the cable, in the unit of the plane; a check on the measured width.
     """
     options = settings.curve
-    half_width, tolerance = rough.half_width_px, 2.0 * options.width_tolerance
+    half_width = rough.half_width_px
     if diameter_m is not None:
         scale = float(np.median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)])))
-        half_width, tolerance = 0.5 * diameter_m * scale, options.width_tolerance
-    found = follow(rough, half_width=half_width, tolerance=tolerance, settings=options)
+        half_width = 0.5 * diameter_m * scale
+    found = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
     if isinstance(found, Rejected):
         return found
     sections, _ = found
@@ -281,7 +281,7 @@ def _std(basis: Array, covariance: Array) -> Array:
 def _covariance(
     fit: CurveFit, sections: Sections, chord: ChordFrame, width: Array
 ) -> tuple[Array, tuple[float, float]]:
-    """Covariance of q with the light's slow error and the axes' errors; standard deviation and length of the light's."""
+    """Covariance of q with the light's slow error and the axes' errors; std and length of the light's, m."""
     std = sections.systematic_std * float(np.median(width / sections.width))
     length = 0.25 * float(fit.s[-1] - fit.s[0])
     used = fit.weight > 0.0

@@ -15,20 +15,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
 
 _BIN = 0.25  # px; pixels are pooled at this width of offset: widens the blur by 0.4 % at 0.8 px
+_PLAIN_STEP = 0.1  # of the step: differences up to it are texture or slow light, not letters
 _MIN_BLUR = 0.30  # px; the pixel's own box is 0.29
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """Pixels about one edge: sections ``(n, m)``, offsets from the expected edge, positive outward, and grey values."""
+    """Pixels about one edge.
+
+    Attributes
+    ----------
+    offset : (n, m) px
+        From the expected edge, positive outward, on each of n sections.
+    value : (n, m) grey
+    across : int
+        Pixels of one row; m is a multiple of it, rows follow each other.
+    """
 
     offset: Array
     value: Array
+    across: int
 
 
 @dataclass(frozen=True)
@@ -39,8 +52,8 @@ class Profiles:
     ----------
     s, place, blur, level, step, inside, outside : (k,)
         Centre of the window; t0 and w in px; a and A in grey; b_in / A and b_out / A in 1/px.
-    plain : (k,) px
-        Place by the plain error function, without ramps.
+    shift : (k,) px
+        Place with ramps less the place by the plain error function.
     noise : (k,) grey
         Scatter of pixels about the profile.
     """
@@ -52,7 +65,7 @@ class Profiles:
     step: Array
     inside: Array
     outside: Array
-    plain: Array
+    shift: Array
     noise: Array
 
     def at(self, s: Array, name: str) -> Array:
@@ -71,133 +84,151 @@ def profile(offset: Array, place: Array, blur: Array) -> tuple[Array, Array, Arr
 
 
 def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: float) -> Profiles:
-    """Profiles in windows of neighbouring sections."""
+    """Profiles in windows of neighbouring sections.
+
+    Without ``ramps`` the places are those of the plain error function; the fit with ramps is made all the same, for
+    the difference. Medians over the rows come first: letters cover less than half of any line along the cable, and a
+    mean would take them for the sheath.
+    """
     count = min(windows, max(1, len(s) // 4))
     window = np.minimum((np.arange(len(s)) * count) // len(s), count - 1)
-    centre = np.array([s[window == k].mean() for k in range(count)])
-    low = np.floor(np.nanmin(pixels.offset) / _BIN)
-    bins = int(np.ceil(np.nanmax(pixels.offset) / _BIN - low)) + 1
-    cell = np.clip(np.floor(pixels.offset / _BIN - low).astype(np.int64), 0, bins - 1) + bins * window[:, None]
-    keep = np.isfinite(pixels.value)
-    start = np.tile([0.0, blur, 0.0, 0.0], (count, 1))
-    full = start
-    for _ in range(2):  # the second time without the pixels that contradict the profile (text, dirt)
-        weight = np.bincount(cell[keep], minlength=count * bins).reshape(count, bins).astype(np.float64)
-        filled = np.maximum(weight, 1.0)
-        offset = np.bincount(cell[keep], pixels.offset[keep], count * bins).reshape(count, bins) / filled
-        value = np.bincount(cell[keep], pixels.value[keep], count * bins).reshape(count, bins) / filled
-        full, linear = _variable_projection(offset, value, weight, start, ramps=ramps)
-        shape = np.stack(profile(pixels.offset, full[window, :1], full[window, 1:2])[:3], axis=-1)
-        model = linear[window, :1] + np.einsum("nmk,nk->nm", shape, linear[window, 1:])
-        residual = np.where(np.isfinite(pixels.value), pixels.value - model, np.nan)
-        noise = np.array([1.4826 * np.nanmedian(np.abs(residual[window == k])) for k in range(count)])
-        keep = np.isfinite(residual) & (np.abs(residual) < 4.0 * noise[window, None] + 1e-9)
-        start = full
-    plain = full[:, 0]
-    if ramps:
-        plain = _variable_projection(offset, value, weight, full * [1, 1, 0, 0], ramps=False)[0][:, 0]
-    step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])
-    return Profiles(
-        centre,
-        full[:, 0],
-        full[:, 1],
-        linear[:, 0],
-        linear[:, 1],
-        linear[:, 2] / step,
-        linear[:, 3] / step,
-        plain,
-        noise,
-    )
+    centre = np.bincount(window, s) / np.bincount(window)
+    low = np.floor(pixels.offset.min() / _BIN)
+    bins = int(pixels.offset.max() / _BIN - low) + 1
+    cell = np.floor(pixels.offset / _BIN - low).astype(np.int64) + bins * window[:, None]
+    first = np.searchsorted(window, range(1, count))
+    pooled = _medians(pixels, first)
+    start = np.column_stack([np.zeros(count), np.full(count, blur)])
+    for _ in range(2):
+        start, linear = _variable_projection(pooled, start, ramps=True)
+        # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
+        usual, blurs = _running_median(linear), _running_median(start[:, 1:])
+        shape = np.stack(profile(pixels.offset, start[window, :1], blurs[window])[:3], axis=-1)
+        residual = np.abs(pixels.value - usual[window, :1] - (shape @ usual[window, 1:, None])[..., 0])
+        noise = 1.4826 * np.array([float(np.median(part)) for part in np.split(residual, first)])
+        limit = np.maximum(4.0 * np.median(noise), _PLAIN_STEP * usual[window, 1:2])
+        pooled = _pool(pixels, cell, residual < limit, (count, bins))
+    full, full_linear = _variable_projection(pooled, start, ramps=True)
+    plain, plain_linear = _variable_projection(pooled, full, ramps=False)
+    used, linear = (full, full_linear) if ramps else (plain, plain_linear)
+    step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
+    shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
+    return Profiles(centre, used[:, 0], *shape.T, full[:, 0] - plain[:, 0], noise)
 
 
-def _variable_projection(
-    offset: Array, value: Array, weight: Array, start: Array, *, ramps: bool
-) -> tuple[Array, Array]:
-    """Place and blur ``(k, 2)`` and linear parts ``(k, 4)`` of binned profiles ``(k, b)``, all windows at once.
+@dataclass(frozen=True)
+class _Pooled:
+    """Mean offset and value of the pixels in bins of the offset, and their number; ``(windows, bins)``."""
 
-    Levenberg-Marquardt on (t0, log w, a, A, b_in, b_out); steps of place and blur are bounded.
+    offset: Array
+    value: Array
+    count: Array
+
+
+def _running_median(values: Array) -> Array:
+    """Median over five neighbouring windows, of each column."""
+    return np.asarray(median_filter(values, size=(min(5, len(values)), 1), mode="nearest"))
+
+
+def _medians(pixels: Pixels, first: NDArray[np.int64]) -> _Pooled:
+    """Medians over the rows of each window, at each step across."""
+    parts = [np.split(a, first) for a in (pixels.offset, pixels.value)]
+    offset = np.array([part.reshape(-1, pixels.across).mean(axis=0) for part in parts[0]])
+    value = np.array([np.median(part.reshape(-1, pixels.across), axis=0) for part in parts[1]])
+    return _Pooled(offset, value, np.ones_like(value))
+
+
+def _pool(pixels: Pixels, cell: NDArray[np.int64], keep: NDArray[np.bool_], shape: tuple[int, int]) -> _Pooled:
+    size = shape[0] * shape[1]
+    cells = cell[keep]
+    count = np.bincount(cells, minlength=size).astype(np.float64)
+    filled = np.maximum(count, 1.0)
+    offset = np.bincount(cells, pixels.offset[keep], size) / filled
+    value = np.bincount(cells, pixels.value[keep], size) / filled
+    return _Pooled(offset.reshape(shape), value.reshape(shape), count.reshape(shape))
+
+
+def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple[Array, Array]:
+    """Place and blur ``(k, 2)``, and level, step and ramps ``(k, 4)``, of pooled profiles, all windows at once.
+
+    Gauss-Newton on place and blur alone: the other four are solved for exactly at each step (Golub and Pereyra, in
+    Kaufman's form). Steps are bounded to a part of the blur.
     """
     place, blur = start[:, 0].copy(), start[:, 1].copy()
-    root = np.sqrt(weight)
-    span = np.maximum(np.ptp(np.where(weight > 0, offset, 0.0), axis=1), 1.0)
+    offset, root = pooled.offset, np.sqrt(pooled.count)[:, None, :]
+    value = pooled.value[:, None, :] * root
+    total = pooled.count.sum(axis=1)
+    low, high = offset.min(axis=1), offset.max(axis=1)
+    span = np.maximum(high - low, 1.0)
     linear = np.zeros((len(place), 4))
-    # A ramp as steep as a tenth of the step over the window is ordinary, one of the whole step is not an edge: a weak
-    # prior that only rules where blur and ramp cannot be told apart.
+    # A weak prior on the ramps, a thousandth of the data's weight: it decides only where blur and ramp look the same.
+    prior = np.zeros((len(place), 4))
+    prior[:, 2:] = (1e-3 * total / 12.0 * (span / 2.0) ** 2)[:, None]
+    prior += 1e-9 * total[:, None]
+    size = 4 if ramps else 2
     for _ in range(25):
         cumulative, inside, outside, density = profile(offset, place[:, None], blur[:, None])
-        columns = [np.ones_like(offset), cumulative]
-        if ramps:
-            columns += [inside, outside]
-        basis = np.stack(columns, axis=-1) * root[..., None]
-        gram = np.einsum("kbi,kbj->kij", basis, basis)
-        total = weight.sum(axis=1)
-        if ramps:
-            strength = total / 12.0 * (span / 2.0) ** 2 * 1e-3
-            gram[:, 2, 2] += strength
-            gram[:, 3, 3] += strength
-        gram += np.eye(gram.shape[1]) * (1e-9 * total[:, None, None])
-        coefficients = np.linalg.solve(gram, np.einsum("kbi,kb->ki", basis, value * root)[..., None])[..., 0]
-        linear[:, : coefficients.shape[1]] = coefficients
-        residual = value * root - np.einsum("kbi,ki->kb", basis, coefficients)
-        step = linear[:, 1:2]
-        z = (offset - place[:, None]) / blur[:, None]
-        slope_place = -step * density - linear[:, 2:3] * (1.0 - cumulative) - linear[:, 3:4] * cumulative
-        slope_blur = (-step * z + (linear[:, 3:4] - linear[:, 2:3]) * blur[:, None]) * density
-        tangent = np.stack([slope_place, slope_blur], axis=-1) * root[..., None]
-        # Kaufman's form: the tangent without its part in the span of the linear columns.
-        inner = np.linalg.solve(gram, np.einsum("kbi,kbj->kij", basis, tangent))
-        tangent = tangent - np.einsum("kbi,kij->kbj", basis, inner)
-        normal = np.einsum("kbi,kbj->kij", tangent, tangent)
+        basis = np.stack([np.ones_like(offset), cumulative, inside, outside][:size], axis=1) * root
+        gram = basis @ basis.transpose(0, 2, 1) + prior[:, :size, None] * np.eye(size)
+        linear[:, :size] = np.linalg.solve(gram, basis @ value.transpose(0, 2, 1))[..., 0]
+        residual = value - linear[:, None, :size] @ basis
+        step, ramp_in, ramp_out = linear[:, 1:2], linear[:, 2:3], linear[:, 3:]
+        by_place = -step * density - ramp_in - (ramp_out - ramp_in) * cumulative
+        by_blur = (-step * (offset - place[:, None]) / blur[:, None] + (ramp_out - ramp_in) * blur[:, None]) * density
+        tangent = np.stack([by_place, by_blur], axis=1) * root
+        tangent -= (tangent @ basis.transpose(0, 2, 1)) @ np.linalg.solve(gram, basis)
+        normal = tangent @ tangent.transpose(0, 2, 1)
         normal += np.eye(2) * (1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None, None] + 1e-30)
-        move = np.linalg.solve(normal, np.einsum("kbi,kb->ki", tangent, residual)[..., None])[..., 0]
-        place += np.clip(move[:, 0], -0.7 * blur, 0.7 * blur)
-        place = np.clip(place, offset.min(axis=1), offset.max(axis=1))
+        move = np.linalg.solve(normal, tangent @ residual.transpose(0, 2, 1))[..., 0]
+        place = np.clip(place + np.clip(move[:, 0], -0.7 * blur, 0.7 * blur), low, high)
         blur = np.clip(blur + np.clip(move[:, 1], -0.3 * blur, 0.3 * blur), _MIN_BLUR, 0.5 * span)
-        if np.max(np.abs(move)) < 1e-5:
+        if np.max(np.abs(move)) < 1e-4:
             break
-    return np.column_stack([place, blur, linear[:, 2], linear[:, 3]]), linear
+    return np.column_stack([place, blur]), linear
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Sub-pixel edges of one side: offset from the expected edge and its standard deviation, px; step and scatter."""
+    """Sub-pixel edges of one side: offset from the expected edge and its standard deviation, px; step, grey."""
 
     place: Array
     std: Array
     step: Array
-    scatter: Array
 
 
-def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 6) -> Edges:
-    """Place, level and step of the edge on every section; blur and relative slopes come from the profiles."""
+def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 5) -> Edges:
+    """Place, level and step of the edge on every section; blur and relative slopes come from the profiles.
+
+    Levels and steps are solved for at the profile's place first; three Newton steps of all then suffice for a start
+    within a blur's width.
+    """
     place = profiles.at(s, "place")
     blur = profiles.at(s, "blur")[:, None]
     inside, outside = profiles.at(s, "inside")[:, None], profiles.at(s, "outside")[:, None]
-    noise = float(np.median(profiles.noise))
-    finite = np.isfinite(pixels.value)
-    value = np.where(finite, pixels.value, 0.0)
-    weight = finite.astype(np.float64)
     level, step = profiles.at(s, "level"), profiles.at(s, "step")
-    scatter = np.full(len(s), noise)
+    noise = float(np.median(profiles.noise))
+    basis = np.ones((len(s), 3, pixels.value.shape[1]))
     gram = np.zeros((len(s), 3, 3))
+    weight = np.ones_like(pixels.value)
     for _ in range(iterations):
         cumulative, ramp_in, ramp_out, density = profile(pixels.offset, place[:, None], blur)
-        shape = cumulative + inside * ramp_in + outside * ramp_out
-        slope = -step[:, None] * (density + inside * (1.0 - cumulative) + outside * cumulative)
-        residual = value - level[:, None] - step[:, None] * shape
-        scatter = np.sqrt((weight * residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1) - 3.0, 1.0))
+        basis[:, 1] = cumulative + inside * ramp_in + outside * ramp_out
+        basis[:, 2] = -step[:, None] * (density + inside + (outside - inside) * cumulative)
+        residual = pixels.value - level[:, None] - step[:, None] * basis[:, 1]
         # Biweight with the scatter of the whole side: a section full of text must not raise its own limit.
-        weight = finite * (1.0 - np.minimum(np.abs(residual) / (6.0 * noise + 1e-12), 1.0) ** 2) ** 2
-        basis = np.stack([np.ones_like(shape), shape, slope], axis=-1)
-        weighted = basis * weight[..., None]
-        gram = np.einsum("nmi,nmj->nij", weighted, basis)
-        gram += np.eye(3) * 1e-12 + 1e-9 * np.einsum("nii->n", gram)[:, None, None] * np.eye(3)
-        move = np.linalg.solve(gram, np.einsum("nmi,nm->ni", weighted, residual)[..., None])[..., 0]
+        weight = (1.0 - np.minimum((residual / (6.0 * noise + 1e-12)) ** 2, 1.0)) ** 2
+        # The rim of a letter is neither sheath nor ink: a pixel counts no more than its neighbours across the edge.
+        rows = weight.reshape(len(s), -1, pixels.across)
+        rows[..., 1:-1] = np.minimum(rows[..., 1:-1], np.minimum(rows[..., 2:], rows[..., :-2]))
+        weighted = basis * weight[:, None, :]
+        gram = weighted @ basis.transpose(0, 2, 1)
+        gram += np.eye(3) * (1e-12 + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None])
+        move = np.linalg.solve(gram, weighted @ residual[..., None])[..., 0]
         level, step = level + move[:, 0], step + move[:, 1]
         shift = np.clip(move[:, 2], -blur[:, 0], blur[:, 0])
         place = place + shift
-        if np.max(np.abs(shift)) < 1e-4:
+        if np.max(np.abs(shift)) < 1e-3:  # px; Newton squares the error, so what is left is far below
             break
     std = noise * np.sqrt(np.linalg.inv(gram)[:, 2, 2])
     lost = (weight.sum(axis=1) < 0.5 * weight.shape[1]) | (step <= 0.0)
-    return Edges(np.where(lost, np.nan, place), std, step, scatter)
+    return Edges(np.where(lost, np.nan, place), std, step)

@@ -65,6 +65,17 @@ def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Array:
     )
 
 
+def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
+    """Sections whose pixels up to ``reach`` px on both sides are in the picture."""
+    where, angle = curve.at(s)
+    height, width = ground.grey.shape
+    inside = np.ones(len(s), dtype=bool)
+    for side in (-reach, reach):
+        u, v = (where + side * normals(angle) - np.asarray(ground.origin_px)).T
+        inside &= (u >= 1.0) & (u <= width - 2.0) & (v >= 1.0) & (v <= height - 2.0)
+    return inside
+
+
 @dataclass(frozen=True)
 class Found:
     """Edges found by search: sections ``s``, offsets of both edges ``(n, 2)`` in px, usable sections."""
@@ -141,7 +152,7 @@ def edge_pixels(
     half_width: float,
     window: tuple[float, float],
 ) -> Pixels:
-    """Pixels nearest to a grid about one edge: ``rows`` a section along s, one a px across.
+    """Pixels nearest to a grid about one edge: ``rows`` a section along s, one a px across; see `in_picture`.
 
     Parameters
     ----------
@@ -161,7 +172,6 @@ def edge_pixels(
     offset = np.einsum("nmk,nk->nm", index - where[:, None, :], across) - half_width
     column, row = index[..., 0] - ground.origin_px[0], index[..., 1] - ground.origin_px[1]
     height, width = ground.grey.shape
-    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    height, width = ground.grey.shape
     value = ground.grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float64)
-    value[~inside] = np.nan
-    return Pixels(offset.reshape(len(s), -1), value.reshape(len(s), -1))
+    return Pixels(offset.reshape(len(s), -1), value.reshape(len(s), -1), len(steps))

@@ -10,7 +10,9 @@ and no averaging removes it. Its size is judged by three things seen on the phot
 - how far the measured width, which is constant on the cable, changes slowly along s: independent edge errors that
   change the width by w move the midline by w / 2;
 - the difference of the two edges' blur: an edge that is broader than the other by more than the lens explains is
-  shading or penumbra, and its place is open by half of that.
+  shading or penumbra, and its place is open by half of that;
+- measured width against diameter: what is missing is missing at one edge if the two have different contrast, at both
+  alike (and harmless) if they have the same.
 """
 
 from __future__ import annotations
@@ -92,7 +94,14 @@ def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cov
 
 
 def measure_sections(
-    ground: Ground, curve: PlaneCurve, s: Array, *, half_width: float, blur: float, settings: CurveSettings
+    ground: Ground,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    half_width: float,
+    diameter: float | None,
+    blur: float,
+    settings: CurveSettings,
 ) -> Sections | None:
     """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
     inside = min(settings.inside_radii * half_width, settings.longest_side_px)
@@ -120,7 +129,6 @@ def measure_sections(
     width = place.sum(axis=1) + 2.0 * half_width
     step = np.column_stack([edges1.step, edges2.step])[keep]
     contrast = float(np.nanmedian(step))
-    sides_contrast = np.nanmedian(step, axis=0)
     smooth_width = _running_median(width)
     return Sections(
         s=s,
@@ -131,13 +139,13 @@ def measure_sections(
         width=width,
         width_smooth=smooth_width,
         off_path=off,
-        systematic_std=_systematic(profiles1, profiles2, smooth_width, std),
+        systematic_std=_systematic(profiles1, profiles2, smooth_width, std, diameter),
         share=float(np.mean(keep)),
         profiles=(profiles1, profiles2),
         contrast=contrast,
         noise=float(np.median(np.r_[profiles1.noise, profiles2.noise])),
         blur=float(np.median(np.r_[profiles1.blur, profiles2.blur])),
-        asymmetry=float(abs(sides_contrast[1] - sides_contrast[0]) / sides_contrast.mean()),
+        asymmetry=_asymmetry(step[:, 0], step[:, 1]),
     )
 
 
@@ -164,12 +172,20 @@ def _consistent(place: Array, std: Array, good: NDArray[np.bool_]) -> tuple[Arra
     return out, spread, good
 
 
-def _systematic(first: Profiles, second: Profiles, width: Array, std: Array) -> float:
+def _systematic(first: Profiles, second: Profiles, width: Array, std: Array, diameter: float | None) -> float:
     """Standard deviation, px, of the slow sideways error of the midline; see the module's text."""
-    model = 0.5 * ((second.place - second.plain) - (first.place - first.plain))
+    model = 0.5 * (second.shift - first.shift)
     # Half the width of the change between two models that both have some right: its standard deviation.
     by_model = 0.5 * np.sqrt(np.mean(model**2))
     noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
     by_width = 0.5 * np.sqrt(max(np.var(width) - noise2, 0.0))
     by_blur = 0.25 * np.sqrt(np.mean((second.blur - first.blur) ** 2))
-    return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2))
+    unequal = _asymmetry(first.step, second.step)
+    by_diameter = 0.0 if diameter is None else 0.5 * abs(float(np.median(width)) - diameter) * min(unequal, 1.0)
+    return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_diameter**2))
+
+
+def _asymmetry(first: Array, second: Array) -> float:
+    """Relative difference of two edges' contrast."""
+    one, two = float(np.nanmedian(first)), float(np.nanmedian(second))
+    return abs(two - one) / (0.5 * (two + one))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.records import Array, Rejected
+from pipeline.records import Rejected
 from pipeline.settings.vision_curve import CurveSettings
 from pipeline.vision.curvature import Frame, PlaneCurve, fit_curve, initial_curve, make_frame
-from pipeline.vision.edges import Ground, search_edges
+from pipeline.vision.edges import Ground, in_picture, search_edges
 from pipeline.vision.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.rough import Bearing, RoughCable
 
@@ -20,7 +20,7 @@ def knots_along(length: float, diameter: float, settings: CurveSettings) -> Fram
 
 
 def follow(
-    rough: RoughCable, *, half_width: float, tolerance: float, settings: CurveSettings
+    rough: RoughCable, *, half_width: float, known: bool, settings: CurveSettings
 ) -> tuple[Sections, PlaneCurve] | Rejected:
     """Sections of the cable and the path in px they were measured on.
 
@@ -28,8 +28,8 @@ def follow(
     ----------
     half_width : px
         Expected half width of the cable.
-    tolerance : relative
-        Of the expected width, for the search.
+    known : bool
+        True if it is that of the diameter, False if it is that of the mask.
     """
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
@@ -51,13 +51,14 @@ def follow(
     span = _span(path, (float(s[0]), float(s[-1])), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
+    tolerance = settings.width_tolerance * (1.0 if known else 2.0)
     found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance, settings=settings)
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = float(np.median(width[found.usable])) if found.usable.any() else np.nan
     usable = found.usable & (np.abs(width - middle) < settings.search_radii * half_width)
     if np.count_nonzero(usable) < 12:
         return _lost(rough, float(np.mean(usable)))
-    half_width = 0.5 * middle
+    diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
     points = where + found.edges.mean(axis=1)[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
     spacing = float(np.median(np.diff(found.s)))
@@ -73,8 +74,18 @@ def follow(
     ).curve
     count = min(settings.sections, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
-    s = s[free_of_covers(path, s, 0.6 * half_width, covers)]
-    sections = measure_sections(ground, path, s, half_width=half_width, blur=rough.blur_px, settings=settings)
+    s = s[free_of_covers(path, s, 0.6 * half_width, covers) & in_picture(ground, path, s, 1.5 * half_width + 4.0)]
+    if len(s) < 20:
+        return _lost(rough, 0.0)
+    sections = measure_sections(
+        ground,
+        path,
+        s,
+        half_width=half_width,
+        diameter=diameter if known else None,
+        blur=rough.blur_px,
+        settings=settings,
+    )
     return _lost(rough, 0.0) if sections is None else (sections, path)
 
 
@@ -84,7 +95,9 @@ def _cover(bearing: Bearing, blur: float) -> Cover:
     return Cover(bearing.center_px, float(bearing.radius_px or 0.0) + margin)
 
 
-def _span(path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float) -> tuple[float, float] | None:
+def _span(
+    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float
+) -> tuple[float, float] | None:
     """Range of s in which the cable is seen and neither edge is hidden."""
     s = np.arange(seen[0], seen[1], 1.0)
     free = s[free_of_covers(path, s, 0.6 * half_width, covers)] if len(s) else s
