@@ -120,14 +120,14 @@ class SegmentationSettings(StageSettings):
     least_level: float = Field(
         5.0, gt=0, description="sigmas of the ground; the last level at which a cable may be found"
     )
+    max_branching_readings: int = Field(
+        4, ge=1, description="readings with a long but branching strip after which the branch is believed"
+    )
     max_covered_share: float = Field(
         0.5, gt=0, le=1, description="share of the photo; a mask that covers more is ground, not cable"
     )
     smoothing_widths: float = Field(
         0.8, gt=0, description="widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03"
-    )
-    trimmed_widths: float = Field(
-        0.8, gt=0, description="widths; so much of a skeleton's end runs into a corner of the mask and is replaced"
     )
     accepted_width_ratio: tuple[float, float] = Field(
         (0.75, 1.3), description="ratio of measured width to diameter; shadow and glare leave it within 20 %"
@@ -135,9 +135,6 @@ class SegmentationSettings(StageSettings):
     max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
     seen_share: float = Field(
         0.4, gt=0, lt=1, description="share of the median contrast from which a section counts as seen"
-    )
-    cover_margin_widths: float = Field(
-        0.1, ge=0, description="widths; the blurred rim of a cover spoils the edges so far beyond its circle"
     )
     corridor_widths: float = Field(
         3.0, gt=2, description="widths; half corridor kept at full resolution: flanks and ramps"
@@ -170,12 +167,25 @@ class BearingSettings(StageSettings):
     min_rim: float = Field(
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"
     )
+    sure_rim: float = Field(0.7, gt=0, lt=1, description="share of the rim; with so much seen no other centre is tried")
+    directions: int = Field(
+        240, ge=90, description="rays of the circle fit at most; more share their pixels and tell nothing new"
+    )
     edge_over_texture: float = Field(
         3.0, gt=0, description="ratio to the median gradient in the window; below it texture votes for centres"
     )
     candidates: int = Field(3, ge=1, description="best voted centres that are fitted; the rim decides among them")
     center_std_floor_px: float = Field(
         0.02, gt=0, description="px; light and rounding of the cover move the centre by so much whatever the noise"
+    )
+    trimmed_widths: float = Field(
+        0.8, gt=0, description="widths; so much of a skeleton's end runs into a corner of the mask and is replaced"
+    )
+    cover_margin_widths: float = Field(
+        0.1, ge=0, description="widths; the blurred rim of a cover spoils the edges so far beyond its circle"
+    )
+    cut_std_widths: float = Field(
+        0.02, gt=0, description="widths; a cut with pliers is square to about a twentieth of the width"
     )
     given_std_px: float = Field(1.0, gt=0, description="px; how well a person reads an axis off a screen")
     end_std_widths: float = Field(

@@ -101,37 +101,39 @@ def _ground(small: Image) -> Image:
     height, width, channels = small.shape
     coarse_size = (min(width, 64), min(height, 64))
     coarse = cv2.resize(small, coarse_size, interpolation=cv2.INTER_AREA).reshape(-1, channels)
-    terms = _terms(*coarse_size)
-    full = _terms(width, height)
+    x, y = np.meshgrid(_centred(coarse_size[0]), _centred(coarse_size[1]))
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
+    u, v = _centred(width).astype(np.float32)[None, :], _centred(height).astype(np.float32)[:, None]
     surface = np.empty_like(small)
     for channel in range(channels):
-        surface[..., channel] = (full @ _robust_fit(terms, coarse[:, channel])).reshape(height, width)
+        c = _robust_fit(terms, coarse[:, channel].astype(np.float64)).astype(np.float32)
+        # products of a row and a column: three passes over the picture, not six
+        surface[..., channel] = (c[0] + c[1] * u + c[3] * u * u) + (c[2] + c[4] * u + c[5] * v) * v
     return surface
 
 
-def _terms(width: int, height: int) -> Image:
-    x = ((np.arange(width, dtype=np.float32) + 0.5) / width * 2 - 1)[None, :]
-    y = ((np.arange(height, dtype=np.float32) + 0.5) / height * 2 - 1)[:, None]
-    one = np.ones((height, width), np.float32)
-    return np.stack([one, one * x, one * y, one * x * x, x * y, one * y * y], axis=-1).reshape(-1, 6)
+def _centred(count: int) -> Array:
+    return np.asarray((np.arange(count) + 0.5) / count * 2.0 - 1.0)
 
 
-def _robust_fit(terms: Image, values: Image) -> Image:
+def _robust_fit(terms: Array, values: Array) -> Array:
     """Least squares with Tukey's biweight: cable and objects are outliers of the ground."""
-    coefficients = np.zeros(6, np.float32)
+    coefficients = np.zeros(6)
     coefficients[0] = np.median(values)
     for _ in range(12):
         residual = values - terms @ coefficients
         spread = _MAD_TO_STD * float(np.median(np.abs(residual))) + 1e-6
-        weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None)  # zero weight beyond 4.685 sigma
-        scaled = terms * weight[:, None]
-        coefficients = np.linalg.lstsq(scaled, values * weight, rcond=None)[0].astype(np.float32)
+        weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
+        normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
+        coefficients = np.linalg.solve(normal, terms.T @ (weight * values))
     return coefficients
 
 
 def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     """Covariance of the ground's colours, without cable and objects."""
-    sample = residual[::2, ::2].reshape(-1, residual.shape[2]).astype(np.float64)
+    # some ten thousand cells tell a standard deviation to one percent
+    stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
+    sample = residual[::stride, ::stride].reshape(-1, residual.shape[2]).astype(np.float64)
     spread = _MAD_TO_STD * np.median(np.abs(sample), axis=0) + settings.min_ground_std
     calm = np.all(np.abs(sample) < 3.0 * spread, axis=1)
     covariance = np.atleast_2d(np.cov(sample[calm], rowvar=False)) if calm.sum() > sample.shape[1] + 1 else 0.0

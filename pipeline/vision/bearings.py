@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.covers import find_cover
+from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 
@@ -44,15 +45,6 @@ class BearingHints:
         if self.cover_px is not None:
             return 0.5 * self.cover_px
         return None if self.cover_widths is None else 0.5 * self.cover_widths * width_px
-
-
-@dataclass(frozen=True)
-class CableEnd:
-    """One visible end of the cable: place and outward direction in px, and whether a larger object hides the rest."""
-
-    place: Array
-    outward: Array
-    at_object: bool = False
 
 
 def find_bearings(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
@@ -48,13 +49,18 @@ class Wanted:
 
 def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading:
     """The first reading with a strip that is long enough and does not branch, or else the best."""
-    best = Reading((), np.zeros((1, 1), np.uint8), np.zeros((1, 1), np.uint8), wanted.width or 0.0, 0.0)
+    nothing = np.zeros((1, 1), np.uint8)
+    best, branching = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
     for picture, level in _pictures(standout, settings):
         for reading in _readings(picture, level, wanted, settings):
-            if reading.longest >= wanted.least_length and reading.strips[0].branch < _branch_limit(reading, settings):
+            long = reading.longest >= wanted.least_length
+            if long and reading.strips[0].branch < _branch_limit(reading, settings):
                 return reading
+            branching += long
             if reading.longest > best.longest:
                 best = reading
+        if branching >= settings.max_branching_readings:
+            break
     return best
 
 
@@ -71,10 +77,9 @@ def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> 
 
 def approaches_itself(path: Array, width: float) -> bool:
     """True if the path comes back to within 1.2 widths of itself: the cable crosses or touches itself."""
-    thinned = path[:: max(1, int(width / 3.0))]
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(thinned, axis=0).T))])
-    distance = np.hypot(*(thinned[:, None, :] - thinned[None, :, :]).transpose(2, 0, 1))
-    return bool(((distance < 1.2 * width) & (np.abs(s[:, None] - s[None, :]) > 5.0 * width)).any())
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    first, second = cKDTree(path).query_pairs(1.2 * width, output_type="ndarray").T
+    return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
 
 
 def _branch_limit(reading: Reading, settings: SegmentationSettings) -> float:

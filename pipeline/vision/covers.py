@@ -76,6 +76,8 @@ def find_cover(
         circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius_px, settings)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
+        if best is not None and best.rim > settings.sure_rim:
+            break
         cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius_px / window.reduction)), 0.0, cv2.FILLED)
     return best if best is not None and best.rim >= settings.min_rim else None
 
@@ -144,7 +146,7 @@ def fit_circle(photo: Photo, center: Array, radius: float, settings: BearingSett
     Strategy: radial profiles, twice (the second time from the fitted centre and radius); the edge is the centroid of
     the slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight.
     """
-    count = int(np.clip(2.0 * np.pi * radius, 90, 720))
+    count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, 2.0 * settings.radius_tolerance * radius)
@@ -193,19 +195,23 @@ def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> t
         return None
     points = parameters[:2] + (parameters[2] + edge[found])[:, None] * ray[found]
     fit, scale = parameters.copy(), 0.5 * span
-    tukey = np.ones(len(points))
-    for _ in range(25):
+    for step in range(25):
         arm = points - fit[:2]
         distance = np.hypot(*arm.T)
         residual = distance - fit[2]
         tukey = np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
         design = np.column_stack([arm / distance[:, None], np.ones(len(points))])
         normal = design.T @ (tukey[:, None] * design)
-        if np.linalg.cond(normal) > 1e8:
+        if np.linalg.det(normal) < 1e-4 * len(points) ** 3 * 1e-2:  # less than an eighth of the rim: no centre
             return None
-        fit = fit + np.linalg.solve(normal, design.T @ (tukey * residual))
+        change = np.linalg.solve(normal, design.T @ (tukey * residual))
+        fit = fit + change
         # The scale may fall by a third a step: a robust fit that trusts its first guess too early keeps its error.
-        scale = max(_MAD_TO_STD * float(np.median(np.abs(residual))), 0.03, 0.67 * scale if _ < 6 else 0.0)
+        floor = 0.67 * scale if step < 6 else 0.03
+        settled = np.abs(change).max() < 1e-3 and step >= 6
+        scale = max(_MAD_TO_STD * float(np.median(np.abs(residual))), floor)
+        if settled:
+            break
     weight = np.zeros(len(edge))
     weight[found] = tukey
     spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))

@@ -14,17 +14,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.records import Array, Rejected
+from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout, choose_reduction, stand_out
-from pipeline.vision.bearings import BearingHints, CableEnd, find_bearings, left_first
+from pipeline.vision.bearings import BearingHints, find_bearings, left_first
 from pipeline.vision.candidates import Reading, Wanted, approaches_itself, branches, read_photo
 from pipeline.vision.closeup import take_closeup
 from pipeline.vision.crosscut import CrossCut, cut_across
+from pipeline.vision.ends import CableEnd, at_border, between_axes, find_end, lead_to_axes, settle_end
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.strips import Strip, end_direction
+from pipeline.vision.strips import Strip
 
 Window = tuple[int, int, int, int]
 
@@ -145,7 +146,7 @@ def _judge(
     axes = _axes(photo, standout, reading, strip, cable, settings)
     if isinstance(axes, Rejected):
         return axes
-    path = _up_to_axes(standout, strip.path, reading.width, axes, stage)
+    path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = cut_across(standout, path, reading.width, stage)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, settings)
@@ -156,9 +157,12 @@ def _axes(
 ) -> tuple[Bearing, Bearing] | Rejected:
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
-    ends = (_end(strip.path[::-1], reading, standout), _end(strip.path, reading, standout))
+    ends = (
+        find_end(strip.path[::-1], reading, standout, settings.bearings),
+        find_end(strip.path, reading, standout, settings.bearings),
+    )
     hidden = cable.bearings.cover_radius(1.0) is not None or cable.bearings.given_px is not None
-    leaving = [end for end in ends if _at_border(end, photo, width)]
+    leaving = [end for end in ends if at_border(end, photo, width)]
     if leaving and not hidden:
         return _leaves(photo, leaving[0])
     first, second = find_bearings(photo, ends, width, cable.bearings, settings.bearings)
@@ -176,28 +180,6 @@ def _axes(
     )
 
 
-def _up_to_axes(
-    standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
-) -> Array:
-    """Replace the ends of a skeleton, which run into the corners of the mask, by straight pieces up to the covers."""
-    for axis in axes:
-        path = path[::-1]
-        center = standout.to_cells(np.array(axis.center_px))
-        distance = np.hypot(*(path - center).T)
-        nearest = int(np.argmin(distance))
-        radius = 0.0 if axis.radius_px is None else axis.radius_px / standout.reduction
-        clear = distance[: nearest + 1] > radius + stage.cover_margin_widths * width
-        path = path[: max(int(clear.sum()) if not clear.all() else nearest + 1, 3)]
-        outward = end_direction(path, width)
-        body = path[: max(3, len(path) - max(1, round(stage.trimmed_widths * width)))]
-        reach = float((center - body[-1]) @ outward) - np.sqrt(
-            max(radius**2 - float(np.hypot(*(center - body[-1] - ((center - body[-1]) @ outward) * outward))) ** 2, 0.0)
-        )
-        steps = np.arange(1.0, max(reach - stage.cover_margin_widths * width, 1.0) + 1e-9)
-        path = np.vstack([body, body[-1] + steps[:, None] * outward])
-    return path
-
-
 def _leaves(photo: Photo, end: CableEnd) -> Rejected:
     return _refused(
         photo,
@@ -206,26 +188,6 @@ def _leaves(photo: Photo, end: CableEnd) -> Rejected:
         u_px=float(end.place[0]),
         v_px=float(end.place[1]),
     )
-
-
-def _end(path: Array, reading: Reading, standout: Standout) -> CableEnd:
-    """The end at the last point of the path: onward through the mask until it stops or a larger object begins."""
-    outward = end_direction(path, reading.width)
-    place = path[-1]
-    at_object = False
-    for step in np.arange(0.0, 2.0 * reading.width, 0.5):
-        u, v = np.rint(path[-1] + step * outward).astype(int)
-        inside = 0 <= v < reading.mask.shape[0] and 0 <= u < reading.mask.shape[1]
-        at_object = inside and bool(reading.thick[v, u])
-        if not inside or at_object or not reading.mask[v, u]:
-            break
-        place = path[-1] + step * outward
-    return CableEnd(standout.to_pixels(place), outward, at_object)
-
-
-def _at_border(end: CableEnd, photo: Photo, width_px: float) -> bool:
-    u, v = end.place
-    return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < width_px)
 
 
 def _check_width(
@@ -272,10 +234,14 @@ def _assemble(
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
         path, seen, axes = path[::-1], seen[::-1], axes[::-1]
     width = float(np.nanmedian(cut.width)) * standout.reduction
-    path, visible = _between_axes(path, seen, axes, stage.cover_margin_widths * width)
+    closeup = take_closeup(photo, path, width, cut.weights, stage)
+    axes = (
+        settle_end(axes[0], path[::-1], closeup, width, settings.bearings),
+        settle_end(axes[1], path, closeup, width, settings.bearings),
+    )
+    path, visible = between_axes(path, seen, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
         return _refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")
-    closeup = take_closeup(photo, path, width, cut.weights, stage)
     ratio = cut.contrast / max(float(np.hypot(cut.texture, closeup.noise)), 1e-9)
     if ratio < stage.min_contrast_to_noise:
         return _too_faint(photo, ratio, stage)
@@ -305,32 +271,6 @@ def _assemble(
         weights=tuple(float(weight) for weight in cut.weights),
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
     )
-
-
-def _between_axes(
-    path: Array, seen: Array, axes: tuple[Bearing, Bearing], margin: float
-) -> tuple[Array, tuple[int, int] | None]:
-    """Cut the path to what is seen between the axes and lead it straight on to them."""
-    usable = seen.astype(bool).copy()
-    left, right = (np.array(axis.center_px) for axis in axes)
-    start, stop = (int(np.argmin(np.hypot(*(path - place).T))) for place in (left, right))
-    usable[:start] = False
-    usable[stop + 1 :] = False
-    for axis, place in zip(axes, (left, right), strict=True):
-        if axis.radius_px is not None:
-            usable &= np.hypot(*(path - place).T) > axis.radius_px + margin
-    indices = np.flatnonzero(usable)
-    if len(indices) < 5:
-        return path, None
-    body = path[indices[0] : indices[-1] + 1]
-    spacing = float(np.median(np.hypot(*np.diff(body, axis=0).T)))
-    head, tail = _lead(left, body[0], spacing), _lead(right, body[-1], spacing)[::-1]
-    return np.vstack([head, body, tail]), (len(head), len(head) + len(body) - 1)
-
-
-def _lead(axis: Array, start: Array, spacing: float) -> Array:
-    count = max(1, int(np.hypot(*(start - axis)) / spacing))
-    return np.asarray(axis + np.arange(count)[:, None] / count * (start - axis))
 
 
 def _surroundings(near: RoughCable, photo: Photo, stage: SegmentationSettings) -> Window:

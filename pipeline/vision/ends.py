@@ -1,0 +1,172 @@
+"""The two ends of what is seen of the cable, and the way from there to the bearing axes.
+
+A skeleton runs into a corner of the mask over its last half width, so ends are led straight on from before that: to the
+cover's rim, to the larger object that hides the rest, or to where the cable stops. A free end is then placed to a
+fraction of a pixel where the grey value along the cable's middle falls to half its step.
+Photo pixels, unless cells (of the reduced photo) are said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.backdrop import Standout
+from pipeline.vision.candidates import Reading
+from pipeline.vision.closeup import Closeup
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import Bearing
+from pipeline.vision.strips import end_direction
+
+
+@dataclass(frozen=True)
+class CableEnd:
+    """One visible end of the cable: place and outward direction in px, and whether a larger object hides the rest."""
+
+    place: Array
+    outward: Array
+    at_object: bool = False
+
+
+def find_end(path: Array, reading: Reading, standout: Standout, settings: BearingSettings) -> CableEnd:
+    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins."""
+    width = reading.width
+    body, outward = _body(path, width, settings)
+    place, at_object = body[-1], False
+    for step in np.arange(0.0, (settings.trimmed_widths + 2.0) * width, 0.5):
+        here = body[-1] + step * outward
+        u, v = np.rint(here).astype(int)
+        inside = 0 <= v < reading.mask.shape[0] and 0 <= u < reading.mask.shape[1]
+        at_object = inside and bool(reading.thick[v, u])
+        if not inside or at_object or not reading.mask[v, u]:
+            break
+        place = here
+    return CableEnd(standout.to_pixels(place), outward, at_object)
+
+
+def _body(path: Array, width: float, settings: BearingSettings) -> tuple[Array, Array]:
+    """The path without the piece at its end that runs into a corner, and the direction in which it leaves there."""
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    count = int(np.searchsorted(s, s[-1] - settings.trimmed_widths * width))
+    body = path[: max(3, count)]
+    return body, end_direction(body, width)
+
+
+def at_border(end: CableEnd, photo: Photo, width_px: float) -> bool:
+    """True if the end lies within a width of the picture's border."""
+    u, v = end.place
+    return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < width_px)
+
+
+def lead_to_axes(
+    standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing], settings: BearingSettings
+) -> Array:
+    """The path (cells) with straight ends up to the rim of each cover, or to the axis where there is no cover."""
+    margin = settings.cover_margin_widths * width
+    for axis in axes:
+        path = path[::-1]
+        center = standout.to_cells(np.array(axis.center_px))
+        radius = 0.0 if axis.radius_px is None else axis.radius_px / standout.reduction + margin
+        distance = np.hypot(*(path - center).T)
+        path = path[: int(np.argmin(distance)) + 1]
+        outside = np.flatnonzero(distance[: len(path)] > radius)
+        body, outward = _body(path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, settings)
+        steps = np.arange(1.0, max(_to_circle(body[-1], outward, center, radius), 1.0) + 1e-9)
+        path = np.vstack([body, body[-1] + steps[:, None] * outward])
+    return path
+
+
+def _to_circle(start: Array, direction: Array, center: Array, radius: float) -> float:
+    """Distance along a ray to a circle, or to the foot of its centre where the ray misses it."""
+    along = float((center - start) @ direction)
+    aside = float(np.hypot(*(center - start - along * direction)))
+    return along - float(np.sqrt(max(radius**2 - aside**2, 0.0)))
+
+
+def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float, settings: BearingSettings) -> Bearing:
+    """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
+
+    Parameters
+    ----------
+    axis : Bearing
+        Returned as it is unless its kind is ``end`` or ``clamp``.
+    path : (k, 2) px
+        Refined path; its last point is the end.
+    closeup : Closeup
+    width : px
+    settings : BearingSettings
+    """
+    if axis.kind not in ("end", "clamp"):
+        return axis
+    settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
+    if axis.kind == "clamp":
+        return settled
+    outward = end_direction(path, width)
+    across = np.array([-outward[1], outward[0]])
+    along = np.arange(-1.5 * width, 1.5 * width + 0.125, 0.25)
+    rows = np.linspace(-0.25, 0.25, 9) * width
+    points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
+    u, v = (points[..., k].astype(np.float32) for k in (0, 1))
+    profiles = cv2.remap(closeup.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    places = [_half_level(profile, along, width) for profile in profiles]
+    known = np.array([place for place in places if place is not None])
+    if len(known) < 5:
+        return settled
+    middle = float(np.median(known))
+    # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
+    std = float(np.hypot(1.4826 * np.median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
+    end = path[-1] + middle * outward
+    return replace(settled, center_px=(float(end[0]), float(end[1])), std_px=std)
+
+
+def _half_level(profile: Array, along: Array, width: float) -> float | None:
+    """Where the grey value leaves the cable's for the ground's; None without a clear step."""
+    cable, ground = np.median(profile[along < -0.6 * width]), np.median(profile[along > 0.6 * width])
+    relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
+    inside = np.flatnonzero(relief > 0.5)
+    if not len(inside) or inside[-1] + 1 >= len(along):
+        return None
+    i = int(inside[-1])
+    share = (relief[i] - 0.5) / (relief[i] - relief[i + 1])
+    return float(along[i] + share * (along[i + 1] - along[i]))
+
+
+def between_axes(
+    path: Array, seen: Array, axes: tuple[Bearing, Bearing], margin: float
+) -> tuple[Array, tuple[int, int] | None]:
+    """Cut the path (px, left to right) to what is seen between the axes and lead it straight on to them.
+
+    Returns
+    -------
+    path : (k, 2) px
+    visible : (first, last) or None
+        None if less than five points are seen.
+    """
+    usable = seen.astype(bool).copy()
+    left, right = (np.array(axis.center_px) for axis in axes)
+    start, stop = (int(np.argmin(np.hypot(*(path - place).T))) for place in (left, right))
+    usable[:start] = False
+    usable[stop + 1 :] = False
+    for axis, place in zip(axes, (left, right), strict=True):
+        if axis.radius_px is not None:
+            usable &= np.hypot(*(path - place).T) > axis.radius_px + margin
+    indices = np.flatnonzero(usable)
+    if len(indices) < 5:
+        return path, None
+    body = path[indices[0] : indices[-1] + 1]
+    spacing = float(np.median(np.hypot(*np.diff(body, axis=0).T)))
+    head, tail = _lead(left, body[0], spacing), _lead(right, body[-1], spacing)[::-1]
+    return np.vstack([head, body, tail]), (len(head), len(head) + len(body) - 1)
+
+
+def _lead(axis: Array, start: Array, spacing: float) -> Array:
+    """Points from the axis to ``start``, without it; none if the axis is there already."""
+    distance = float(np.hypot(*(start - axis)))
+    if distance < 1e-6:
+        return np.empty((0, 2))
+    count = max(1, int(distance / spacing))
+    return np.asarray(axis + np.arange(count)[:, None] / count * (start - axis))
