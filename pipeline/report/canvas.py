@@ -165,7 +165,9 @@ def _along(name: str, part: tuple[float, float], index: int, count: int) -> str:
     return str(mpl.colors.to_hex(mpl.colormaps[name](part[0] + (part[1] - part[0]) * share)))
 
 
-def plot_area(figure: FigureBase, *, left: float = 62.0, right: float = 14.0, top: float = 34.0, bottom: float = 46.0) -> Axes:
+def plot_area(
+    figure: FigureBase, *, left: float = 62.0, right: float = 14.0, top: float = 34.0, bottom: float = 46.0
+) -> Axes:
     """One pair of axes with margins in px: a fixed layout costs a tenth of matplotlib's constrained one."""
     width, height = figure.bbox.width, figure.bbox.height  # in px, for all figures are drawn at 72 dots per inch
     return figure.add_axes(
@@ -203,7 +205,7 @@ def _compact(svg: str, name: str, size: tuple[float, float], title: str, descrip
     body = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', body)
     body = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", body)
     body = re.sub(r"xlink:href", "href", body)
-    body = re.sub(r"-?\d+\.\d{2,}", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), body)
+    body = re.sub(r"<[^>]+>", lambda tag: re.sub(r"-?\d+\.\d{2,}", _hundredths, tag[0]), body)  # never the texts
     body = re.sub(r"font: ([\d.]+)px [^;\"]+", r"font-size: \1px", body)
     body = re.sub(r"\s*\n\s*", " ", body)
     body = re.sub(r"> <", "><", body)
@@ -212,3 +214,8 @@ def _compact(svg: str, name: str, size: tuple[float, float], title: str, descrip
         f'id="{name}" aria-labelledby="{name}-title {name}-desc"><title id="{name}-title">{escape(title)}</title>'
         f'<desc id="{name}-desc">{escape(description)}</desc>{body}</svg>'
     )
+
+
+def _hundredths(number: re.Match[str]) -> str:
+    """A coordinate to a hundredth of a pixel."""
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")

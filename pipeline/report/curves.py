@@ -1,9 +1,9 @@
-"""What the report reads out of a characteristic: the visited part, the best one, equivalent stiffness, photos behind it.
+"""What the report reads out of a characteristic: the visited part, the best one, equivalent stiffness, photos.
 
 Only the visited range is ever shown: below the pre-curvature and above the largest curvature no cable was looked at.
 
-Equivalent constant stiffness over a range [a, b]: EI = (m(b) - m(a)) / (b - a), the mean of the tangent dm/dkappa. It is the
-stiffness of the linear rod that changes its moment by as much over that range.
+Equivalent constant stiffness over a range [a, b]: EI = (m(b) - m(a)) / (b - a), the mean of the tangent dm/dkappa. It
+is the stiffness of the linear rod that changes its moment by as much over that range.
 """
 
 from __future__ import annotations

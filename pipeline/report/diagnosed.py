@@ -1,4 +1,4 @@
-"""The diagnosis on the page: causes named, ranking, twins, maps before and after, gain, blind spots, next experiment."""
+"""The diagnosis on the page: causes, ranking, twins, maps before and after, gain, blind spots, next experiment."""
 
 from __future__ import annotations
 

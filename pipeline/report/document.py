@@ -1,8 +1,8 @@
 """``report.html``: one file that answers first and proves after, without network.
 
-Result -> views (texts, rows, figures) -> templates. Every text is escaped by the template engine; only the SVG drawn here is
-not, and its texts were escaped by matplotlib. Order of the page: the answer in a sentence and a figure; what was wrong and
-what was done; evidence; what simulation programs need; data and provenance.
+Result -> views (texts, rows, figures) -> templates. Every text is escaped by the template engine; only the SVG drawn
+here is not, and its texts were escaped by matplotlib. Order of the page: the answer in a sentence and a figure; what
+was wrong and what was done; evidence; what simulation programs need; data and provenance.
 """
 
 from __future__ import annotations
@@ -81,27 +81,35 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     words = Words(settings.language)
     main = main_figure(result, words, settings)
     levels = {level: [f for f in result.findings if f.level == level] for level in ("error", "warning", "info")}
-    return environment().get_template("report.html").render(
-        result=result,
-        words=words,
-        settings=settings,
-        answer=answer(result, words, settings),
-        main=main,
-        pointer=pointer_data(result, main, words, settings),
-        levels=levels,
-        photos=photo_views(result, words, settings),
-        figures=mechanics_figures(result, words, settings),
-        diagnosis=diagnosis_view(result, words, settings),
-        tables={"forces": force_rows(result, words), "photos": photo_rows(result, words), "knots": knot_rows(result, words)},
-        force_symbol=force_unit(result, words).symbol,
-        stiffness_symbol=stiffness_unit(result, words).symbol,
-        use=simulation_texts(result, words, settings),
-        specimen_rows=specimen_rows(result, words),
-        fit_rows=fit_rows(result, words),
-        provenance=provenance_rows(result),
-        palette=palette_css(sum(bool(photo.kappa_per_m) for photo in result.photos)),
-        css=asset("page.css") + asset("report.css"),
-        js=asset("page.js") + asset("report.js"),
+    return (
+        environment()
+        .get_template("report.html")
+        .render(
+            result=result,
+            words=words,
+            settings=settings,
+            answer=answer(result, words, settings),
+            main=main,
+            pointer=pointer_data(result, main, words, settings),
+            levels=levels,
+            photos=photo_views(result, words, settings),
+            figures=mechanics_figures(result, words, settings),
+            diagnosis=diagnosis_view(result, words, settings),
+            tables={
+                "forces": force_rows(result, words),
+                "photos": photo_rows(result, words),
+                "knots": knot_rows(result, words),
+            },
+            force_symbol=force_unit(result, words).symbol,
+            stiffness_symbol=stiffness_unit(result, words).symbol,
+            use=simulation_texts(result, words, settings),
+            specimen_rows=specimen_rows(result, words),
+            fit_rows=fit_rows(result, words),
+            provenance=provenance_rows(result),
+            palette=palette_css(sum(bool(photo.kappa_per_m) for photo in result.photos)),
+            css=asset("page.css") + asset("report.css"),
+            js=asset("page.js") + asset("report.js"),
+        )
     )
 
 
@@ -138,6 +146,3 @@ def write_report(result: Result, folder: Path, settings: ReportSettings | None =
         Of the file.
     """
     return write_atomic(Path(folder) / "report.html", report_html(result, settings))
-
-
-

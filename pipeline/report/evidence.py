@@ -231,6 +231,4 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of control points: curvature, tangent."""
     unit = figures.stiffness_unit(result, words)
     knots = result.inverse.knots if result.inverse else []
-    return [
-        [f"{words.number(k.kappa_per_m)} ({words('exact')})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots
-    ]
+    return [[f"{words.number(k.kappa_per_m)} ({words('exact')})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots]

@@ -133,7 +133,9 @@ def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: R
     parts: dict[str, Visited] = {m: c for m, c in curves(result).items() if m == "balance"}
     for method, curve in parts.items():
         _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
-        axes.set_ylim(min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max()))
+        axes.set_ylim(
+            min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max())
+        )
     return finish(
         axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=4
     )
@@ -156,7 +158,10 @@ def draw_forces(figure: FigureBase, result: Result, words: Words, settings: Repo
             [1e3 * step.displacement_m for step in line],
             [unit.factor * (step.force_fit_N or 0.0) for step in line],
             color=LIGHT["inverse"],
-            lw=1.4,
+            marker="_",
+            ms=14.0,
+            mew=2.0,
+            lw=0.8,
             ls="-" if branch == "loading" else (0, (4, 2)),
             label=words("simulated") if branch == "loading" else None,
         )
@@ -173,9 +178,7 @@ def draw_forces(figure: FigureBase, result: Result, words: Words, settings: Repo
     return axes
 
 
-def _branch(
-    axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words
-) -> None:
+def _branch(axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words) -> None:
     """Measured forces of one branch with error bars, and their residuals below."""
     look = {
         "ls": "none",

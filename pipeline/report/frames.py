@@ -14,7 +14,7 @@ CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "
 
 
 def characteristic_frame(result: Result) -> pd.DataFrame:
-    """Moment curve and both readings by every way, with their standard deviations; ``supported`` marks what was visited."""
+    """Moment curve and both readings by every way, with standard deviations; ``supported`` marks the visited range."""
     whole: dict[str, Curve | None] = {
         "inverse": result.inverse.curve if result.inverse else None,
         "balance": result.balance.curve if result.balance else None,
@@ -60,7 +60,9 @@ def photos_frame(result: Result) -> pd.DataFrame:
     """Outcome of every photo with its lengths."""
     names = ("image", "step", "status", "reason", "chord_m", "chord_std_m", "traced_length_m", "traced_length_std_m")
     names += ("width_m", "width_std_m")
-    return pd.DataFrame([{name: getattr(photo, name) for name in names} for photo in result.photos], columns=list(names))
+    return pd.DataFrame(
+        [{name: getattr(photo, name) for name in names} for photo in result.photos], columns=list(names)
+    )
 
 
 def causes_frame(result: Result) -> pd.DataFrame:

@@ -1,7 +1,8 @@
 """Maps of what is left: shape residuals over arc length and step, and cosines between causes.
 
-A residual map shows (measured - simulated) / standard deviation: rows are steps in the order of the test, columns are arc
-length from the left bearing axis. Purple and orange (map PuOr) are told apart in all colour blindnesses; white is none.
+A residual map shows (measured - simulated) / standard deviation: rows are steps in the order of the test, columns are
+arc length from the left bearing axis. Purple and orange (map PuOr) are told apart in all colour blindnesses; white is
+none.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ def draw_map(
     every = max(1, len(residuals.steps) // 12)
     axes.set_yticks(
         range(0, len(residuals.steps), every),
-        [f"{step} {words(f'branch_{b}') if b else ''}" for step, b in zip(residuals.steps, branches, strict=True)][::every],
+        [f"{step} {words(f'branch_{b}') if b else ''}" for step, b in zip(residuals.steps, branches, strict=True)][
+            ::every
+        ],
     )
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)
@@ -103,7 +106,9 @@ def draw_cosines(figure: FigureBase, cosines: dict[str, dict[str, float]], words
         for (row, column), value in np.ndenumerate(table):
             if np.isfinite(value):
                 text = words.number(value, 2)
-                axes.text(column, row, text, ha="center", va="center", color="#000000" if value > 0.5 else "#fdfdfd", size=9)
+                axes.text(
+                    column, row, text, ha="center", va="center", color="#000000" if value > 0.5 else "#fdfdfd", size=9
+                )
     _scale(figure, axes, image, words("axis_cosine"), words)
     return axes
 

@@ -1,8 +1,8 @@
 """One photo as evidence: its centerline drawn over it, its curvature with band and fit, what is left between them.
 
-The centerline is drawn in the pixels of the preview: preview px = displayed px / reduction. Pixel (0, 0) is the centre of the
-top-left pixel, while SVG counts from its corner, hence half a displayed pixel is added.
-Parts of the cable that no photo shows (under a bearing cover) are drawn dashed and shaded.
+The centerline is drawn in the pixels of the preview: preview px = displayed px / reduction. Pixel (0, 0) is the
+centre of the top-left pixel, while SVG counts from its corner, hence half a displayed pixel is added. Parts of the
+cable that no photo shows (under a bearing cover) are drawn dashed and shaded.
 """
 
 from __future__ import annotations

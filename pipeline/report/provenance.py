@@ -55,7 +55,10 @@ def specimen_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     rows = [
         (words("length"), f"{words.number(1e3 * part.length_m, 6)} mm ({words('given')})"),
         (words("diameter"), f"{words.number(1e3 * part.diameter_m, 6)} mm ({words('given')})"),
-        (words("moving"), words(part.moving_bearing) if part.moving_bearing in ("left", "right") else part.moving_bearing),
+        (
+            words("moving"),
+            words(part.moving_bearing) if part.moving_bearing in ("left", "right") else part.moving_bearing,
+        ),
     ]
     if result.scale is not None:
         scale = words.measured(result.scale.px_per_mm, result.scale.px_per_mm * result.scale.std_relative)

@@ -1,8 +1,8 @@
 """The tables beside the report, as any spreadsheet or program reads them: comma, decimal point, UTF-8, SI units.
 
 ``characteristic.csv`` and ``centerlines.csv`` are fixed by the contract; ``moment_curve.csv`` (kappa, m) and
-``simulation.csv`` (constants with errors) are what simulation programs ask for. Text that a spreadsheet would run as a formula
-gets an apostrophe in front (CWE-1236).
+``simulation.csv`` (constants with errors) are what simulation programs ask for. Text that a spreadsheet would run as
+a formula gets an apostrophe in front (CWE-1236).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The words of report and index in English and German; the numbers in the reader's format.
 
-The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences made
-by other rooms (findings, headline of the diagnosis) are English and are marked as such on a German page.
+The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences
+made by other rooms (findings, headline of the diagnosis) are English and are marked as such on a German page.
 """
 
 from __future__ import annotations

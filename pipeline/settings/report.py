@@ -31,11 +31,21 @@ class ReportSettings(BaseModel):
     residual_noise_sigma: float = Field(
         2.0, gt=0.0, description="residuals inside this band are called noise in figures; 95 % of normal errors"
     )
+    misfit_sigma: float = Field(
+        3.0,
+        gt=0.0,
+        description="chi-square beyond expectation by this many standard deviations is misfit; 1 in 700 by chance",
+    )
     index_curve_points: int = Field(
-        24, ge=4, description="points of a characteristic kept in the index; a natural spline of 3 to 6 knots needs no more"
+        24,
+        ge=4,
+        description="points of a characteristic kept in the index; a natural spline of 3 to 6 knots needs no more",
     )
     pooled_types_drawn: int = Field(
         24, ge=0, description="pooled cable types with a figure in the index; more would make it slow to open"
+    )
+    pooled_p_value: float = Field(
+        0.05, gt=0.0, lt=1.0, description="repeat specimens differ below this p value; the usual one in twenty"
     )
     ranked_causes: int = Field(
         20, ge=1, description="causes in the ranking figure; the catalogue has 20, further ones are in the table"

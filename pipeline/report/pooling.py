@@ -1,0 +1,108 @@
+"""Repeat specimens of one cable type: their mean characteristic, and whether they differ by more than their errors.
+
+Random effects by DerSimonian and Laird (1986): each specimen has its own error sigma_i and a true value that scatters
+by tau around the mean. Q = sum (f_i - f)^2 / sigma_i^2 follows chi-square with n - 1 degrees of freedom if tau = 0.
+The test is made once, on the mean stiffness over the range all specimens visited; the curves are pooled point by
+point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from pipeline.report.curves import Equivalent, Visited, equivalent
+
+Array = NDArray[np.float64]
+POINTS = 41
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """Pooled characteristic of repeat specimens.
+
+    Attributes
+    ----------
+    kappa : (m,) 1/m
+        The range all specimens visited.
+    mean, std, scatter : (m,) N m^2
+        Mean tangent, its standard deviation, and the standard deviation between specimens (tau).
+    stiffness, stiffness_std : N m^2
+        Mean stiffness over the range and its standard deviation.
+    scatter_relative, error_relative : float
+        Scatter between specimens and their own root mean square error, relative to the mean stiffness.
+    p_value : float
+        Of a scatter this large from the specimens' errors alone.
+    """
+
+    kappa: Array
+    mean: Array
+    std: Array
+    scatter: Array
+    stiffness: float
+    stiffness_std: float
+    scatter_relative: float
+    error_relative: float
+    p_value: float
+
+
+def pool(specimens: list[Visited]) -> Pooled | None:
+    """Pool the characteristics of repeat specimens.
+
+    Returns
+    -------
+    Pooled or None
+        None for fewer than two specimens, no common range, or errors that are not positive.
+    """
+    if len(specimens) < 2:
+        return None
+    low, high = max(c.kappa[0] for c in specimens), min(c.kappa[-1] for c in specimens)
+    constants = [equivalent(curve, (low, high)) for curve in specimens] if low < high else []
+    known: list[Equivalent] = [c for c in constants if c is not None and c.std > 0.0]
+    kappa = np.linspace(low, high, POINTS)
+    errors = np.array([np.interp(kappa, c.kappa, c.tangent_std) for c in specimens])
+    if len(known) < len(specimens) or not np.all(errors > 0.0):
+        return None
+    own = np.array([c.std for c in known])
+    mean, std, tau, q = random_effects(np.array([c.stiffness for c in known])[:, None], own[:, None])
+    curve, curve_std, scatter, _ = random_effects(
+        np.array([np.interp(kappa, c.kappa, c.tangent) for c in specimens]), errors
+    )
+    return Pooled(
+        kappa=kappa,
+        mean=curve,
+        std=curve_std,
+        scatter=scatter,
+        stiffness=float(mean[0]),
+        stiffness_std=float(std[0]),
+        scatter_relative=float(tau[0] / abs(mean[0])),
+        error_relative=float(np.sqrt(np.mean(own**2)) / abs(mean[0])),
+        p_value=float(chi2.sf(q[0], len(known) - 1)),
+    )
+
+
+def random_effects(values: Array, stds: Array) -> tuple[Array, Array, Array, Array]:
+    """Mean of scattered quantities with known errors, column by column.
+
+    Parameters
+    ----------
+    values, stds : (n, m)
+        n specimens, m quantities; standard deviations positive.
+
+    Returns
+    -------
+    mean, std, tau, q : (m,)
+        Mean, its standard deviation, scatter between specimens, and the statistic Q.
+    """
+    weight = 1.0 / stds**2
+    total = weight.sum(axis=0)
+    fixed = (weight * values).sum(axis=0) / total
+    q = (weight * (values - fixed) ** 2).sum(axis=0)
+    excess = q - (len(values) - 1)
+    tau2 = np.maximum(0.0, excess / (total - (weight**2).sum(axis=0) / total))
+    both = 1.0 / (stds**2 + tau2)
+    mean = (both * values).sum(axis=0) / both.sum(axis=0)
+    return mean, 1.0 / np.sqrt(both.sum(axis=0)), np.sqrt(tau2), q
