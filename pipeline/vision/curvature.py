@@ -23,10 +23,12 @@ covariance; the reasons for a spline of the curvature are measured in the tests.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from pipeline.records import Array
 from pipeline.vision.smoothing import Smooth, smooth
@@ -101,6 +103,15 @@ def _penalty(spline: BSpline, edges: Array, order: int) -> Array:
     return np.asarray(np.sqrt(np.outer(half, weights)).ravel()[:, None] * spline.derivative(order)(at))
 
 
+class _Nodes(NamedTuple):
+    """Grid nodes, angles and tangents on the whole grid, and the position as a spline."""
+
+    s: Array
+    theta: Array
+    tangent: Array
+    position: CubicHermiteSpline
+
+
 @dataclass(frozen=True)
 class PlaneCurve:
     """A curve: frame, spline coefficients ``(J,)``, point ``(2,)`` and angle of the anchor."""
@@ -114,33 +125,34 @@ class PlaneCurve:
         """Curvature at ``s`` (d theta / ds)."""
         return np.asarray(BSpline(self.frame.knots, self.coefficients, DEGREE)(s))
 
+    @cached_property
+    def _nodes(self) -> _Nodes:
+        frame = self.frame
+        theta = self.angle + frame.integrals @ self.coefficients
+        tangent = np.column_stack([np.cos(theta), np.sin(theta)])
+        nodes = frame.grid[::2]
+        points = self.point + _integrate(tangent, frame.grid, frame.anchor)
+        # Cubic Hermite pieces: the tangents are known, and the error is far below that of the quadrature.
+        return _Nodes(nodes, theta, tangent, CubicHermiteSpline(nodes, points, tangent[::2]))
+
     def at(self, s: Array) -> tuple[Array, Array]:
         """Points ``(n, 2)`` and angles ``(n,)`` at ``s``; beyond the range the curve goes on straight."""
-        grid, theta = self.frame.grid, self.angle + self.frame.integrals @ self.coefficients
-        tangent = np.column_stack([np.cos(theta), np.sin(theta)])
-        nodes, points = grid[::2], self.point + _integrate(tangent, grid, self.frame.anchor)
+        nodes, theta, _, spline = self._nodes
         inside = np.clip(s, nodes[0], nodes[-1])
         cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
-        width = nodes[cell + 1] - nodes[cell]
-        t = ((inside - nodes[cell]) / width)[:, None]
-        h = width[:, None]
-        # Cubic Hermite in a cell: the tangents are known, its error is far below that of the quadrature.
-        where = (
-            points[cell] * (1 + 2 * t) * (1 - t) ** 2
-            + points[cell + 1] * t**2 * (3 - 2 * t)
-            + h * tangent[::2][cell] * t * (1 - t) ** 2
-            - h * tangent[::2][cell + 1] * t**2 * (1 - t)
-        )
         # The angle by the parabola through both ends and the middle of the cell.
+        t = (inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
         a, m, b = theta[2 * cell], theta[2 * cell + 1], theta[2 * cell + 2]
-        t = t[:, 0]
         angle = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
-        beyond = (np.asarray(s) - inside)[:, None]
-        return where + beyond * np.column_stack([np.cos(angle), np.sin(angle)]), angle
+        where = spline(inside)
+        beyond = np.asarray(s) - inside
+        if beyond.any():
+            where = where + beyond[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        return where, angle
 
-    def foot(self, points: Array, s: Array) -> Array:
-        """Arc length of the points' feet on the curve, from a guess ``s``; two Newton steps without curvature."""
-        for _ in range(3):
+    def foot(self, points: Array, s: Array, *, steps: int = 3) -> Array:
+        """Arc length of the feet of points ``(n, 2)``, from a guess ``s``; Newton steps without the curvature."""
+        for _ in range(steps):
             where, angle = self.at(s)
             s = s + np.cos(angle) * (points[:, 0] - where[:, 0]) + np.sin(angle) * (points[:, 1] - where[:, 1])
         return s
@@ -148,11 +160,10 @@ class PlaneCurve:
     def bases(self, s: Array) -> tuple[Array, Array, Array]:
         """Derivatives ``(n, J + 2)`` of normal displacement, angle and curvature at ``s`` with respect to q."""
         frame = self.frame
-        theta = self.angle + frame.integrals @ self.coefficients
+        nodes, theta, tangent, _ = self._nodes
         turns = np.column_stack([np.ones(len(theta)), frame.integrals])  # of the angle, by turn and coefficients
-        along_x = _integrate(-np.sin(theta)[:, None] * turns, frame.grid, frame.anchor)
-        along_y = _integrate(np.cos(theta)[:, None] * turns, frame.grid, frame.anchor)
-        nodes = frame.grid[::2]
+        along_x = _integrate(-tangent[:, 1:] * turns, frame.grid, frame.anchor)
+        along_y = _integrate(tangent[:, :1] * turns, frame.grid, frame.anchor)
         inside = np.clip(s, nodes[0], nodes[-1])
         cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
         f = ((inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell]))[:, None]
@@ -256,15 +267,16 @@ def fit_curve(
     length = correlation_length
     smooth_: Smooth | None = None
     for iteration in range(iterations):
-        s = curve.foot(points, s)
+        s = curve.foot(points, s, steps=2)
         residual = _residual(curve, points, s)
         normal = curve.bases(s)[0]
         spread = 1.4826 * np.median(np.abs(residual / std))
         if iteration:
             weight = _biweight(residual / std, max(spread, 1e-12), robust)
         data = residual + normal[:, 2:] @ curve.coefficients
-        # The correlation is settled once the curve is: twice is enough, each search costs a dozen factorisations.
-        length = correlation_length if iteration in (0, 2) else length
+        # The correlation is sought once, when the curve is nearly there: each search costs ten factorisations.
+        if correlation_length is None:
+            length = float(np.median(np.diff(s))) if iteration == 0 else None if iteration == 1 else length
         used = weight > 0.0
         before = smooth_
         smooth_ = smooth(

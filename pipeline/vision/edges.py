@@ -28,9 +28,7 @@ from scipy.ndimage import gaussian_filter1d
 from pipeline.records import Array
 from pipeline.settings.vision_curve import CurveSettings
 from pipeline.vision.curvature import PlaneCurve
-from pipeline.vision.edge_profile import Pixels
-
-Float32 = NDArray[np.float32]
+from pipeline.vision.edge_profile import Float32, Pixels
 
 
 @dataclass(frozen=True)
@@ -173,5 +171,5 @@ def edge_pixels(
     column, row = index[..., 0] - ground.origin_px[0], index[..., 1] - ground.origin_px[1]
     height, width = ground.grey.shape
     height, width = ground.grey.shape
-    value = ground.grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float64)
-    return Pixels(offset.reshape(len(s), -1), value.reshape(len(s), -1), len(steps))
+    value = ground.grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+    return Pixels(offset.reshape(len(s), -1).astype(np.float32), value.reshape(len(s), -1), len(steps))
