@@ -63,7 +63,9 @@ class Scene:
         Objects below the cable.
     sensor : Sensor
     seed : int
-        Of texture and noise.
+        Of the noise.
+    ground_seed : int
+        Of the ground's texture: the photos of one rig have one.
     """
 
     cable: Strand
@@ -75,6 +77,7 @@ class Scene:
     things: tuple[Thing, ...] = ()
     sensor: Sensor = field(default_factory=Sensor)
     seed: int = 0
+    ground_seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -132,8 +135,7 @@ def _ends(cable: Strand) -> tuple[tuple[float, float], tuple[float, float]]:
 
 def _photograph(scene: Scene, layers: list[Layer]) -> Pixels:
     camera, channels = scene.camera, scene.sensor.channels
-    rng = np.random.default_rng(scene.seed)
-    picture = paint(scene.ground, camera.width, camera.height, channels, rng)
+    picture = paint(scene.ground, camera.width, camera.height, channels, np.random.default_rng([scene.ground_seed, 1]))
     bright = sheet(scene.light, camera.width, camera.height)
     if scene.light.shadow:
         # The shadow's own thickness is taken from the cable for all: covers lie as high as the cable's upper side.
@@ -145,7 +147,7 @@ def _photograph(scene: Scene, layers: list[Layer]) -> Pixels:
         alpha = layer.alpha[:, None]
         flat[layer.index] = flat[layer.index] * (1.0 - alpha) + alpha * layer.colour
     rest = sqrt(scene.sensor.blur_px**2 - _before_pixels(scene.sensor) ** 2)
-    return expose(replace(scene.sensor, blur_px=rest), picture, rng)
+    return expose(replace(scene.sensor, blur_px=rest), picture, np.random.default_rng([scene.seed, 2]))
 
 
 def _before_pixels(sensor: Sensor) -> float:

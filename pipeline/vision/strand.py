@@ -207,7 +207,11 @@ def half_plane(distance: Array, gradient: Array, cells: int = 1) -> Array:
 def soft_edge(distance: Array, gradient: Array, cells: int = 1, *, blur_px: float) -> Array:
     """Like `half_plane`, through a Gaussian lens; the cell's own box enters with its variance (1/12 of its width^2)."""
     slope = np.hypot(gradient[0], gradient[1])
-    return ndtr(distance / (slope * sqrt(blur_px**2 + 1.0 / (12.0 * cells**2))))
+    z = distance / (slope * sqrt(blur_px**2 + 1.0 / (12.0 * cells**2)))
+    cover = np.where(z > 0.0, 1.0, 0.0)
+    near = np.abs(z) < 6.0  # beyond, 1e-9 is missing
+    cover[near] = ndtr(z[near])
+    return cover
 
 
 def disc_cover(

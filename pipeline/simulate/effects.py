@@ -1,0 +1,219 @@
+"""Causes that can be hidden in a virtual experiment, by the names of the catalogue, and what their values mean.
+
+An effect has one or a few values, the first is its size. It acts in one of three places:
+
+* on the cable or rig: it changes the `rod.bending_test.BendingTest`;
+* on what is read: load cell, displacement log, stated length and scale (`Readings`);
+* on the camera.
+
+Signs follow the catalogue: a stated value that is too large has a positive error; a load cell that shows too much has a
+positive offset, gain or drift; a positive displacement offset pushes the bearing further than the log says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.vision.render import Camera
+from rod.bending_test import BendingTest
+from rod.characteristic import Characteristic
+from rod.section import InternalFriction
+
+Array = NDArray[np.float64]
+Values = tuple[float, ...]
+
+SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0 .. 10 1/m, as in the paper's Table 1
+WIDTH = 0.08  # standard deviation of a local kink or soft spot, in lengths: the 15 mm of a splice on a cable of 181 mm
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What the rig's instruments and the specimen's description get wrong.
+
+    ``offset`` N, ``gain`` -, ``drift`` N/s; ``relaxation`` share of the force lost and ``relaxation_time`` s;
+    ``length`` and ``scale`` relative errors of the stated values.
+    """
+
+    offset: float = 0.0
+    gain: float = 0.0
+    drift: float = 0.0
+    relaxation: float = 0.0
+    relaxation_time: float = 7.0
+    length: float = 0.0
+    scale: float = 0.0
+
+    def shown(self, force: float, begin: float, time: Array) -> Array:
+        """What the load cell shows (n,) N of a step's ``force``, ``time`` (n,) s after the hold began at ``begin``."""
+        held = force * (1.0 - self.relaxation * (1.0 - np.exp(-time / self.relaxation_time)))
+        return held * (1.0 + self.gain) + self.offset + self.drift * (begin + time)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything an effect can change."""
+
+    test: BendingTest
+    readings: Readings
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A cause that can be hidden.
+
+    Attributes
+    ----------
+    name : str
+    values : str
+        What its values are, with units.
+    counts : tuple of int
+        How many values are allowed.
+    apply : callable
+        (Setup, values) -> Setup.
+    """
+
+    name: str
+    values: str
+    counts: tuple[int, ...]
+    apply: Callable[[Setup, Values], Setup]
+
+
+def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
+    """Setup with all effects in it.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or the number of values is wrong.
+    """
+    for name, given in effects.items():
+        effect = _effect(name)
+        values = tuple(float(v) for v in np.atleast_1d(given))
+        if effect.counts and len(values) not in effect.counts:
+            raise ValueError(f"{name} takes {' or '.join(map(str, effect.counts))} values ({effect.values})")
+        setup = effect.apply(setup, values)
+    return setup
+
+
+def parse_effect(text: str) -> tuple[str, Values]:
+    """Read ``NAME=VALUE`` or ``NAME=VALUE,VALUE``.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read; the message names the nearest known name.
+    """
+    name, equals, rest = text.partition("=")
+    effect = _effect(name.strip())
+    try:
+        values = tuple(float(part) for part in rest.split(","))
+    except ValueError as error:
+        raise ValueError(f"{text!r} is not NAME=VALUE: {effect.name} takes {effect.values}") from error
+    if not equals:
+        raise ValueError(f"{text!r} has no value: {effect.name} takes {effect.values}")
+    return effect.name, values
+
+
+def _effect(name: str) -> Effect:
+    if name in EFFECTS:
+        return EFFECTS[name]
+    near = get_close_matches(name, EFFECTS, n=1)
+    hint = f"the nearest is {near[0]}" if near else f"known are {', '.join(EFFECTS)}"
+    raise ValueError(f"no cause is called {name!r}; {hint}")
+
+
+def _along(values: Values) -> Callable[[Array], Array]:
+    """Deviation along the cable: linear, from -size to size; or, with a place, a local bump there."""
+    if len(values) == 1:
+        return lambda u: values[0] * (2.0 * u - 1.0)
+    return lambda u: values[0] * np.exp(-0.5 * ((u - values[1]) / WIDTH) ** 2)
+
+
+def _stiffness(setup: Setup, values: Values) -> Setup:
+    knots = np.linspace(0.0, SPAN_PER_M, max(len(values), 2))
+    ordinates = np.broadcast_to(values, knots.shape)
+    law = Characteristic.from_ordinates(knots, ordinates, reading="tangent", abscissa="excess")
+    return replace(setup, test=replace(setup.test, characteristic=law))
+
+
+def _varying_pre_curvature(setup: Setup, values: Values) -> Setup:
+    base, deviation = setup.test.pre_curvature, _along(values)
+    mean = base if callable(base) else lambda u: np.full_like(u, float(np.mean(base)))
+    return replace(setup, test=replace(setup.test, pre_curvature=lambda u: mean(u) + deviation(u)))
+
+
+def _varying_stiffness(setup: Setup, values: Values) -> Setup:
+    deviation = _along(values)
+    return replace(setup, test=replace(setup.test, stiffness_profile=lambda u: 1.0 + deviation(u)))
+
+
+def _hysteresis(setup: Setup, values: Values) -> Setup:
+    stick = values[1] if len(values) > 1 else 3.0
+    return replace(setup, test=replace(setup.test, friction=InternalFriction(values[0], stick)))
+
+
+def _load(setup: Setup, values: Values) -> Setup:
+    return replace(setup, test=replace(setup.test, load=(values[0], values[1])))
+
+
+def _relaxation(setup: Setup, values: Values) -> Setup:
+    time = values[1] if len(values) > 1 else setup.readings.relaxation_time
+    return replace(setup, readings=replace(setup.readings, relaxation=values[0], relaxation_time=time))
+
+
+def _tilt(setup: Setup, values: Values) -> Setup:
+    terms = (values[0], values[1] if len(values) > 1 else 0.0)
+    return replace(setup, camera=replace(setup.camera, perspective_per_m=terms))
+
+
+def _on_test(field: str) -> Callable[[Setup, Values], Setup]:
+    return lambda setup, values: replace(setup, test=replace(setup.test, **{field: values[0]}))
+
+
+def _on_supports(field: str) -> Callable[[Setup, Values], Setup]:
+    def apply(setup: Setup, values: Values) -> Setup:
+        left, right = (replace(end, **{field: values[0]}) for end in (setup.test.left, setup.test.right))
+        return replace(setup, test=replace(setup.test, left=left, right=right))
+
+    return apply
+
+
+def _on_readings(field: str) -> Callable[[Setup, Values], Setup]:
+    return lambda setup, values: replace(setup, readings=replace(setup.readings, **{field: values[0]}))
+
+
+def _lens(setup: Setup, values: Values) -> Setup:
+    return replace(setup, camera=replace(setup.camera, k1=values[0]))
+
+
+_LOCAL = "and, for a local one, its place in lengths"
+EFFECTS: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        Effect("nonlinear_stiffness", "ordinates of f_EI over K - K0 = 0 .. 10 1/m, N m^2", (), _stiffness),
+        Effect("pre_curvature", "K0, 1/m", (1,), _on_test("pre_curvature")),
+        Effect("pre_curvature_varying", f"deviation of K0, 1/m, {_LOCAL}", (1, 2), _varying_pre_curvature),
+        Effect("stiffness_varying", f"relative deviation of EI, {_LOCAL}", (1, 2), _varying_stiffness),
+        Effect("hysteresis", "moment half-width, N m, and curvature change to full slip, 1/m", (1, 2), _hysteresis),
+        Effect("plastic_set", "growth of K0 with the largest curvature reached", (1,), _on_test("plastic_rate")),
+        Effect("relaxation", "share of the force lost in a long hold, and its time, s", (1, 2), _relaxation),
+        Effect("bearing_friction", "Coulomb moment of each bearing, N m", (1,), _on_supports("friction_moment")),
+        Effect("bearing_stiffness", "spring of each bearing, N m/rad", (1,), _on_supports("stiffness")),
+        Effect("rigid_ends", "length of the stiff piece at each axis, m", (1,), _on_supports("rigid_length")),
+        Effect("rig_compliance", "yield of the frame, m/N", (1,), _on_test("compliance")),
+        Effect("displacement_offset", "added to every displacement, m", (1,), _on_test("displacement_offset")),
+        Effect("length_error", "stated over true length, minus 1", (1,), _on_readings("length")),
+        Effect("force_offset", "shown too much, N", (1,), _on_readings("offset")),
+        Effect("force_drift", "shown too much per second, N/s", (1,), _on_readings("drift")),
+        Effect("force_gain", "shown too much, relative", (1,), _on_readings("gain")),
+        Effect("in_plane_load", "along the chord and toward the bow, N/m", (2,), _load),
+        Effect("scale_error", "stated over true px/mm, minus 1", (1,), _on_readings("scale")),
+        Effect("lens_distortion", "k1 at half the picture's diagonal", (1,), _lens),
+        Effect("camera_tilt", "perspective terms along u and v, 1/m", (1, 2), _tilt),
+    )
+}

@@ -1,0 +1,218 @@
+"""Writes a virtual experiment as a specimen folder: images/, force.csv, specimen.toml; the truth in a file of its own.
+
+The folder holds nothing a measured one would not hold. ``truth.json``: id, effects, law, K0 (values along s), lengths,
+scale, and for each step force, chord and, at 101 equidistant arc lengths, kappa (1/m), moment (N m), position (mm) and
+the pixel path of the centerline; pixel (0, 0) is the centre of the top-left pixel.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pipeline.simulate.effects import Readings, Setup
+from pipeline.simulate.experiment import Experiment, State, bend
+from pipeline.simulate.photography import Photography
+from pipeline.vision.render import Camera, Picture, render, render_board
+from pipeline.vision.sensor import write_picture
+
+Array = NDArray[np.float64]
+
+TRUTH_POINTS = 101
+
+
+@dataclass(frozen=True)
+class Written:
+    """A written specimen: its folder, the file with the truth, and the truth itself."""
+
+    folder: Path
+    truth_file: Path
+    truth: dict[str, Any]
+
+
+def simulate_specimen(
+    folder: Path,
+    experiment: Experiment | None = None,
+    *,
+    photography: Photography | None = None,
+    truth_file: Path | None = None,
+) -> Written:
+    """Bend, photograph and log a cable; see `write_specimen`."""
+    experiment = experiment or Experiment(id=folder.name)
+    return write_specimen(folder, experiment, states=bend(experiment), photography=photography, truth_file=truth_file)
+
+
+def write_specimen(
+    folder: Path,
+    experiment: Experiment,
+    *,
+    states: tuple[State, ...],
+    photography: Photography | None = None,
+    truth_file: Path | None = None,
+) -> Written:
+    """Photograph and log states bent by any solver.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if missing; existing files of the same names are overwritten.
+    experiment : Experiment
+        Its effects on instruments and camera are applied here; those on cable and rig must be in ``states``.
+    states : tuple of State
+        One per displacement.
+    photography : Photography or None
+        The default camera, light and ground.
+    truth_file : Path or None
+        Default: beside the folder, named ``<folder>.truth.json``.
+
+    Raises
+    ------
+    ValueError
+        If states and displacements differ in number.
+    """
+    if len(states) != len(experiment.displacements_m):
+        raise ValueError(f"{len(states)} states for {len(experiment.displacements_m)} displacements")
+    photography = photography or Photography()
+    setup = experiment.setup(photography.camera(experiment, states))
+    (folder / "images").mkdir(parents=True, exist_ok=True)
+    names = [f"images/step_{number:02d}{photography.suffix}" for number in range(len(states))]
+    pictures = []
+    for number, (name, state) in enumerate(zip(names, states, strict=True)):
+        picture = render(photography.scene(experiment, state, setup.camera, number))
+        _save(folder / name, picture.pixels, photography)
+        pictures.append(_Traced(picture))
+    if photography.scale == "board":
+        _calibrate(folder, experiment, photography, setup.camera, states[0])
+    shown, log = _force_log(experiment, setup.readings, states, names)
+    (folder / "force.csv").write_text(log, encoding="utf-8")
+    (folder / "specimen.toml").write_text(_description(experiment, setup, photography, pictures[0]), encoding="utf-8")
+    truth = _truth(experiment, setup, states, pictures, shown)
+    truth_file = truth_file or folder.parent / f"{folder.name}.truth.json"
+    truth_file.write_text(json.dumps(truth, indent=1), encoding="utf-8")
+    return Written(folder, truth_file, truth)
+
+
+class _Traced:
+    """What is kept of a picture: its truth without the pixels."""
+
+    def __init__(self, picture: Picture) -> None:
+        self.s, self.u, self.v = picture.curve.s, picture.u_px, picture.v_px
+        self.left, self.right = picture.left_px, picture.right_px
+
+
+def _save(path: Path, pixels: Any, photography: Photography) -> None:
+    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality, exif_orientation=photography.exif_orientation)
+
+
+def _calibrate(folder: Path, experiment: Experiment, photography: Photography, camera: Camera, state: State) -> None:
+    (folder / "calibration").mkdir(exist_ok=True)
+    scene = photography.scene(experiment, state, camera, 10_000)  # a seed no step has
+    pixels = render_board(scene, photography.fitted_board(experiment, camera))
+    _save(folder / "calibration" / f"board{photography.suffix}", pixels, photography)
+
+
+def _force_log(
+    experiment: Experiment, readings: Readings, states: tuple[State, ...], names: list[str]
+) -> tuple[list[float], str]:
+    """Noiseless reading at the time of each photo (N), and the text of ``force.csv``."""
+    rng = np.random.default_rng([experiment.seed, 1])
+    noise = experiment.force_noise * max(abs(state.force) for state in states)
+    lines, shown = ["step,branch,time_s,displacement_mm,force_N,image"], []
+    times = np.linspace(min(0.5, 0.1 * experiment.hold_s), experiment.hold_s, experiment.samples)
+    # 4 digits below the noise: rounding is none of the errors of this log.
+    digits = max(5, 3 - int(np.floor(np.log10(noise)))) if noise > 0 else 9
+    for number, (state, branch) in enumerate(zip(states, experiment.branches, strict=True)):
+        begin = number * experiment.period_s
+        force = readings.shown(state.force, begin, times)
+        shown.append(float(force[-1]))
+        force = force + noise * rng.standard_normal(times.size)
+        for k, (time, value) in enumerate(zip(times, force, strict=True)):
+            image = names[number] if k == times.size - 1 else ""
+            displacement = 1e3 * experiment.displacements_m[number]
+            lines.append(f"{number},{branch},{begin + time:.2f},{displacement:.3f},{value:.{digits}f},{image}")
+    return shown, "\n".join(lines) + "\n"
+
+
+def _description(experiment: Experiment, setup: Setup, photography: Photography, first: _Traced) -> str:
+    """Text of ``specimen.toml``."""
+    length = 1e3 * experiment.length_m * (1.0 + setup.readings.length)
+    lines = [
+        "[specimen]",
+        f"id = {json.dumps(experiment.id, ensure_ascii=False)}",
+        f"length_mm = {length:.4f}",
+        f"diameter_mm = {1e3 * experiment.diameter_m:.3f}",
+        "",
+        "[camera]",
+    ]
+    if photography.scale == "number":
+        lines.append(f"scale_px_per_mm = {1e-3 * setup.camera.px_per_m * (1.0 + setup.readings.scale):.6f}")
+    elif photography.scale == "board":
+        board = photography.fitted_board(experiment, setup.camera)
+        square = 1e3 * board.square_m / (1.0 + setup.readings.scale)
+        lines.append('calibration = "calibration"')
+        lines.append(f"board = {{columns = {board.columns}, rows = {board.rows}, square_mm = {square:.6f}}}")
+    lines += ["", "[rig]", f'moving_bearing = "{experiment.moving}"']
+    covers = [cover for cover in photography.covers if cover is not None]
+    if len(covers) == 2:
+        lines.append(f"bearing_marker_mm = {1e3 * covers[0].diameter_m:.3f}")
+    else:
+        axes = ", ".join(f"[{u:.2f}, {v:.2f}]" for u, v in (first.left, first.right))
+        lines.append(f"bearings_px = [{axes}]")
+    return "\n".join(lines) + "\n"
+
+
+def _truth(
+    experiment: Experiment,
+    setup: Setup,
+    states: tuple[State, ...],
+    pictures: list[_Traced],
+    shown: list[float],
+) -> dict[str, Any]:
+    excess = np.linspace(-5.0, 20.0, 251)
+    law = setup.test.characteristic
+    return {
+        "id": experiment.id,
+        "seed": experiment.seed,
+        "effects": {name: np.atleast_1d(value).tolist() for name, value in experiment.effects.items()},
+        "ei0": experiment.EI0,
+        "ei1": experiment.EI1,
+        "kc": experiment.kc,
+        "K0": experiment.K0,
+        "law": {
+            "excess_per_m": excess.tolist(),
+            "moment_Nm": np.asarray(law.moment(excess, np.zeros_like(excess))).tolist(),
+            "tangent_Nm2": np.asarray(law.tangent(excess, np.zeros_like(excess))).tolist(),
+        },
+        "L_mm": 1e3 * experiment.length_m,
+        "px_per_mm": 1e-3 * setup.camera.px_per_m,
+        "steps": [
+            _step(number, experiment, state, picture, force)
+            for number, (state, picture, force) in enumerate(zip(states, pictures, shown, strict=True))
+        ],
+    }
+
+
+def _step(number: int, experiment: Experiment, state: State, picture: _Traced, shown: float) -> dict[str, Any]:
+    s = np.linspace(0.0, float(state.s[-1]), TRUTH_POINTS)
+    x, y, u, v = (CubicSpline(state.s, row)(s) for row in (state.x, state.y, picture.u, picture.v))
+    kappa, m = (np.interp(s, state.s, row) for row in (state.kappa, state.moment))
+    return {
+        "step": number,
+        "branch": experiment.branches[number],
+        "F": state.force,
+        "F_shown": shown,
+        "chord_mm": 1e3 * state.chord,
+        "s_mm": (1e3 * s).tolist(),
+        "kappa": kappa.tolist(),
+        "m": m.tolist(),
+        "xy_mm": (1e3 * np.column_stack([x, y])).tolist(),
+        "px": np.column_stack([u, v]).tolist(),
+        "left_px": list(picture.left),
+        "right_px": list(picture.right),
+    }
