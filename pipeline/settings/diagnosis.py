@@ -1,11 +1,110 @@
-"""Settings of the room ``diagnosis``: unit in the name, reason in the description."""
+"""Settings of the room ``diagnosis``: unit in the name or the description, reason in the description."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class DiagnosisSettings(BaseModel):
     """Thresholds of ``diagnosis``."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    # noise
+    force_floor: float = Field(
+        5e-4,
+        description="share of the largest force; repeatability of a class 0.05 load cell, below it samples repeat digits",
+    )
+    hold_noise_level: float = Field(
+        1e-3, description="probability; holds have noise levels of their own only if equality is refuted at this level"
+    )
+    chord_std: float = Field(
+        3e-5,
+        description="relative; standard deviation of a photographed chord where the photo states none (0.05 px of 1700)",
+    )
+    displacement_std: float = Field(
+        2e-6,
+        description="m; of one displacement of the log against the chord: spindle and last digit of a log in 0.001 mm",
+    )
+    section_blocks: int = Field(
+        96, description="block means a photo; four per shape function, so that noise and misfit are measured apart"
+    )
+    shape_functions: int = Field(
+        20, description="Legendre polynomials a photo; resolves a kink to L / 20, and 7 photos stay a 150-row problem"
+    )
+    noise_stretches: tuple[float, ...] = Field(
+        (0.35, 0.6, 1.0, 1.7, 2.8, 4.5),
+        description="trial factors of the stated correlation length, a grid of ratio 1.7",
+    )
+    noise_prior_weight: float = Field(
+        20.0, description="samples; what the noise level stated by the photos counts for against the level seen"
+    )
+
+    # detection
+    false_alarm: float = Field(0.01, description="probability of naming anything on a specimen without effect")
+    alien_false_alarm: float = Field(
+        0.003, description="probability of `unexplained` on a specimen without effect; on top of false_alarm"
+    )
+    null_draws: int = Field(20000, description="draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma")
+    power: float = Field(0.9, description="probability at which the minimal detectable effect is stated")
+    visible: float = Field(1e-3, description="surviving fraction below which a cause counts as invisible here")
+    seed: int = Field(20240229, description="of every simulated distribution, so that a report repeats to the digit")
+    bootstrap: int = Field(
+        40, description="refits of simulated data that confirm a score near its threshold; each costs one base fit"
+    )
+    bootstrap_margin: float = Field(
+        1.0, description="sigma; the bootstrap is asked where the largest score is this close to the threshold"
+    )
+
+    # naming
+    twin_cosine: float = Field(0.95, description="|cos| above which two causes are one class, diagnosis.md F")
+    set_level: float = Field(0.95, description="probability the set of possible causes contains the true one")
+    refit_margin: float = Field(
+        0.35, description="share of the best linear chi-square gain a cause may fall short of and still be refitted"
+    )
+    refit_least: float = Field(
+        30.0, description="chi-square a cause may always fall short of the best and still be refitted"
+    )
+    refit_most: int = Field(12, description="causes refitted at most, best linear scores first; time")
+    shapes_most: int = Field(3, description="directions of one cause that are combined in a refit at most")
+    shape_gain: float = Field(
+        16.0, description="chi-square by which a further direction of the same cause must pay (4 sigma)"
+    )
+    pair_collinear: float = Field(0.985, description="|cos| above which the split between two causes is noise")
+    pairs_refitted: int = Field(6, description="best pairs of the exhaustive linear search that are refitted; time")
+    pair_share: float = Field(
+        0.02,
+        description="share of the chi-square the first cause removes that the second must remove besides being significant",
+    )
+    explained_share: float = Field(
+        0.10, description="share of the excess misfit a named model may leave; more is `unexplained`"
+    )
+    implausible: float = Field(
+        4.0, description="multiples of the plausible size from which a cause loses probability, by the inverse square"
+    )
+
+    # base model
+    knots_most: int = Field(7, description="control points of the base characteristic at most; more would eat causes")
+    knot_gain: float = Field(
+        16.0,
+        description="chi-square that another control point must remove, beyond what any cause removes, to be taken",
+    )
+    grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
+    iterations: int = Field(12, description="Gauss-Newton steps at most; three to five are usual")
+    tolerance: float = Field(1e-3, description="change of chi-square at which a fit is done; 1 is one sigma")
+
+    # data faults
+    fault_sigma: float = Field(6.0, description="sigma; a photo or force this far from what the others say is a fault")
+    chord_mismatch: float = Field(
+        0.15,
+        description="share of the travel; mean mismatch of chord and displacement from which order or unit is doubted",
+    )
+    doubled_sigma: float = Field(
+        4.0, description="sigma; two photos closer than this in every coordinate are one photo"
+    )
+    length_mismatch: float = Field(
+        0.01, description="relative; traced against stated length from which length_mm is doubted"
+    )
+
+    # blind spots
+    harm: float = Field(0.005, description="relative change of f_EI from which an invisible cause is worth a warning")

@@ -1,0 +1,178 @@
+"""What the camera gets wrong: scale, radial distortion, tilt.
+
+All three move points on the plane of the cable, seen from the centre of the picture: true place ``p`` (relative to the
+centre, m) goes to the place that the photo with its stated scale claims. Bearings and cable are moved alike and the chord
+frame is laid through the moved bearings, so chord and shape change together.
+
+    scale_error      p -> p / (1 + e)                       e: stated px/mm over true px/mm, minus 1
+    lens_distortion  p -> p (1 + k1 |p|^2 / R^2)            R: half the picture's diagonal on the plane
+    camera_tilt      p -> p / (1 + g . p)                   g: perspective terms along and across the chord, 1/m
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.prediction import Facts, Model, Observer, Prediction
+
+Array = NDArray[np.float64]
+Move = Callable[[Array, Array], tuple[Array, Array]]
+
+
+def seen_through(move: Move) -> Observer:
+    """Observer whose camera shows the point (x, y), counted from the centre of the picture, at ``move(x, y)``."""
+
+    def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        centre = facts.picture_centre
+        chord = prediction.chord[:, None]
+        # the two bearings travel as two more points; a short tangent at every point carries its direction along
+        x = np.hstack([np.zeros_like(chord), chord, prediction.x]) - centre[:, :1]
+        y = np.hstack([np.zeros_like(chord), np.zeros_like(chord), prediction.y]) - centre[:, 1:]
+        direction = np.hstack([np.zeros_like(chord), np.zeros_like(chord), prediction.theta])
+        reach = 1e-4 * facts.length
+        seen_x, seen_y = move(x, y)
+        tip_x, tip_y = move(x + reach * np.cos(direction), y + reach * np.sin(direction))
+        span_x, span_y = seen_x[:, 1] - seen_x[:, 0], seen_y[:, 1] - seen_y[:, 0]
+        roll = np.arctan2(span_y, span_x)[:, None]
+        rel_x, rel_y = seen_x[:, 2:] - seen_x[:, :1], seen_y[:, 2:] - seen_y[:, :1]
+        turned = np.arctan2(tip_y - seen_y, tip_x - seen_x)[:, 2:] - roll
+        return replace(
+            prediction,
+            chord=np.hypot(span_x, span_y),
+            x=np.cos(roll) * rel_x + np.sin(roll) * rel_y,
+            y=np.cos(roll) * rel_y - np.sin(roll) * rel_x,
+            # the direction is kept on the branch of the true one: slopes may pass 90 degrees
+            theta=prediction.theta + np.angle(np.exp(1j * (turned - prediction.theta))),
+        )
+
+    return observer
+
+
+def scaled(error: float) -> Observer:
+    """Observer whose stated px/mm is ``1 + error`` times the true one: all lengths and the chord shrink by that."""
+    factor = 1.0 / (1.0 + error)
+
+    def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        return replace(
+            prediction,
+            chord=factor * prediction.chord,
+            s=factor * prediction.s,
+            x=factor * prediction.x,
+            y=factor * prediction.y,
+        )
+
+    return observer
+
+
+@dataclass(frozen=True)
+class ScaleError:
+    """``scale_error``: the stated px/mm is not the true one."""
+
+    name: str = "scale_error"
+    unit: str = "-"
+    sign: int = 0
+    combines: bool = False
+    seat: str = "camera"
+    needs: str = "the cable's length or the displacement log to compare with"
+    summary: str = "The scale of the photos (px/mm) is off, so every photographed length and curvature is off alike."
+    sign_means: str = "positive: the stated px/mm is larger than the true one and the photos show everything too small"
+    apart: str = (
+        "It scales chord, chord change and traced length by one factor. length_error leaves the chord change right; "
+        "lens_distortion and camera_tilt grow away from the centre of the picture."
+    )
+    remedy: str = "Photograph a scale or a chessboard in the plane of the cable axis and give it as calibration."
+    settled_by: str = "a chessboard photo in the plane of the cable"
+
+    def plausible(self, facts: Facts) -> float:
+        """One percent: a scale read from a ruler one cable radius off the plane."""
+        return 0.01
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form."""
+        return PLAIN
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Everything the camera sees shrinks by ``1 + amount``."""
+        return model.observed(scaled(amount))
+
+
+@dataclass(frozen=True)
+class LensDistortion:
+    """``lens_distortion``: radial distortion left in the photos."""
+
+    name: str = "lens_distortion"
+    unit: str = "-"
+    sign: int = 0
+    combines: bool = False
+    seat: str = "camera"
+    needs: str = "the cable away from the centre of the picture"
+    summary: str = "The lens magnifies the rim of the picture otherwise than its centre (barrel or cushion)."
+    sign_means: str = "positive: cushion, the rim is shown too far out; negative: barrel"
+    apart: str = (
+        "It bends straight lines, most near the rim: the ends of the cable and the bow change against the middle. "
+        "camera_tilt is one-sided, scale_error uniform."
+    )
+    remedy: str = (
+        "Calibrate the lens with ten or more chessboard photos, or move the camera back and use a longer lens."
+    )
+    settled_by: str = "a straight edge photographed along the rim, or a lens calibration"
+
+    def plausible(self, facts: Facts) -> float:
+        """One percent at half the diagonal: a common zoom lens."""
+        return 0.01
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form."""
+        return PLAIN
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Points move out by ``amount`` times the cube of their distance from the centre."""
+        square = facts.half_diagonal**2
+
+        def move(x: Array, y: Array) -> tuple[Array, Array]:
+            grow = 1.0 + amount * (x * x + y * y) / square
+            return x * grow, y * grow
+
+        return model.observed(seen_through(move))
+
+
+@dataclass(frozen=True)
+class CameraTilt:
+    """``camera_tilt``: the camera does not look straight down."""
+
+    name: str = "camera_tilt"
+    unit: str = "1/m"
+    sign: int = 0
+    combines: bool = True
+    seat: str = "camera"
+    needs: str = "photos of different chords, or the cable's length"
+    summary: str = "The camera looks askew, so the scale changes across the picture."
+    sign_means: str = "positive: the scale falls toward the moved-to side (along x) or toward the bow (along y)"
+    apart: str = (
+        "It makes one side of the picture larger than the other: left against right half, or bow against chord. "
+        "A cable turned end for end keeps a tilt's trace and reverses that of a varying pre-curvature."
+    )
+    remedy: str = "Level the camera over the table, or give one chessboard photo in the plane of the cable."
+    settled_by: str = "a chessboard photo in the plane of the cable"
+
+    def plausible(self, facts: Facts) -> float:
+        """Two degrees seen from twice the cable's length."""
+        return float(np.tan(np.radians(2.0)) / (2.0 * facts.length))
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Tilt along and across the chord."""
+        return (Variant("along the chord", at=0.0), Variant("across the chord", at=1.0))
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """The scale falls by ``amount`` per metre along (``at`` 0) or across (``at`` 1) the chord."""
+
+        def move(x: Array, y: Array) -> tuple[Array, Array]:
+            shrink = 1.0 + amount * (y if variant.at > 0.5 else x)
+            return x / shrink, y / shrink
+
+        return model.observed(seen_through(move))

@@ -1,0 +1,99 @@
+"""What a cause is: one small frozen class that can be put into a model, and can explain itself.
+
+A cause has one amount (in `unit`) and one or more variants: what is scanned because it has no meaning without the cause,
+such as the place of a soft spot or a relaxation time. ``amount = 0`` leaves every model as it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from pipeline.diagnosis.prediction import Facts, Model
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One form of a cause.
+
+    Attributes
+    ----------
+    label : str
+        In words, as it completes "pre_curvature_varying, ...".
+    at, width : float
+        What the form needs to know: place and width in shares of the length, time in s, curvature in 1/m.
+    tuned : tuple of str
+        Which of ``at`` and ``width`` a refit may change.
+    at_range, width_range : (low, high)
+        Where they may go.
+    """
+
+    label: str = ""
+    at: float = 0.0
+    width: float = 0.0
+    tuned: tuple[str, ...] = ()
+    at_range: tuple[float, float] = (0.0, 1.0)
+    width_range: tuple[float, float] = (0.0, 1.0)
+
+    def range(self, name: str) -> tuple[float, float]:
+        """Range of ``at`` or ``width``."""
+        return self.at_range if name == "at" else self.width_range
+
+    def scale(self, name: str) -> float:
+        """Size of a large change of ``at`` or ``width``."""
+        low, high = self.range(name)
+        return high - low
+
+
+PLAIN = (Variant(),)
+
+
+class Cause(Protocol):
+    """A candidate for what the simulation gets wrong.
+
+    Attributes
+    ----------
+    name : str
+        Of the contract's table.
+    unit : str
+        Of the amount.
+    sign : int
+        1 if the amount cannot be negative, 0 if it can.
+    combines : bool
+        Whether several forms may act together (a profile along the cable is a sum of forms).
+    seat : str
+        Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first kind only.
+    needs : str
+        What the data must have for the cause to show at all, in words.
+    summary : str
+        What it is.
+    sign_means : str
+        What a positive amount means.
+    apart : str
+        What separates it from its twins.
+    remedy : str
+        What to do at the rig.
+    settled_by : str
+        The measurement that settles it, as few words.
+    """
+
+    name: str
+    unit: str
+    sign: int
+    combines: bool
+    seat: str
+    needs: str
+    summary: str
+    sign_means: str
+    apart: str
+    remedy: str
+    settled_by: str
+
+    def plausible(self, facts: Facts) -> float:
+        """Size (positive, in `unit`) that would surprise nobody on such a rig."""
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Forms to be tried; empty where the data cannot show the cause at all."""
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """The model with the cause in it."""

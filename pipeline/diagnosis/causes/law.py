@@ -1,0 +1,136 @@
+"""What the characteristic may be beyond the base model: its form, friction between the wires, and set.
+
+nonlinear_stiffness  another control point: f_EI has a form the spline of the base model cannot follow
+hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
+plastic_set          K0 grows with the largest curvature reached (see `rod.section`)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.prediction import Facts, Model
+from rod.characteristic import Characteristic
+from rod.section import InternalFriction
+
+
+@dataclass(frozen=True)
+class NonlinearStiffness:
+    """``nonlinear_stiffness``: the bending stiffness depends on curvature in another way than the model's."""
+
+    name: str = "nonlinear_stiffness"
+    unit: str = "N m^2"
+    sign: int = 0
+    combines: bool = True
+    seat: str = "cable"
+    needs: str = "steps of different curvature"
+    summary: str = "The bending stiffness depends on curvature, or does so in another form than the spline allows."
+    sign_means: str = "positive: stiffer at the named curvature than the spline between its control points"
+    apart: str = "The same law then holds for every photo, both halves and both branches; no other cause keeps to that."
+    remedy: str = "None is needed: give the characteristic more control points, or bend in smaller steps."
+    settled_by: str = "more displacement steps"
+
+    def plausible(self, facts: Facts) -> float:
+        """Five percent of the stiffness."""
+        return 0.05 * facts.moment_scale / facts.curvature_scale
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """A change around one of five places of the range of curvatures."""
+        return tuple(
+            Variant("at a part of the range of curvatures", at=place, tuned=("at",), at_range=(0.02, 0.98))
+            for place in (0.1, 0.3, 0.5, 0.7, 0.9)
+        )
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """One more control point at the share ``at`` of the spline's range, ``amount`` off the spline so far."""
+        law = model.bending.characteristic
+        if not isinstance(law, Characteristic):
+            raise ValueError("only a spline characteristic can be given another control point")
+        low, high = (law.knots[0], law.knots[-1]) if law.knots.size > 1 else (0.0, facts.curvature_scale)
+        here = low + variant.at * (high - low)
+        knots = law.knots if law.knots.size > 1 else np.array([low, high])
+        # a natural spline through points of a natural spline is that spline: without an amount nothing changes
+        ordinates = law.f(np.append(knots, here))
+        ordinates[-1] += amount
+        closest = float(np.min(np.abs(knots - here)))
+        if closest < 1e-3 * (high - low):
+            knots, ordinates = knots.copy(), ordinates[:-1]
+            ordinates[int(np.argmin(np.abs(knots - here)))] += amount
+            changed = Characteristic(knots, ordinates, law.reading, law.even, law.abscissa)
+        else:
+            order = np.argsort(np.append(knots, here))
+            changed = Characteristic(
+                np.append(knots, here)[order], ordinates[order], law.reading, law.even, law.abscissa
+            )
+        return replace(model, bending=replace(model.bending, characteristic=changed))
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """``hysteresis``: friction between the wires."""
+
+    name: str = "hysteresis"
+    unit: str = "N m"
+    sign: int = 1
+    combines: bool = False
+    seat: str = "cable"
+    needs: str = "an unloading branch"
+    summary: str = "Wires rub on each other: the moment depends on the way the cable was bent to its shape."
+    sign_means: str = "half the width of the loop of moment over curvature"
+    apart: str = (
+        "It acts wherever the curvature changes, most in the middle; bearing friction acts at the ends only and bends "
+        "them; plastic set does not close the loop when the force is gone."
+    )
+    remedy: str = "Measure loading and unloading; cycle a few times first; report both branches."
+    settled_by: str = "unloading in the same steps"
+
+    def plausible(self, facts: Facts) -> float:
+        """A tenth of the largest moment."""
+        return 0.1 * facts.moment_scale
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Loops with sharp to round corners: slip after 5, 20 and 60 % of the range of curvatures."""
+        reach = (0.01 * facts.curvature_scale, 2.0 * facts.curvature_scale)
+        return tuple(
+            Variant("slipping", at=share * facts.curvature_scale, tuned=("at",), at_range=reach)
+            for share in (0.05, 0.2, 0.6)
+        )
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Friction of half width ``amount`` that slips after a curvature change ``at``."""
+        friction = InternalFriction(max(amount, 0.0), variant.at)
+        return replace(model, bending=replace(model.bending, friction=friction))
+
+
+@dataclass(frozen=True)
+class PlasticSet:
+    """``plastic_set``: K0 grows with the largest curvature reached."""
+
+    name: str = "plastic_set"
+    unit: str = "1/m per 1/m"
+    sign: int = 1
+    combines: bool = False
+    seat: str = "cable"
+    needs: str = "an unloading branch or a force-free photo after bending"
+    summary: str = "Bending leaves the cable bent: the pre-curvature grows with the largest curvature reached."
+    sign_means: str = "growth of the pre-curvature per curvature reached"
+    apart: str = (
+        "After unloading the cable stays more bent than before; with friction alone small vibrations undo that."
+    )
+    remedy: str = "Photograph the force-free cable before and after the test; bend less."
+    settled_by: str = "a photo of the force-free cable after the test"
+
+    def plausible(self, facts: Facts) -> float:
+        """A twentieth of the curvature stays."""
+        return 0.05
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form."""
+        return PLAIN
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Let ``amount`` of the largest excess curvature stay."""
+        return replace(model, bending=replace(model.bending, plastic_rate=amount))

@@ -1,0 +1,171 @@
+"""What the load cell gets wrong, and what the force does while a step is held.
+
+    force_offset  shown = F + a
+    force_gain    shown = F (1 + a)
+    force_drift   shown = F + a t                            t: since the first hold began
+    relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; tau is scanned
+
+Relaxation belongs to the cable, but as it scales moments everywhere alike it changes forces only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.prediction import Facts, Model, Observer, Prediction
+
+Array = NDArray[np.float64]
+
+
+def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:
+    """Observer whose load cell shows ``reading(force, time in the hold, time of the hold's begin)``."""
+
+    def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        samples = tuple(
+            reading(force, times, float(clock))
+            for force, times, clock in zip(prediction.samples, facts.hold_times, facts.clock, strict=True)
+        )
+        photo = [
+            float(reading(prediction.force[i : i + 1], facts.photo_time[i : i + 1], float(facts.clock[i]))[0])
+            for i in range(len(prediction.force))
+        ]
+        return replace(prediction, force=np.array(photo), samples=samples)
+
+    return observer
+
+
+@dataclass(frozen=True)
+class ForceOffset:
+    """``force_offset``: the load cell was not zeroed."""
+
+    name: str = "force_offset"
+    unit: str = "N"
+    sign: int = 0
+    combines: bool = False
+    seat: str = "load cell"
+    needs: str = "a force reading of the force-free cable, or large changes of the bow"
+    summary: str = "The load cell shows a constant force too much or too little."
+    sign_means: str = "positive: every reading is too high by this much"
+    apart: str = (
+        "A reading of the force-free cable shows it at once. Without one, loads in the plane and a varying "
+        "pre-curvature leave nearly the same trace."
+    )
+    remedy: str = "Zero the load cell with the cable taken out, and log a reading of the mounted, force-free cable."
+    settled_by: str = "one reading with the cable taken out"
+
+    def plausible(self, facts: Facts) -> float:
+        """Two percent of the largest force."""
+        return 0.02 * facts.force_scale
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form."""
+        return PLAIN
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Add ``amount`` to every reading."""
+        return model.observed(shown(lambda force, time, begin: force + amount))
+
+
+@dataclass(frozen=True)
+class ForceGain:
+    """``force_gain``: the load cell's calibration is off."""
+
+    name: str = "force_gain"
+    unit: str = "-"
+    sign: int = 0
+    combines: bool = False
+    seat: str = "load cell"
+    needs: str = "nothing helps: it is the scale of EI itself"
+    summary: str = "The load cell shows all forces too large or too small by one factor."
+    sign_means: str = "positive: readings are too high by this share"
+    apart: str = "Nothing in a bending test does: forces scale with EI, shapes do not change."
+    remedy: str = "Hang known weights on the load cell."
+    settled_by: str = "dead weights on the load cell"
+
+    def plausible(self, facts: Facts) -> float:
+        """One percent: a load cell a few years after its calibration."""
+        return 0.01
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form."""
+        return PLAIN
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Multiply every reading by ``1 + amount``."""
+        return model.observed(shown(lambda force, time, begin: force * (1.0 + amount)))
+
+
+@dataclass(frozen=True)
+class ForceDrift:
+    """``force_drift``: the load cell drifts with time."""
+
+    name: str = "force_drift"
+    unit: str = "N/s"
+    sign: int = 0
+    combines: bool = False
+    seat: str = "load cell"
+    needs: str = "times in the force log"
+    summary: str = "The load cell's zero wanders steadily while the test runs."
+    sign_means: str = "positive: readings rise with time"
+    apart: str = (
+        "The same slope in every hold, whatever the force, also in the force-free one. Relaxation is "
+        "proportional to the force and fades within each hold."
+    )
+    remedy: str = "Let the load cell warm up, read it with the cable taken out before and after the test."
+    settled_by: str = "readings with the cable taken out before and after"
+
+    def plausible(self, facts: Facts) -> float:
+        """Two percent of the largest force over the test."""
+        span = float(np.max(facts.clock)) if facts.timed else 0.0
+        return 0.02 * facts.force_scale / span if span > 0.0 else 0.02 * facts.force_scale
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """One form, if the log has times."""
+        return PLAIN if facts.timed else ()
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Add ``amount`` times the time since the first hold began."""
+        return model.observed(shown(lambda force, time, begin: force + amount * (begin + time)))
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """``relaxation``: the force decays while a step is held."""
+
+    name: str = "relaxation"
+    unit: str = "-"
+    sign: int = 1
+    combines: bool = False
+    seat: str = "cable"
+    needs: str = "several force samples, with times, in every hold"
+    summary: str = "The cable gives way while a step is held: the force decays toward a smaller value."
+    sign_means: str = "share of the force that is lost if the step is held for long"
+    apart: str = "The decay starts anew in every hold, is proportional to the force and fades. Drift does none of that."
+    remedy: str = (
+        "Hold every step equally long and take photo and force at the same time after the move; or wait longer."
+    )
+    settled_by: str = "one step held ten times longer"
+
+    def plausible(self, facts: Facts) -> float:
+        """Five percent."""
+        return 0.05
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Relaxation times from a tenth of a hold to three holds."""
+        span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
+        if not facts.timed or span <= 0.0:
+            return ()
+        return tuple(
+            Variant(f"relaxation time {share * span:.3g} s", at=share * span) for share in (0.1, 0.3, 1.0, 3.0)
+        )
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time."""
+        return model.observed(
+            shown(lambda force, time, begin: force * (1.0 - amount * (1.0 - np.exp(-time / variant.at))))
+        )

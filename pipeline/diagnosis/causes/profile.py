@@ -1,0 +1,129 @@
+"""What changes along the cable: pre-curvature K0(s) and bending stiffness EI(s).
+
+Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of mean zero and largest absolute value one, so the
+amount is the largest deviation from the mean. Forms: growing along the cable, more (or less) in the middle than at the
+ends, S-shaped, and a spot at a place that is found by scanning. Several forms may add up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.prediction import Facts, Model
+
+Array = NDArray[np.float64]
+
+PLACES = (0.15, 0.325, 0.5, 0.675, 0.85)
+SPOT_WIDTH = 0.07
+"""Standard deviation of a spot in shares of the length: a splice or a kink of two to three diameters; tuned in a refit."""
+
+
+def forms() -> tuple[Variant, ...]:
+    """Forms of a profile; spots may move and widen in a refit."""
+    spots = tuple(
+        Variant(
+            "in a spot",
+            at=place,
+            width=SPOT_WIDTH,
+            tuned=("at", "width"),
+            at_range=(0.03, 0.97),
+            width_range=(0.015, 0.2),
+        )
+        for place in PLACES
+    )
+    return (
+        Variant("growing along the cable"),
+        Variant("other in the middle than at the ends", at=2.0),
+        Variant("other in one half than in the other", at=3.0),
+        *spots,
+    )
+
+
+def profile(variant: Variant, position: Array) -> Array:
+    """``phi`` at relative positions 0..1 that sample the cable evenly."""
+    if variant.width > 0.0:
+        values = np.exp(-0.5 * ((position - variant.at) / variant.width) ** 2)
+    elif variant.at == 2.0:
+        values = -np.cos(2.0 * np.pi * position)
+    elif variant.at == 3.0:
+        values = np.sin(2.0 * np.pi * position)
+    else:
+        values = 2.0 * position - 1.0
+    deviation = values - np.mean(values)
+    return np.asarray(deviation / np.max(np.abs(deviation)))
+
+
+def position_of(model: Model) -> Array:
+    """Relative position 0..1 of the joints on the free cable."""
+    return np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
+
+
+@dataclass(frozen=True)
+class PreCurvatureVarying:
+    """``pre_curvature_varying``: the cable is bent at rest, but not uniformly."""
+
+    name: str = "pre_curvature_varying"
+    unit: str = "1/m"
+    sign: int = 0
+    combines: bool = True
+    seat: str = "cable"
+    needs: str = "photos; a photo of the force-free cable shows it directly"
+    summary: str = "The pre-curvature varies along the cable: set from the spool, or a kink."
+    sign_means: str = "positive: more bent at rest toward the right end, in the middle, or in the spot"
+    apart: str = (
+        "It is there without any force. A load in the plane or a varying stiffness shows under load only; "
+        "turned end for end, the cable takes it along, the table does not."
+    )
+    remedy: str = "Photograph the force-free cable; straighten it, or cut a piece away from the kink."
+    settled_by: str = "a photo of the force-free cable"
+
+    def plausible(self, facts: Facts) -> float:
+        """A change of direction of a tenth of a radian over the cable."""
+        return 0.1 / facts.length
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Profiles along the cable."""
+        return forms()
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Add ``amount * phi`` to the pre-curvature."""
+        rest = model.bending.rod.section.pre_curvature + amount * profile(variant, position_of(model))
+        return replace(model, bending=replace(model.bending, pre_curvature=rest))
+
+
+@dataclass(frozen=True)
+class StiffnessVarying:
+    """``stiffness_varying``: the cable is not equally stiff everywhere."""
+
+    name: str = "stiffness_varying"
+    unit: str = "-"
+    sign: int = 0
+    combines: bool = True
+    seat: str = "cable"
+    needs: str = "photos under load"
+    summary: str = "The bending stiffness varies along the cable: a soft spot, a splice, a stiff label."
+    sign_means: str = "positive: stiffer toward the right end, in the middle, or in the spot; relative to the mean"
+    apart: str = (
+        "Nothing of it shows without force, and its trace grows with the moment, while a varying pre-curvature is there "
+        "from the start. Turned end for end, the cable takes it along."
+    )
+    remedy: str = "Turn the cable end for end and repeat; look for the spot; test a uniform piece."
+    settled_by: str = "the same test with the cable turned end for end"
+
+    def plausible(self, facts: Facts) -> float:
+        """A tenth."""
+        return 0.1
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Profiles along the cable."""
+        return forms()
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Multiply the moments by ``1 + amount * phi``; never below a twentieth."""
+        given = model.bending.rod.section.profile
+        factor = 1.0 + amount * profile(variant, position_of(model)) + (0.0 if given is None else given - 1.0)
+        return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, 0.05)))

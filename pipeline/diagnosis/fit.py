@@ -1,0 +1,264 @@
+"""Fit of a model to an observation: Gauss-Newton on whitened residuals, with causes added to the base model or not.
+
+``Extension`` is the base model with terms (a cause in one of its forms); its parameter vector is the base's, then for
+each term its amount and whatever of the form is tuned along. Rows of the residual: the observation's, then one per
+parameter with prior knowledge. Nothing here raises for a model without equilibrium: the step is shortened, and a fit
+that cannot start says so in ``Fit.advice``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.base import Base
+from pipeline.diagnosis.causes.cause import Cause, Variant
+from pipeline.diagnosis.observation import Observation, residual
+from pipeline.diagnosis.prediction import Facts, Model, Run, run
+
+Array = NDArray[np.float64]
+
+
+class Term(NamedTuple):
+    """A cause in one of its forms."""
+
+    cause: Cause
+    variant: Variant
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """Base model and the terms added to it."""
+
+    base: Base
+    facts: Facts
+    terms: tuple[Term, ...] = ()
+
+    @property
+    def owners(self) -> tuple[int, ...]:
+        """Position in the vector of each term's amount."""
+        at, first = [], len(self.base.names)
+        for term in self.terms:
+            at.append(first)
+            first += 1 + len(term.variant.tuned)
+        return tuple(at)
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self.base.names) + sum(1 + len(term.variant.tuned) for term in self.terms)
+
+    @property
+    def prior_std(self) -> Array:
+        """Standard deviations (p,) of the priors."""
+        return np.r_[self.base.prior_std, np.full(self.size - len(self.base.names), np.inf)]
+
+    @property
+    def steps(self) -> Array:
+        """Steps (p,) of difference quotients."""
+        added: list[float] = []
+        for term in self.terms:
+            added.append(1e-3 * term.cause.plausible(self.facts))
+            added.extend(1e-3 * term.variant.scale(name) for name in term.variant.tuned)
+        return np.r_[self.base.steps(self.facts), added]
+
+    def start(self, vector: Array, amounts: tuple[float, ...]) -> Array:
+        """Vector of this extension from one of the base model and an amount for each term."""
+        parts = [vector[: len(self.base.names)]]
+        for term, amount in zip(self.terms, amounts, strict=True):
+            parts.append(np.r_[amount, [getattr(term.variant, name) for name in term.variant.tuned]])
+        return np.concatenate(parts)
+
+    def model(self, vector: Array, *, of: Model | None = None) -> Model:
+        """The model at a vector; ``of`` is the base model there, where it is known already."""
+        model = self.base.model(vector) if of is None else of
+        for at, term in zip(self.owners, self.terms, strict=True):
+            tuned = {name: float(vector[at + 1 + j]) for j, name in enumerate(term.variant.tuned)}
+            model = term.cause.apply(model, float(vector[at]), replace(term.variant, **tuned), self.facts)
+        return model
+
+    def admissible(self, vector: Array) -> bool:
+        """Whether the vector describes a possible cable; signs of amounts are judged after the fit, not here."""
+        if not self.base.admissible(vector):
+            return False
+        for at, term in zip(self.owners, self.terms, strict=True):
+            if term.cause.sign * vector[at] < 0.0:
+                return False
+            for j, name in enumerate(term.variant.tuned):
+                low, high = term.variant.range(name)
+                if not low <= vector[at + 1 + j] <= high:
+                    return False
+        return True
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted model.
+
+    Attributes
+    ----------
+    extension : Extension
+    vector : (p,)
+    run : Run
+    residual : (N,)
+        Whitened, prior rows last.
+    jacobian : (N, p)
+        Sensitivities of the model: ``d residual = - jacobian d vector``; prior rows ``1 / std``.
+    converged : bool
+    advice : str
+        Why there is no fit, or what stopped it.
+    """
+
+    extension: Extension
+    vector: Array
+    run: Run
+    residual: Array
+    jacobian: Array
+    converged: bool
+    advice: str = ""
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares, priors included."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the parameters; invisible combinations get a huge variance, not an infinite one."""
+        size = np.linalg.norm(self.jacobian, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        _, weight, right = np.linalg.svd(self.jacobian / size, full_matrices=False)
+        root = right.T / np.maximum(weight, 1e-8 * weight[0])
+        return np.asarray((root @ root.T) / np.outer(size, size))
+
+    def amount(self, term: int) -> tuple[float, float]:
+        """Amount of a term and its standard deviation."""
+        at = self.extension.owners[term]
+        return float(self.vector[at]), float(np.sqrt(self.covariance[at, at]))
+
+
+def prior_rows(vector: Array, std: Array) -> Array:
+    """Residual rows of the parameters with prior knowledge (all priors are centred at zero)."""
+    known = np.isfinite(std)
+    return -vector[known] / std[known]
+
+
+def whole_residual(observation: Observation, run_: Run, vector: Array, std: Array) -> Array | None:
+    """Residual with prior rows; None where the model has no equilibrium."""
+    if run_.prediction is None:
+        return None
+    return np.r_[residual(observation, run_.prediction), prior_rows(vector, std)]
+
+
+def sensitivities(observation: Observation, extension: Extension, vector: Array, here: Run) -> Array:
+    """Jacobian (N, p) of the model by difference quotients with warm starts, prior rows included.
+
+    A quotient that runs into a model without equilibrium is taken to the other side.
+    """
+    std = extension.prior_std
+    at_here = whole_residual(observation, here, vector, std)
+    assert at_here is not None
+    base_model = extension.base.model(vector)
+    columns = []
+    for j, step in enumerate(extension.steps):
+        column = np.zeros_like(at_here)
+        for signed in (step, -step):
+            moved = vector.copy()
+            moved[j] += signed
+            model = extension.model(moved, of=base_model if j >= len(extension.base.names) else None)
+            there = whole_residual(observation, run(model, extension.facts, near=here), moved, std)
+            if there is not None and extension.admissible(moved):
+                column = (at_here - there) / signed
+                break
+        columns.append(column)
+    return np.column_stack(columns)
+
+
+def fit(
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    *,
+    iterations: int,
+    tolerance: float,
+    near: Run | None = None,
+) -> Fit:
+    """Gauss-Newton with shortened steps from ``start``.
+
+    Parameters
+    ----------
+    observation : Observation
+    extension : Extension
+    start : (p,)
+    iterations : int
+        At most.
+    tolerance : float
+        Fall of chi-square at which the fit is done.
+    near : Run or None
+        Run of a similar model, for warm starts.
+
+    Returns
+    -------
+    Fit
+        ``converged`` is False if the iterations ran out or the start has no equilibrium.
+    """
+    std = extension.prior_std
+    vector = np.asarray(start, dtype=float)
+    here = run(extension.model(vector), extension.facts, near=near)
+    value = whole_residual(observation, here, vector, std)
+    if value is None:
+        empty = np.zeros((0, extension.size))
+        return Fit(extension, vector, here, np.zeros(0), empty, False, here.advice)
+    jacobian = sensitivities(observation, extension, vector, here)
+    converged = False
+    for _ in range(iterations):
+        step, expected = _step(jacobian, value)
+        if expected < tolerance:
+            converged = True
+            break
+        accepted = None
+        for _ in range(8):
+            trial = _inside(extension, vector, vector + step)
+            there = run(extension.model(trial), extension.facts, near=here)
+            found = whole_residual(observation, there, trial, std)
+            if found is not None and found @ found < value @ value:
+                accepted = (trial, there, found)
+                break
+            step = 0.4 * step
+        if accepted is None:
+            converged = expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
+            break
+        fall = float(value @ value - accepted[2] @ accepted[2])
+        vector, here, value = accepted
+        jacobian = sensitivities(observation, extension, vector, here)
+        if fall < tolerance:
+            converged = True
+            break
+    return Fit(extension, vector, here, value, jacobian, converged, "" if converged else "the fit did not settle")
+
+
+def _step(jacobian: Array, value: Array) -> tuple[Array, float]:
+    """Gauss-Newton step and the fall of chi-square the linear model expects of it."""
+    size = np.linalg.norm(jacobian, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    left, weight, right = np.linalg.svd(jacobian / size, full_matrices=False)
+    kept = weight > 1e-7 * weight[0]
+    along = left.T[kept] @ value
+    step = right.T[:, kept] @ (along / weight[kept])
+    return step / size, float(along @ along)
+
+
+def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
+    """The trial, taken back into the admissible range: amounts and forms clipped, the rest by halving the step."""
+    clipped = trial.copy()
+    for at, term in zip(extension.owners, extension.terms, strict=True):
+        if term.cause.sign:
+            clipped[at] = term.cause.sign * max(term.cause.sign * clipped[at], 0.0)
+        for j, name in enumerate(term.variant.tuned):
+            clipped[at + 1 + j] = np.clip(clipped[at + 1 + j], *term.variant.range(name))
+    count = len(extension.base.knots)
+    clipped[:count] = np.maximum(clipped[:count], 0.2 * vector[:count])
+    return clipped

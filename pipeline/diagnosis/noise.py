@@ -1,0 +1,215 @@
+"""What the measurement scatters: covariance of the sections of a photo, and of the force samples of a hold.
+
+In: the raw midline sections of a `rod.measurement.MeasuredShape` and the samples of each hold. Out: block means of
+sections with their exact covariance, and the noise level of the load cell with the samples behind it. The residuals of a
+fit never set a variance here: only the part of a photo's scatter that no bent cable can follow (faster along s than
+the smooth basis of the comparison) does, so misfit cannot hide in it.
+
+Notation. A photo has sections with standard deviation sigma(s), correlation exp(-ds / l) and a slow sideways error
+(light) of standard deviation sigma_sys and correlation exp(-ds^2 / (2 l_sys^2)). ``m`` neighbouring sections at pitch D form a
+block; with rho = exp(-D / l) the block means have (AR(1) sums)
+
+    variance   sigma^2 / m^2 (m + 2 sum_{j=1}^{m-1} (m - j) rho^j)
+    covariance sigma^2 / m^2 rho^{m g} (sum_{j=0}^{m-1} rho^j) (sum_{j=0}^{m-1} rho^-j)      at g blocks apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, stats
+from scipy.interpolate import CubicHermiteSpline
+
+from rod.measurement import MeasuredShape, MeasuredStep
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sections:
+    """Block means of the midline sections of one photo, in the chord frame.
+
+    Attributes
+    ----------
+    s, x, y, theta : (k,) m, rad
+        Arc length, position and direction of the blocks.
+    std : (k,) m
+        Of a single section in the block, along the normal.
+    members : int
+        Sections in a block.
+    pitch : m
+        Distance of neighbouring sections.
+    correlation_length, systematic_std, systematic_length : m
+    """
+
+    s: Array
+    x: Array
+    y: Array
+    theta: Array
+    std: Array
+    members: int
+    pitch: float
+    correlation_length: float
+    systematic_std: float
+    systematic_length: float
+
+
+def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
+    """Average neighbouring sections: what is faster than the comparison can use becomes precision.
+
+    The deviation from the smooth centerline is averaged, not the position, so the bend within a block costs nothing.
+    Sections left over by the division are dropped at both ends alike.
+    """
+    order = np.argsort(shape.section_s, kind="stable")
+    s = shape.section_s[order]
+    curve_x = CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))
+    curve_y = CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))
+    theta = np.interp(s, shape.s, shape.theta)
+    across = -np.sin(theta) * (shape.section_x[order] - curve_x(s)) + np.cos(theta) * (
+        shape.section_y[order] - curve_y(s)
+    )
+    members = max(1, len(s) // blocks)
+    count = len(s) // members
+    first = (len(s) - count * members) // 2
+
+    def mean(values: Array) -> Array:
+        return np.asarray(values[first : first + count * members].reshape(count, members).mean(axis=1))
+
+    at, offset = mean(s), mean(across)
+    middle = np.interp(at, shape.s, shape.theta)
+    return Sections(
+        s=at,
+        x=curve_x(at) - np.sin(middle) * offset,
+        y=curve_y(at) + np.cos(middle) * offset,
+        theta=middle,
+        std=np.sqrt(mean(shape.section_std[order] ** 2)),
+        members=members,
+        pitch=float(np.median(np.diff(s))),
+        correlation_length=shape.correlation_length,
+        systematic_std=shape.systematic_std,
+        systematic_length=shape.systematic_length,
+    )
+
+
+def block_correlation(count: int, *, members: int, pitch: float, length: float) -> Array:
+    """Covariance (count, count) of means of ``members`` unit-variance sections with correlation exp(-ds / length)."""
+    rho = np.exp(-pitch / length) if length > 0.0 else 0.0
+    j = np.arange(1, members)
+    variance = (members + 2.0 * np.sum((members - j) * rho**j)) / members**2
+    gap = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    if rho == 0.0:
+        return np.asarray(variance * (gap == 0), dtype=float)
+    # rho^{m g} (sum rho^j)(sum rho^-j), written with exponents that are never negative
+    ramp = np.sum(rho ** np.arange(members))
+    near = np.sum(rho ** (members - 1 - np.arange(members)))
+    between = ramp * near * rho ** np.maximum(members * gap - (members - 1), 0) / members**2
+    return np.where(gap == 0, variance, between)
+
+
+def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: float = 1.0) -> Array:
+    """Covariance (k, k) of the block means: random part times ``factor``^2 at a stretched correlation, plus the slow part."""
+    random = block_correlation(
+        len(sections.s),
+        members=sections.members,
+        pitch=sections.pitch,
+        length=sections.correlation_length * stretch,
+    )
+    random *= factor**2 * np.outer(sections.std, sections.std)
+    if sections.systematic_std > 0.0:
+        apart = np.abs(np.subtract.outer(sections.s, sections.s))
+        random += sections.systematic_std**2 * np.exp(-0.5 * (apart / max(sections.systematic_length, 1e-12)) ** 2)
+    return random
+
+
+def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
+    """Legendre polynomials (k, functions) of ``s / length``: every misfit of a bent cable that the data can show."""
+    return np.polynomial.legendre.legvander(2.0 * s / length - 1.0, functions - 1)
+
+
+@dataclass(frozen=True)
+class PhotoNoise:
+    """Correction of the stated noise of sections: standard deviations times ``factor``, correlation length times ``stretch``."""
+
+    factor: float = 1.0
+    stretch: float = 1.0
+
+
+def calibrate_photo_noise(
+    residuals: list[Array],
+    sections: list[Sections],
+    bases: list[Array],
+    *,
+    stretches: tuple[float, ...],
+    prior_weight: float,
+) -> PhotoNoise:
+    """Noise level and correlation of the sections from what is faster along s than ``bases``.
+
+    Restricted maximum likelihood over all photos: the smooth basis is projected out, so neither a misfit of the model
+    nor a cause can raise the level.
+
+    Parameters
+    ----------
+    residuals : list of (k,) m
+        Normal distance of the block means from any smooth reference (the fitted cable).
+    sections, bases : lists
+        Per photo; bases (k, q) as of `smooth_basis`.
+    stretches : tuple of float
+        Trial factors of the stated correlation length.
+    prior_weight : float
+        Number of samples the stated level counts for.
+
+    Returns
+    -------
+    PhotoNoise
+    """
+    best, likelihood = PhotoNoise(), -np.inf
+    for stretch in stretches:
+        square, freedom, determinant = prior_weight, prior_weight, 0.0
+        for residual, block, basis in zip(residuals, sections, bases, strict=True):
+            contrast = linalg.qr(basis)[0][:, basis.shape[1] :]
+            inner = contrast.T @ section_covariance(block, stretch=stretch) @ contrast
+            root = linalg.cholesky(inner, lower=True)
+            square += float(np.sum(linalg.solve_triangular(root, contrast.T @ residual, lower=True) ** 2))
+            freedom += contrast.shape[1]
+            determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
+        value = -0.5 * (determinant + freedom * np.log(square / freedom))
+        if value > likelihood:
+            best, likelihood = PhotoNoise(float(np.sqrt(square / freedom)), stretch), value
+    return best
+
+
+@dataclass(frozen=True)
+class ForceNoise:
+    """Standard deviation of one force sample of each step (n,) N, and the samples behind it; 0 where none."""
+
+    std: Array
+    freedom: int
+
+
+def force_noise(steps: tuple[MeasuredStep, ...], *, floor: float, distinct: float) -> ForceNoise:
+    """Scatter of the samples within the holds, each hold with its own straight line in time.
+
+    One common level, unless the holds differ beyond chance (Bartlett's test at the level ``distinct``): then each hold
+    has its own. ``floor`` (N) bounds it from below: a log of few digits scatters by rounding.
+    """
+    squares, freedom = np.zeros(len(steps)), np.zeros(len(steps), dtype=int)
+    for i, step in enumerate(steps):
+        if step.hold_forces is None or len(step.hold_forces) < 4:
+            continue
+        line = np.ones((len(step.hold_forces), 1))
+        if step.hold_times is not None and np.ptp(step.hold_times) > 0.0:
+            line = np.vander((step.hold_times - step.hold_times.mean()) / np.ptp(step.hold_times), 2)
+        scatter = step.hold_forces - line @ np.linalg.lstsq(line, step.hold_forces, rcond=None)[0]
+        squares[i], freedom[i] = float(scatter @ scatter), len(scatter) - line.shape[1]
+    total = int(freedom.sum())
+    if total == 0:
+        return ForceNoise(np.maximum([step.force_std for step in steps], floor), 0)
+    pooled = squares.sum() / total
+    own = np.divide(squares, freedom, out=np.full(len(steps), pooled), where=freedom > 0)
+    used = freedom > 0
+    statistic = total * np.log(pooled) - np.sum(freedom[used] * np.log(np.maximum(own[used], 1e-300)))
+    differs = used.sum() > 1 and stats.chi2.sf(statistic, used.sum() - 1) < distinct
+    variance = own if differs else np.full(len(steps), pooled)
+    return ForceNoise(np.maximum(np.sqrt(variance), floor), total)

@@ -1,0 +1,220 @@
+"""From forces, displacements and photos to one whitened residual vector, and back to where its entries came from.
+
+Rows, block by block: force samples of every hold; for every photo the photographed chord and the shape, compared by
+position along the measured normal; one row for every nuisance parameter with prior knowledge. Each block is divided by
+the root of its measured covariance, so every entry has unit variance where nothing is wrong.
+
+The shape of one photo enters as its components along a smooth basis (generalised least squares, Legendre polynomials of
+``s / L``): faster variation is no bent cable's and only serves to measure the noise (`noise.calibrate_photo_noise`).
+The errors of the two bearing axes, which turn and shift the chord frame, are common to chord and shape of a photo and
+part of the joint covariance.
+
+Sign: residual = (data - model) / sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from pipeline.diagnosis.noise import (
+    PhotoNoise,
+    Sections,
+    block_means,
+    force_noise,
+    section_covariance,
+    smooth_basis,
+)
+from pipeline.diagnosis.prediction import Prediction
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredTest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Where the entries of the residual vector come from; all arrays (N,).
+
+    ``kind``: 0 force, 1 chord, 2 shape, 3 prior. ``step``: index of the step, -1 for priors.
+    """
+
+    kind: NDArray[np.int_]
+    step: NDArray[np.int_]
+
+
+KINDS = ("force", "chord", "shape", "prior")
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoData:
+    """One photo, ready to be compared.
+
+    Attributes
+    ----------
+    step : int
+        Index of the step.
+    sections : Sections
+    chord : m
+    basis : (k, q)
+        Smooth functions of the shape misfit.
+    whiten : (1 + q, 1 + k)
+        Acts on (chord residual, normal residuals).
+    """
+
+    step: int
+    sections: Sections
+    chord: float
+    basis: Array
+    whiten: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """All data of a test with their weights.
+
+    Attributes
+    ----------
+    forces : tuple of (h,) N
+        Samples by step.
+    force_std : (n,) N
+        Of one sample.
+    force_freedom : int
+        Samples behind ``force_std``; 0 if stated.
+    photos : tuple of PhotoData
+    photo_noise : PhotoNoise
+    rows : Row
+        Without priors.
+    """
+
+    forces: tuple[Array, ...]
+    force_std: Array
+    force_freedom: int
+    photos: tuple[PhotoData, ...]
+    photo_noise: PhotoNoise
+    rows: Row
+
+
+def observe(
+    test: MeasuredTest,
+    settings: DiagnosisSettings,
+    *,
+    photo_noise: PhotoNoise | None = None,
+    without_photos: frozenset[int] = frozenset(),
+    without_forces: frozenset[int] = frozenset(),
+) -> Observation:
+    """Collect and weigh the data of a test.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    settings : DiagnosisSettings
+    photo_noise : PhotoNoise or None
+        Calibrated noise of the sections; as stated by the photos if None.
+    without_photos, without_forces : sets of int
+        Indices of steps whose photo or force is not to be trusted.
+    """
+    noise = photo_noise or PhotoNoise()
+    scale = max(abs(step.force) for step in test.steps)
+    level = force_noise(test.steps, floor=settings.force_floor * scale, distinct=settings.hold_noise_level)
+    forces, photos = [], []
+    kind: list[Array] = []
+    where: list[Array] = []
+    for i, step in enumerate(test.steps):
+        samples = np.array([step.force]) if step.hold_forces is None else step.hold_forces
+        forces.append(samples[:0] if i in without_forces else samples)
+        kind.append(np.zeros(len(forces[-1]), dtype=int))
+        where.append(np.full(len(forces[-1]), i))
+    for i, step in enumerate(test.steps):
+        if step.shape is None or step.chord is None or i in without_photos:
+            continue
+        photo = _photo_data(i, test, settings, noise)
+        photos.append(photo)
+        kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
+        where.append(np.full(len(photo.whiten), i))
+    rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
+    return Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows)
+
+
+def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:
+    step = test.steps[index]
+    assert step.shape is not None and step.chord is not None
+    sections = block_means(step.shape, blocks=settings.section_blocks)
+    functions = min(settings.shape_functions, len(sections.s) // 2)
+    basis = smooth_basis(sections.s, float(step.shape.s[-1]), functions=functions)
+    return PhotoData(
+        index, sections, step.chord, basis, _whitening(step.chord, step.chord_std, sections, basis, settings, noise)
+    )
+
+
+def _whitening(
+    chord: float,
+    chord_std: float | None,
+    sections: Sections,
+    basis: Array,
+    settings: DiagnosisSettings,
+    noise: PhotoNoise,
+) -> Array:
+    """Root of the information of (chord, shape components): rows have unit variance and compress the sections.
+
+    With joint covariance C of (chord, sections) and design B = diag(1, basis): information B^T C^-1 B = R R^T, and
+    ``R^-1 B^T C^-1`` takes residuals to components of unit variance.
+    """
+    axis = (chord_std if chord_std is not None else settings.chord_std * chord) / np.sqrt(2.0)
+    # columns: left axis along x, left and right axis across; right axis along x moves the chord alone
+    normal_x, normal_y = -np.sin(sections.theta), np.cos(sections.theta)
+    share = sections.x / chord
+    shape_by_axis = np.column_stack([-normal_x, -normal_y * (1.0 - share), -normal_y * share])
+    by_axis = np.vstack([np.r_[-1.0, 0.0, 0.0], shape_by_axis])
+    joint = np.zeros((1 + len(sections.s), 1 + len(sections.s)))
+    joint[1:, 1:] = section_covariance(sections, factor=noise.factor, stretch=noise.stretch)
+    joint[0, 0] = axis**2 + settings.displacement_std**2
+    joint += axis**2 * by_axis @ by_axis.T
+    design = linalg.block_diag(np.ones((1, 1)), basis)
+    weighted = linalg.cho_solve(linalg.cho_factor(joint, lower=True), design)
+    root = linalg.cholesky(design.T @ weighted, lower=True)
+    return np.asarray(linalg.solve_triangular(root, weighted.T, lower=True))
+
+
+def residual(observation: Observation, prediction: Prediction) -> Array:
+    """Whitened residual (N,) without priors, rows as in ``observation.rows``."""
+    parts = [
+        (data - model[: len(data)]) / std
+        for data, model, std in zip(observation.forces, prediction.samples, observation.force_std, strict=True)
+    ]
+    for photo in observation.photos:
+        across = normal_distance(photo.sections, prediction, photo.step)
+        parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across])
+    return np.concatenate(parts)
+
+
+def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:
+    """Distance (k,) m of the sections from the predicted curve, positive along its normal.
+
+    The foot point is found by two Newton steps on the curve (cubic Hermite between its points) from the section's own
+    arc length; what is left along the curve enters the distance by its square only.
+    """
+    s, theta = prediction.s, prediction.theta[step]
+    x, y = prediction.x[step], prediction.y[step]
+    at = sections.s
+    for _ in range(3):
+        foot_x, foot_y, direction = _hermite(at, s, x, y, theta)
+        tangent_x, tangent_y = np.cos(direction), np.sin(direction)
+        gap_x, gap_y = sections.x - foot_x, sections.y - foot_y
+        at = at + tangent_x * gap_x + tangent_y * gap_y
+    return np.asarray(-tangent_y * gap_x + tangent_x * gap_y)
+
+
+def _hermite(at: Array, s: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array, Array]:
+    """Point and direction of the curve at arc length ``at``: Hermite cubic from positions and directions."""
+    left = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+    width = s[left + 1] - s[left]
+    t = (at - s[left]) / width
+    a, b = theta[left], theta[left + 1]
+    h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, -t * t * (1.0 - t) * width
+    px = x[left] + (x[left + 1] - x[left]) * h1 + np.cos(a) * h2 + np.cos(b) * h3
+    py = y[left] + (y[left + 1] - y[left]) * h1 + np.sin(a) * h2 + np.sin(b) * h3
+    return px, py, a + (b - a) * t

@@ -1,0 +1,241 @@
+"""What a model says would be measured: the bent cable of every step, seen by load cell, displacement log and camera.
+
+`Facts` are the circumstances every model shares (when was a force sampled, which way did the bearing move);
+`Prediction` is what the rod and the observers make of them. All lengths in m, in the chord frame of `rod.measurement`.
+
+A model is a `rod.bending_test.BendingTest` and a chain of observers. An observer turns one `Prediction` into another: a
+load cell that drifts, a camera that looks askew. A cause changes either of the two, see `pipeline.diagnosis.causes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.bending_test import BendingTest, simulate
+from rod.equilibrium import Branch, Equilibrium
+from rod.measurement import MeasuredStep, MeasuredTest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """Circumstances of a bending test of ``n`` steps.
+
+    Attributes
+    ----------
+    branch : tuple of str
+        ``mounted``, ``loading`` or ``unloading``.
+    displacement : (n,) m
+        By the log; from the photographed chord where the log has none.
+    photo_time : (n,) s
+        Time of the photo since the hold began; 0 where the log has no time.
+    hold_times : tuple of (h,) s
+        Times of the force samples since the hold began; a single 0 where the log has no samples.
+    clock : (n,) s
+        When the hold began, since the first hold.
+    picture_centre : (n, 2) m
+        In the chord frame of each photo.
+    half_diagonal : m
+        Of the picture, on the plane of the cable.
+    moving : str
+        Bearing that is pushed, ``left`` or ``right``.
+    timed : bool
+        Whether the log has times.
+    length : m
+    force_scale, moment_scale : N, N m
+        Largest force, and largest force times bow.
+    curvature_scale : 1/m
+        Range of the curvatures met.
+    """
+
+    branch: tuple[str, ...]
+    displacement: Array
+    photo_time: Array
+    hold_times: tuple[Array, ...]
+    clock: Array
+    picture_centre: Array
+    half_diagonal: float
+    moving: str
+    timed: bool
+    length: float
+    force_scale: float
+    moment_scale: float
+    curvature_scale: float
+
+    @property
+    def travel(self) -> float:
+        """Largest displacement, m."""
+        return float(np.ptp(np.append(self.displacement, 0.0)))
+
+    @property
+    def returns(self) -> bool:
+        """Whether there is an unloading branch."""
+        return "unloading" in self.branch
+
+
+def facts_of(test: MeasuredTest) -> Facts:
+    """Circumstances of a measured test; what the log leaves out is replaced by what the photos say."""
+    steps = test.steps
+    shapes = [step.shape for step in steps if step.shape is not None]
+    bow = max((float(np.max(np.abs(shape.y))) for shape in shapes), default=0.2 * test.length)
+    bend = max((float(np.ptp(shape.kappa)) for shape in shapes), default=1.0 / test.length)
+    force = max(abs(step.force) for step in steps)
+    timed = all(step.hold_times is not None and step.time is not None for step in steps)
+    begin, holds, photo = [], [], []
+    for step in steps:
+        times = step.hold_times if timed and step.hold_times is not None else np.zeros(_samples(step))
+        begin.append(float(times[0]))
+        holds.append(times - times[0])
+        photo.append(float(step.time) - begin[-1] if timed and step.time is not None else 0.0)
+    centre = [step.picture_centre or (0.5 * (step.chord or test.length), 0.5 * bow) for step in steps]
+    return Facts(
+        branch=tuple(step.branch for step in steps),
+        displacement=np.array([_displacement(test, i) for i in range(len(steps))]),
+        photo_time=np.array(photo),
+        hold_times=tuple(holds),
+        clock=np.array(begin) - begin[0],
+        picture_centre=np.array(centre, dtype=float),
+        half_diagonal=test.picture_half_diagonal or 0.75 * test.length,
+        moving=test.moving,
+        timed=timed,
+        length=test.length,
+        force_scale=force,
+        moment_scale=force * bow,
+        curvature_scale=max(bend, 1e-3 / test.length),
+    )
+
+
+def _samples(step: MeasuredStep) -> int:
+    return 1 if step.hold_forces is None else len(step.hold_forces)
+
+
+def _displacement(test: MeasuredTest, index: int) -> float:
+    """Displacement of a step by the log, else by its chord against the longest chord (or the length)."""
+    step = test.steps[index]
+    if step.displacement is not None:
+        return step.displacement
+    chords = [other.chord for other in test.steps if other.chord is not None]
+    if step.chord is None or not chords:
+        raise ValueError(f"step {step.step} has neither a displacement nor a photographed chord")
+    return max(chords) - step.chord
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What would be read at every step; ``n`` steps, ``v`` points along the cable.
+
+    Attributes
+    ----------
+    force : (n,) N
+        At the time of the photo, as the load cell shows it.
+    samples : tuple of (h,) N
+        The hold's samples as the load cell shows them.
+    chord : (n,) m
+        As the camera sees it.
+    s : (v,) m
+        Arc length of the points.
+    x, y, theta : (n, v) m, rad
+        Shapes in the chord frame, as the camera sees them.
+    """
+
+    force: Array
+    samples: tuple[Array, ...]
+    chord: Array
+    s: Array
+    x: Array
+    y: Array
+    theta: Array
+
+
+Observer = Callable[[Prediction, Facts], Prediction]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The experiment as simulated, and how it is observed; observers act in order.
+
+    ``shift`` (n,) m is added to the displacements of the log, step by step.
+    """
+
+    bending: BendingTest
+    observers: tuple[Observer, ...] = ()
+    shift: Array | float = 0.0
+
+    def observed(self, observer: Observer) -> Model:
+        """Same experiment, one more observer at the end of the chain."""
+        return replace(self, observers=(*self.observers, observer))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A model that was run: equilibria by step, and what would be measured; or why there is none.
+
+    Attributes
+    ----------
+    model : Model
+    steps : tuple of Equilibrium
+    prediction : Prediction or None
+        None if a step has no equilibrium.
+    advice : str
+        Of the first step that failed; empty if none.
+    """
+
+    model: Model
+    steps: tuple[Equilibrium, ...]
+    prediction: Prediction | None
+    advice: str = ""
+
+
+def run(model: Model, facts: Facts, *, near: Run | None = None) -> Run:
+    """Simulate all steps and observe them.
+
+    The mounted cable lies as it was made; every other step is bowed to the side the photos show (``up``), also where a
+    fit tries a pre-curvature of the other sign.
+
+    Parameters
+    ----------
+    model : Model
+    facts : Facts
+    near : Run or None
+        A run of a similar model: warm start, and no new simulation at all where only the observers differ.
+    """
+    if near is not None and near.model.bending is model.bending and near.model.shift is model.shift:
+        steps = near.steps
+    else:
+        steps = _simulated(model, facts, near)
+    failed = next((step for step in steps if not step.good), None)
+    if failed is not None:
+        return Run(model, steps, None, failed.outcome.advice)
+    force = np.array([step.force for step in steps])
+    prediction = Prediction(
+        force=force,
+        samples=tuple(np.full(len(times), P) for times, P in zip(facts.hold_times, force, strict=True)),
+        chord=np.array([step.chord for step in steps]),
+        s=steps[0].s,
+        x=np.array([step.x for step in steps]),
+        y=np.array([step.y for step in steps]),
+        theta=np.array([step.theta for step in steps]),
+    )
+    for observer in model.observers:
+        prediction = observer(prediction, facts)
+    return Run(model, steps, prediction)
+
+
+def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
+    displacement = facts.displacement + model.shift
+    mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
+    pushed = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
+    found: dict[int, Equilibrium] = {}
+    for index, side in ((mounted, "natural"), (pushed, "up")):
+        if index:
+            usable = near is not None and len(near.steps[0].angles) == model.bending.rod.edges.size
+            starts = [near.steps[i] if near.steps[i].good else None for i in index] if near and usable else None
+            branch: Branch = "natural" if side == "natural" else "up"
+            done = simulate(model.bending, displacement[index], branch=branch, starts=starts)
+            found.update(zip(index, done, strict=True))
+    return tuple(found[i] for i in range(len(facts.branch)))

@@ -1,0 +1,111 @@
+"""All directions of suspicion about a fitted model: one whitened column for every form of every cause.
+
+A column is the change of the residual when the cause is put into the fitted model at a thousandth of its plausible size,
+per unit of amount. Where only the observation changes, nothing is simulated anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.fit import Fit, Term, whole_residual
+from pipeline.diagnosis.observation import Observation
+from pipeline.diagnosis.prediction import run
+from pipeline.diagnosis.score import Scores, admissible, score
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Suspicion:
+    """Scores of all forms of all causes about a fitted model.
+
+    Attributes
+    ----------
+    causes : tuple of Cause
+        The catalogue.
+    terms : tuple of Term
+        The ``k`` directions.
+    owner : (k,) int
+        Index of the cause of each direction.
+    sign : (k,)
+        Admissible sign; 0 for both.
+    columns : (N, k)
+    scores : Scores
+    """
+
+    causes: tuple[Cause, ...]
+    terms: tuple[Term, ...]
+    owner: NDArray[np.int_]
+    sign: Array
+    columns: Array
+    scores: Scores
+
+    @property
+    def statistic(self) -> Array:
+        """Admissible test statistic (k,) of each direction."""
+        return admissible(self.scores.z, self.sign)
+
+    def of(self, cause: int) -> NDArray[np.int_]:
+        """Directions of a cause."""
+        return np.flatnonzero(self.owner == cause)
+
+    def best(self, cause: int) -> int | None:
+        """Direction of a cause with the largest statistic; by ``|z|`` where none is admissible; None without forms."""
+        own = self.of(cause)
+        if own.size == 0:
+            return None
+        statistic = self.statistic[own]
+        if statistic.max() <= 0.0:
+            return int(own[np.argmax(np.abs(self.scores.z[own]))])
+        return int(own[np.argmax(statistic)])
+
+
+def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, visible: float) -> Suspicion:
+    """Score every form of every cause about a fitted model.
+
+    Causes that are in the model already are scored with forms of theirs only if forms may be combined.
+
+    Parameters
+    ----------
+    observation : Observation
+    fitted : Fit
+        With a prediction.
+    causes : sequence of Cause
+    visible : float
+        Surviving fraction below which a direction counts as invisible.
+    """
+    present = {term.cause.name for term in fitted.extension.terms}
+    facts = fitted.extension.facts
+    terms, owner, columns = [], [], []
+    for index, cause in enumerate(causes):
+        if cause.name in present and not cause.combines:
+            continue
+        for variant in cause.variants(facts):
+            term = Term(cause, variant)
+            columns.append(direction(observation, fitted, term))
+            terms.append(term)
+            owner.append(index)
+    table = np.column_stack(columns) if columns else np.zeros((len(fitted.residual), 0))
+    scores = score(fitted.residual, fitted.jacobian, table, visible=visible)
+    sign = np.array([float(term.cause.sign) for term in terms])
+    return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
+
+
+def direction(observation: Observation, fitted: Fit, term: Term) -> Array:
+    """Whitened column (N,) of one form of a cause at amount zero; zero where not even a trace can be simulated."""
+    facts = fitted.extension.facts
+    trace = 1e-3 * term.cause.plausible(facts)
+    for step in (trace, -trace) if term.cause.sign == 0 else (trace,):
+        model = term.cause.apply(fitted.run.model, step, term.variant, facts)
+        there = whole_residual(
+            observation, run(model, facts, near=fitted.run), fitted.vector, fitted.extension.prior_std
+        )
+        if there is not None:
+            return (fitted.residual - there) / step
+    return np.zeros_like(fitted.residual)
