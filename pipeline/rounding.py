@@ -45,8 +45,11 @@ def rounded(value: float | None, std: float | None, *, decimal: str = ".") -> st
     return f"({inner})·10{_superscript(power)}"
 
 
-def plain(value: float, digits: int = 3, *, decimal: str = ".") -> str:
-    """Text of a number to so many significant digits: for axes, ranges and settings, which are chosen, not measured."""
+def plain(value: float, digits: int = 3, *, decimal: str = ".", zeros: bool = False) -> str:
+    """Text of a number to so many significant digits: for axes, ranges and settings, which are chosen, not measured.
+
+    Trailing zeros are kept if ``zeros`` is true.
+    """
     if not math.isfinite(value):
         return "–"
     if value == 0.0:
@@ -54,7 +57,7 @@ def plain(value: float, digits: int = 3, *, decimal: str = ".") -> str:
     power = math.floor(math.log10(abs(value)))
     if SMALLEST_FIXED <= power <= LARGEST_FIXED:
         text = _fixed(value, max(0, digits - 1 - power), ".")
-        text = text.rstrip("0").rstrip(".") if "." in text else text
+        text = text.rstrip("0").rstrip(".") if "." in text and not zeros else text
         return text.replace(".", decimal)
     return f"{_fixed(value / 10.0**power, digits - 1, decimal)}·10{_superscript(power)}"
 

@@ -53,7 +53,7 @@ def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
     else:
-        verdict, tone = words("verdict_none"), "good" if adequate else "warn"
+        verdict, tone = "", "good" if adequate else "warn"
     return Answer(
         sentence=_sentence(result, words),
         agreement=_agreement(result, words),
@@ -94,8 +94,8 @@ def _sentence(result: Result, words: Words) -> str:
         id=name,
         first=unit.text(curve.tangent[0], curve.tangent_std[0]),
         last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
-        low=words.number(curve.kappa[0]),
-        high=words.number(curve.kappa[-1]),
+        low=words.curvature(curve.kappa[0]),
+        high=words.curvature(curve.kappa[-1]),
     )
     known = pre_curvatures(result)
     way = next((way for way in ("inverse", "balance", "photo") if way in known), None)

@@ -44,6 +44,10 @@ LIGHT = {role: colours[0] for role, colours in PALETTE.items()}
 DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": (0, (6, 2, 1.5, 2))}
 # cividis ends in a blue and a yellow that vanish on dark and white paper: these parts of it can be seen on either
 STEP_RANGE_LIGHT, STEP_RANGE_DARK = (0.0, 0.82), (0.22, 1.0)
+STEP_LEVELS = 24  # neighbours of a longer test share a colour; no eye tells more of them apart
+
+# Room above the axes for a legend, in px.
+ONE_ROW, TWO_ROWS = 22.0, 38.0
 
 STYLE = {
     "svg.fonttype": "none",
@@ -113,7 +117,7 @@ def drawing(
     name: str,
     draw: Callable[[FigureBase], Axes],
     *,
-    size: tuple[float, float] = (460.0, 300.0),
+    size: tuple[float, float] = (400.0, 300.0),
     title: str,
     description: str,
 ) -> Drawing:
@@ -148,25 +152,24 @@ def drawing(
 
 
 def step_colours(count: int) -> list[str]:
-    """Light colours of so many steps in order; `step_variables` gives their CSS variables."""
-    return [_along("cividis", STEP_RANGE_LIGHT, i, count) for i in range(count)]
+    """Light colours of so many steps in order, from dark to bright."""
+    levels = [round(i / max(1, count - 1) * (STEP_LEVELS - 1)) for i in range(count)]
+    return [_along(STEP_RANGE_LIGHT, level) for level in levels]
 
 
-def step_variables(count: int) -> dict[str, tuple[str, str]]:
-    """CSS variables of the steps: name without the dashes, and (light, dark) colour."""
-    return {
-        f"step{i}": (_along("cividis", STEP_RANGE_LIGHT, i, count), _along("cividis", STEP_RANGE_DARK, i, count))
-        for i in range(count)
-    }
+def page_colours() -> dict[str, tuple[str, str]]:
+    """All CSS variables of colours: name without the dashes, and (light, dark) colour."""
+    steps = {f"step{i}": (_along(STEP_RANGE_LIGHT, i), _along(STEP_RANGE_DARK, i)) for i in range(STEP_LEVELS)}
+    return {**PALETTE, **steps}
 
 
-def _along(name: str, part: tuple[float, float], index: int, count: int) -> str:
-    share = index / max(1, count - 1)
-    return str(mpl.colors.to_hex(mpl.colormaps[name](part[0] + (part[1] - part[0]) * share)))
+def _along(part: tuple[float, float], level: int) -> str:
+    share = part[0] + (part[1] - part[0]) * level / (STEP_LEVELS - 1)
+    return str(mpl.colors.to_hex(mpl.colormaps["cividis"](share)))
 
 
 def plot_area(
-    figure: FigureBase, *, left: float = 62.0, right: float = 14.0, top: float = 34.0, bottom: float = 46.0
+    figure: FigureBase, *, left: float = 54.0, right: float = 12.0, top: float = TWO_ROWS, bottom: float = 42.0
 ) -> Axes:
     """One pair of axes with margins in px: a fixed layout costs a tenth of matplotlib's constrained one."""
     width, height = figure.bbox.width, figure.bbox.height  # in px, for all figures are drawn at 72 dots per inch
@@ -197,7 +200,7 @@ def _compact(svg: str, name: str, size: tuple[float, float], title: str, descrip
     """Inline SVG: colours become variables, numbers lose invisible digits, identifiers get the figure's name."""
     body = svg[svg.index("<defs") : svg.rindex("</svg>")]
     body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.DOTALL)
-    for role, (light, _) in PALETTE.items():
+    for role, (light, _) in page_colours().items():
         body = body.replace(light, f"var(--{role})")
     used = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', body))
     kept = {a or b for a, b in used}

@@ -142,7 +142,7 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
         drawn["ranking"] = drawing(
             "ranking",
             lambda f: ranking.draw_ranking(f, part, words, settings),
-            size=(460.0, ranking.ranking_height(part, settings)),
+            size=(400.0, ranking.ranking_height(part, settings)),
             title=words("fig_ranking"),
             description=words("fig_ranking_alt"),
         )
@@ -150,7 +150,7 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
         drawn["cosines"] = drawing(
             "cosines",
             lambda f: maps.draw_cosines(f, part.twins, words),
-            size=(460.0, 400.0),
+            size=(400.0, 380.0),
             title=words("fig_cosines"),
             description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
         )
@@ -160,7 +160,7 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
             drawn[key] = drawing(
                 f"map-{key}",
                 partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
-                size=(460.0, 90.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+                size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
                 title=words(f"fig_map_{key}"),
                 description=words("fig_map_alt", rms=map_rms(residuals, words)),
             )

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from pipeline.report.answer import answer
-from pipeline.report.canvas import PALETTE, step_variables
+from pipeline.report.canvas import page_colours
 from pipeline.report.curves import best, equivalent, smallest_radius
 from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.evidence import (
@@ -51,9 +51,9 @@ def environment() -> Environment:
     return engine
 
 
-def palette_css(steps: int) -> Markup:
+def palette_css() -> Markup:
     """CSS variables of all colours: light, dark by the reader's system, and light again on paper."""
-    colours: dict[str, tuple[str, str]] = {**PALETTE, **step_variables(steps)}
+    colours = page_colours()
     light = "".join(f"--{name}:{pair[0]};" for name, pair in colours.items())
     dark = "".join(f"--{name}:{pair[1]};" for name, pair in colours.items())
     return Markup(f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}")
@@ -106,7 +106,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             specimen_rows=specimen_rows(result, words),
             fit_rows=fit_rows(result, words),
             provenance=provenance_rows(result),
-            palette=palette_css(sum(bool(photo.kappa_per_m) for photo in result.photos)),
+            palette=palette_css(),
             css=asset("page.css") + asset("report.css"),
             js=asset("page.js") + asset("report.js"),
         )
@@ -123,8 +123,8 @@ def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> 
         texts["equivalent"] = words(
             "use_equivalent_row",
             value=unit.text(constant.stiffness, constant.std),
-            low=words.number(constant.low),
-            high=words.number(constant.high),
+            low=words.curvature(constant.low),
+            high=words.curvature(constant.high),
         )
         texts["bound"] = words("use_bound") if constant.bound else ""
         texts["departure"] = words("use_departure", departure=words.number(100.0 * constant.departure, 2))

@@ -17,7 +17,7 @@ from pipeline.report.words import Words
 from pipeline.result import PhotoPart, PreviewPart, Result
 from pipeline.settings import ReportSettings
 
-TALL = (460.0, 360.0)
+TALL = (400.0, 350.0)
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawi
     return drawing(
         "characteristic",
         lambda figure: figures.draw_characteristic(figure, result, words, settings),
-        size=(480.0, 330.0),
+        size=(420.0, 310.0),
         title=words("fig_characteristic"),
-        description=words("fig_characteristic_alt", low=words.number(low), high=words.number(high), lines=lines),
+        description=words("fig_characteristic_alt", low=words.curvature(low), high=words.curvature(high), lines=lines),
     )
 
 
@@ -118,7 +118,7 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
             "curvatures",
             lambda f: figures.draw_curvatures(f, result, words),
             title=words("fig_curvatures"),
-            description=words("fig_curvatures_alt", top=words.number(max(tops))),
+            description=words("fig_curvatures_alt", top=words.curvature(max(tops))),
         )
     if result.balance and result.balance.pointwise and result.balance.curve:
         drawn["pointwise"] = drawing(
@@ -132,7 +132,7 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
         drawn["map"] = drawing(
             "residual-map",
             lambda f: maps.draw_map(f, residuals, words, settings),
-            size=(460.0, 90.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
             title=words("fig_map"),
             description=words("fig_map_alt", rms=map_rms(residuals, words)),
         )
@@ -164,7 +164,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
             lambda f: photos.draw_photo_curvature(f, photo, words, settings),
             size=TALL,
             title=words("fig_kappa"),
-            description=words("fig_kappa_alt", low=words.number(low), high=words.number(high)),
+            description=words("fig_kappa_alt", low=words.curvature(low), high=words.curvature(high)),
         )
     return PhotoView(
         index,
@@ -217,7 +217,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
                 photo.image,
                 words(f"status_{photo.status}") + (f": {photo.reason}" if photo.reason else ""),
                 *(millimetres.number(_times(1e3, v), _times(1e3, std)) for v, std in lengths),
-                "–" if seen is None else f"{words.number(seen[0])} … {words.number(seen[1])}",
+                "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]
         )
     return rows

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 from matplotlib.ticker import MaxNLocator
 
-from pipeline.report.canvas import DASHES, LIGHT, finish, plot_area, step_colours
+from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, finish, plot_area, step_colours
 from pipeline.report.curves import Visited, curves
 from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
@@ -76,7 +76,7 @@ def draw_characteristic(figure: FigureBase, result: Result, words: Words, settin
     axes.set_xlim(left, high + margin)
     axes.set_ylim(1.1 * unit.factor * bottom, 1.08 * unit.factor * top)
     return finish(
-        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=4
+        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )
 
 
@@ -118,7 +118,7 @@ def draw_moment(figure: FigureBase, result: Result, words: Words, settings: Repo
         _banded(axes, curve.kappa, curve.moment, curve.moment_std, method, unit, words, settings)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     return finish(
-        axes, x=words("axis_kappa"), y=words("axis_moment", unit=unit.symbol), decimal=words.decimal, legend=4
+        axes, x=words("axis_kappa"), y=words("axis_moment", unit=unit.symbol), decimal=words.decimal, legend=2
     )
 
 
@@ -137,7 +137,7 @@ def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: R
             min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max())
         )
     return finish(
-        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=4
+        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )
 
 
@@ -173,7 +173,7 @@ def draw_forces(figure: FigureBase, result: Result, words: Words, settings: Repo
     rest.sharex(axes)
     finish(rest, x=words("axis_displacement"), y=words("axis_sigma"), decimal=words.decimal)
     rest.yaxis.set_major_locator(MaxNLocator(4, integer=True))
-    finish(axes, x="", y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=4)
+    finish(axes, x="", y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
     axes.tick_params(labelbottom=False)
     return axes
 
@@ -219,7 +219,7 @@ def force_residual(step: StepPart) -> float | None:
 
 def draw_curvatures(figure: FigureBase, result: Result, words: Words) -> Axes:
     """Draw kappa(s) of the visible cable on all photos in one picture; later steps are brighter."""
-    axes = plot_area(figure)
+    axes = plot_area(figure, top=ONE_ROW)
     traced = [photo for photo in result.photos if photo.kappa_per_m]
     for colour, photo in zip(step_colours(len(traced)), traced, strict=True):
         kappa = np.where(photo.seen, photo.kappa_per_m, np.nan)

@@ -192,7 +192,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> str:
             pooled=repeats(usable, unit, words, settings),
             data=_overlay_data(rows, unit, words, settings),
             size=SHAPE_SIZE,
-            palette=palette_css(0),
+            palette=palette_css(),
             css=asset("page.css") + asset("index.css"),
             js=asset("page.js") + asset("index.js"),
         )

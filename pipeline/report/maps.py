@@ -48,7 +48,7 @@ def draw_map(
     figure: FigureBase, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = ""
 ) -> Axes:
     """Draw shape residuals in sigma over s and step."""
-    axes = plot_area(figure, left=96.0, right=70.0)
+    axes = plot_area(figure, left=92.0, right=64.0, top=20.0 if title else 8.0)
     s, limit = 1e3 * np.asarray(residuals.s_m), settings.map_limit_sigma
     columns = np.linspace(s[0], s[-1], settings.map_columns)
     table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
@@ -93,7 +93,7 @@ def _scale(figure: FigureBase, axes: Axes, image: ScalarMappable, label: str, wo
 def draw_cosines(figure: FigureBase, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
     """Draw how alike the signatures of causes are: |cos| = 1 cannot be told apart by this test."""
     names = list(dict.fromkeys([*cosines, *(other for row in cosines.values() for other in row)]))
-    axes = plot_area(figure, left=140.0, right=66.0, top=14.0, bottom=112.0)
+    axes = plot_area(figure, left=134.0, right=64.0, top=8.0, bottom=108.0)
     table = np.array([[_cosine(cosines, a, b) for b in names] for a in names])
     image = axes.imshow(np.ma.masked_invalid(table), cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
     labels = [words.cause(name) for name in names]

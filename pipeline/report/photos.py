@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
-from pipeline.report.canvas import LIGHT, finish, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, finish, plot_area
 from pipeline.report.figures import band_width
 from pipeline.report.units import suited
 from pipeline.report.words import Words
@@ -65,7 +65,7 @@ def draw_photo_curvature(figure: FigureBase, photo: PhotoPart, words: Words, set
     """Draw kappa(s) of one photo with its band and the fit; below, the position left over along the normal."""
     height, s = figure.bbox.height, 1e3 * np.asarray(photo.s_m)
     residual = bool(photo.shape_residual_m)
-    axes = plot_area(figure, bottom=0.42 * height if residual else 46.0)
+    axes = plot_area(figure, top=ONE_ROW, bottom=0.42 * height if residual else 42.0)
     kappa, half = np.asarray(photo.kappa_per_m), band_width(settings) * np.asarray(photo.kappa_std_per_m)
     axes.fill_between(s, kappa - half, kappa + half, color=LIGHT["measured"], alpha=0.18, lw=0.0)
     axes.plot(s, kappa, color=LIGHT["measured"], lw=1.6, label=words("measured"))

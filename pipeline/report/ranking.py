@@ -25,17 +25,17 @@ def ranked(diagnosis: DiagnosisPart, settings: ReportSettings) -> list[CauseRow]
 
 def ranking_height(diagnosis: DiagnosisPart, settings: ReportSettings) -> float:
     """Height of the figure in px."""
-    return 84.0 + ROW_PX * len(ranked(diagnosis, settings))
+    return 54.0 + ROW_PX * len(ranked(diagnosis, settings))
 
 
 def draw_ranking(figure: FigureBase, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
     """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
     rows, width = ranked(diagnosis, settings), figure.bbox.width
     named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}
-    left = 150.0
-    middle = left + 0.5 * (width - left - 30.0)
-    pull = plot_area(figure, left=left, right=width - middle + 10.0)
-    impact = plot_area(figure, left=middle + 10.0)
+    left = 134.0
+    middle = left + 0.5 * (width - left - 12.0)
+    pull = plot_area(figure, left=left, right=width - middle + 6.0, top=8.0)
+    impact = plot_area(figure, left=middle + 6.0, top=8.0)
     colours = [LIGHT["alarm"] if row.name in named else LIGHT["muted"] for row in rows]
     places = range(len(rows))
     noise = settings.residual_noise_sigma

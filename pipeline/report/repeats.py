@@ -57,8 +57,8 @@ def _pooled_text(pooled: Pooled, count: int, unit: Unit, words: Words, settings:
     return words(
         "index_pooled_text",
         count=count,
-        low=words.number(pooled.kappa[0]),
-        high=words.number(pooled.kappa[-1]),
+        low=words.curvature(pooled.kappa[0]),
+        high=words.curvature(pooled.kappa[-1]),
         mean=unit.text(pooled.stiffness, pooled.stiffness_std),
         scatter=words.number(100.0 * pooled.scatter_relative, 2),
         own=words.number(100.0 * pooled.error_relative, 2),

@@ -66,6 +66,10 @@ class Words:
         """A chosen or exact number."""
         return plain(value, digits, decimal=self.decimal)
 
+    def curvature(self, value: float) -> str:
+        """A curvature as the end of a range, in 1/m: three digits, zeros kept."""
+        return plain(value, 3, decimal=self.decimal, zeros=True)
+
     def measured(self, value: float | None, std: float | None) -> str:
         """A measured number with its standard deviation."""
         return rounded(value, std, decimal=self.decimal)
