@@ -361,12 +361,14 @@ def _horner(coefficients: Array, t: float) -> Array:
 def _evaluate(coefficients: Array, pieces: _Pieces, u: Array) -> Array:
     """Piecewise polynomial at ``u``; with cardinal coefficients (k, q + 1, p) the result has a last axis p."""
     segment = pieces.breaks.searchsorted(u)
-    t = u - pieces.origin[segment]
+    t = np.asarray(u - pieces.origin.take(segment))
+    table = coefficients.take(segment, axis=1)
     if coefficients.ndim == 3:
         t = t[..., None]
-    value = coefficients[-1][segment]
-    for c in coefficients[-2::-1]:
-        value = value * t + c[segment]
+    value = table[-1]
+    for row in table[-2::-1]:
+        value = value * t
+        value += row
     return np.asarray(value)
 
 

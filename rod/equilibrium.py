@@ -176,12 +176,11 @@ def solve(
     Equilibrium
     """
     system = System(rod, hold, rod.virgin if memory is None else memory)
-    mounted = _force_free(system)
     if not _admissible(rod, hold):
-        return _record(system, mounted._replace(outcome=Outcome.UNREACHABLE), 0)
+        return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
     side = bow_side(rod, branch)
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, start, mounted, side, branch):
+    for attempt in _attempts(system, start, side, branch):
         verdicts.append(attempt)
         if attempt.found:
             break
@@ -191,9 +190,7 @@ def solve(
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
-def _attempts(
-    system: System, start: Start | Equilibrium | None, mounted: Trial, side: int, branch: Branch
-) -> Iterator[Trial]:
+def _attempts(system: System, start: Start | Equilibrium | None, side: int, branch: Branch) -> Iterator[Trial]:
     """Ways to the equilibrium, the cheapest first: warm start, bowed guess, path from the force-free shape or guess."""
     if start is not None:
         first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
@@ -204,7 +201,7 @@ def _attempts(
     straight = not np.any(system.rod.section.pre_curvature)
     if bowed is None or (branch == "natural" and not straight):
         # Every state on this path is a proven minimum: it is the natural branch, to whichever side it bows.
-        yield judged(system, followed(system, Start(mounted.angles, mounted.R)), 0)
+        yield judged(system, followed(system, Start(system.rod.mounted.angles, np.zeros(2))), 0)
     else:
         yield judged(system, followed(system, bowed), side)
 
@@ -294,8 +291,8 @@ def _faded(balance: Balance, residual: Balance | None, fade: float) -> Balance:
 
 def _norm(balance: Balance, moment_scale: float, length: float) -> float:
     """Largest residual, relative."""
-    gap_x, gap_y = balance.gap
-    return float(max(np.abs(balance.gradient).max() / moment_scale, abs(gap_x) / length, abs(gap_y) / length))
+    g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
+    return float(max(g.max() / moment_scale, -g.min() / moment_scale, abs(gap_x) / length, abs(gap_y) / length))
 
 
 # Sides and first guesses ----------------------------------------------------------------------------------------------
@@ -384,7 +381,9 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     """Shape at the vertices from the edge angles; the bearing axes join in where rigid pieces are."""
     rod, memory, angles, R = system.rod, system.memory, trial.angles, trial.R
     h = rod.edges
-    path = np.concatenate((np.zeros((2, 1)), np.cumsum(h * system.edge_directions(angles, R), axis=1)), axis=1)
+    path = np.concatenate(
+        (np.zeros((2, 1)), np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1)), axis=1
+    )
     inner = h[1:-1]
     theta = np.empty(h.size - 1)
     theta[1:-1] = (angles[1:-2] * inner[1:] + angles[2:-1] * inner[:-1]) / (inner[:-1] + inner[1:])

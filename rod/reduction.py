@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgtsv
+from scipy.linalg.lapack import dgesv, dgtsv
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -92,87 +92,96 @@ class Balance(NamedTuple):
     tangent: Array
 
 
+class EdgeState(NamedTuple):
+    """Directions of the edges and the force in them along and across, (n + 2,) each; N."""
+
+    cos: Array
+    sin: Array
+    along: Array
+    across: Array
+
+
 class System:
     """Residuals and Newton steps of one rod, hold and memory; built once per equilibrium, immutable afterwards."""
 
     def __init__(self, rod: Rod, hold: Hold, memory: Memory) -> None:
         self.rod, self.hold, self.memory = rod, hold, memory
+        self.moment_scale = rod.stiffness_scale / rod.length
+        self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
         self._inverse_weights = 1.0 / rod.weights
         self._axial, self._shear = rod.flexibility
-        self.moment_scale = rod.stiffness_scale / rod.length
-        self.force_scale = rod.stiffness_scale / rod.length**2
-        self._middle = rod.edges.size // 2
-        self._spring = 3.0 * self.moment_scale
+        self._difference = self._axial - self._shear
+        self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
-        self._scale = np.sqrt(units)
+        self._scale = np.sqrt(units)[:, None]
+        self._scales = self._scale * self._scale.T
 
-    def edge_forces(self, R: Array) -> Array:
-        """Force in every edge, (2, n + 2) N, or (2, 1) without load."""
+    def edge_state(self, angles: Array, R: Array) -> EdgeState:
+        """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
+        cos, sin = np.cos(angles), np.sin(angles)
         beyond = self.rod.load_beyond
-        return R[:, None] if beyond is None else R[:, None] + beyond
+        fx, fy = R.tolist() if beyond is None else R[:, None] + beyond
+        return EdgeState(cos, sin, fx * cos + fy * sin, fy * cos - fx * sin)
 
     def balance(self, angles: Array, R: Array) -> Balance:
         """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
         h = self.rod.edges
-        cos, sin = np.cos(angles), np.sin(angles)
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
-        fx, fy = self.edge_forces(R)
-        along, across = fx * cos + fy * sin, fy * cos - fx * sin
-        axial, shear = self._axial, self._shear
-        x_rate, y_rate = cos, sin
-        turn, restoring = across, along
-        border = np.array((sin, -cos))
-        if axial == shear:
-            softness = np.array([[axial, 0.0], [0.0, axial]]) * self.rod.length
-            x_rate, y_rate = cos + fx * axial, sin + fy * axial
-        else:
-            difference = axial - shear
-            turn = across * (1.0 + along * difference)
-            restoring = along + (along**2 - across**2) * difference
-            border = border * (1.0 + along * difference) - np.array((cos, sin)) * across * difference
-            x_rate, y_rate = (
-                cos + along * axial * cos - across * shear * sin,
-                sin + along * axial * sin + across * shear * cos,
-            )
-            mixed = float(h @ (cos * sin)) * difference
-            xx = float(h @ (cos**2 * axial + sin**2 * shear))
-            softness = np.array([[xx, mixed], [mixed, float(h.sum()) * (axial + shear) - xx]])
-        gradient = -h * turn
+        edge = self.edge_state(angles, R)
+        gradient = -h * self.turning(edge)
         gradient[:-1] += m
         gradient[1:] -= m
         off = -tangent * self._inverse_weights
-        diagonal = h * restoring
+        diagonal = h * (edge.along if self._difference == 0.0 else self._restoring(edge))
         diagonal[:-1] -= off
         diagonal[1:] -= off
-        self._hold_ends(angles, gradient, diagonal, off, border := border * h)
-        gap = -np.array((h @ x_rate, h @ y_rate))
+        border = self.border(edge)
+        gap = -(self.directions(edge) @ h)
         if self.hold.chord is not None:
             gap[0] += self.hold.chord - self.hold.compliance * R[0]
-        return Balance(gradient, diagonal, off, border, softness, gap, K, m, tangent)
+        self._hold_ends(angles, gradient, diagonal, off, border)
+        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
 
-    def edge_directions(self, angles: Array, R: Array) -> Array:
+    def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
-        cos, sin = np.cos(angles), np.sin(angles)
-        fx, fy = self.edge_forces(R)
-        stretch, shear = 1.0 + (fx * cos + fy * sin) * self._axial, (fy * cos - fx * sin) * self._shear
-        return np.array((stretch * cos - shear * sin, stretch * sin + shear * cos))
+        stretch, shear = 1.0 + edge.along * self._axial, edge.across * self._shear
+        return np.array((stretch * edge.cos - shear * edge.sin, stretch * edge.sin + shear * edge.cos))
 
-    def edge_softness(self, angles: Array) -> Array:
-        """Change of the extent of every edge per force, (2, 2, n + 2) m/N: h rot C^-1 rot^T."""
-        cos, sin, h = np.cos(angles), np.sin(angles), self.rod.edges
-        mixed = h * cos * sin * (self._axial - self._shear)
-        xx, yy = h * (cos**2 * self._axial + sin**2 * self._shear), h * (sin**2 * self._axial + cos**2 * self._shear)
-        return np.array([[xx, mixed], [mixed, yy]])
+    def turning(self, edge: EdgeState) -> Array:
+        """Moment per length that the edge forces exert on the angles, (n + 2,) N."""
+        if self._difference == 0.0:
+            return edge.across
+        return edge.across * (1.0 + edge.along * self._difference)
 
-    def turning(self, angles: Array, R: Array) -> Array:
-        """Moment per length that the edge forces exert on the angles, (n + 2,) N: -dLambda/dalpha without bending."""
-        cos, sin = np.cos(angles), np.sin(angles)
-        fx, fy = self.edge_forces(R)
-        along, across = fx * cos + fy * sin, fy * cos - fx * sin
-        return np.asarray(across * (1.0 + along * (self._axial - self._shear)))
+    def border(self, edge: EdgeState) -> Array:
+        """Derivative of the gradient by R, (2, n + 2) m; minus that of the extent of the edges by the angles."""
+        h = self.rod.edges
+        border = np.array((h * edge.sin, -h * edge.cos))
+        if self._difference != 0.0:
+            border *= 1.0 + edge.along * self._difference
+            border -= h * np.array((edge.cos, edge.sin)) * (edge.across * self._difference)
+        return border
+
+    def softened(self, edge: EdgeState, force: Array) -> Array:
+        """Extent of every edge, (2, n + 2, q) m, for a small force (2, n + 2, q) or (2, 1, q) N: h rot C^-1 rot^T."""
+        h = self.rod.edges[:, None]
+        if self._difference == 0.0:
+            return np.asarray(self._axial * h * force)
+        cos, sin = edge.cos[:, None], edge.sin[:, None]
+        along, across = self._axial * (cos * force[0] + sin * force[1]), self._shear * (cos * force[1] - sin * force[0])
+        return np.array((h * (cos * along - sin * across), h * (sin * along + cos * across)))
+
+    def _softness(self, edge: EdgeState) -> Array:
+        if self._difference == 0.0:
+            soft = self._axial * self.rod.length
+            return np.array(((soft, 0.0), (0.0, soft)))
+        return np.asarray(self.softened(edge, np.eye(2)[:, None, :]).sum(axis=1))
+
+    def _restoring(self, edge: EdgeState) -> Array:
+        return edge.along + (edge.along**2 - edge.across**2) * self._difference
 
     def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
         """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
@@ -180,9 +189,8 @@ class System:
         ends = ((0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0))
         for end, support, rest_angle, slip, sign in ends:
             if support.kind == "clamp":
-                gradient[end], diagonal[end], off[end], border[:, end] = angles[end] - rest_angle, 1.0, 0.0, 0.0
-                gradient[end] *= self.moment_scale
-                diagonal[end] *= self.moment_scale
+                gradient[end] = self.moment_scale * (angles[end] - rest_angle)
+                diagonal[end], off[end], border[:, end] = self.moment_scale, 0.0, 0.0
             elif support.stiffness or support.friction_moment or support.moment:
                 moment, slope = support.moment_at(float(angles[end]), rest_angle, slip)
                 gradient[end] += moment + sign * support.moment
@@ -207,10 +215,8 @@ class System:
         k, p = len(self._imposed), rhs.shape[1]
         low = columns[:, : k + 1].T @ -solved[:, k + 1 :]
         low[:k] += gap if k == 2 else gap[self._imposed]
-        try:
-            multipliers = self._scale[:, None] * np.linalg.solve(schur, self._scale[:, None] * low)
-        except np.linalg.LinAlgError:
-            multipliers = np.full((k + 1, p), np.nan)
+        _, _, multipliers, info = dgesv(schur, self._scale * low)
+        multipliers = self._scale * multipliers if info == 0 else np.full((k + 1, p), np.nan)
         dR = np.zeros((2, p))
         dR[self._imposed] = multipliers[:k]
         return solved[:, k + 1 :] - solved[:, : k + 1] @ multipliers, dR
@@ -238,11 +244,12 @@ class System:
         if info != 0:
             solved = np.full_like(columns, np.nan)
         schur = columns[:, : k + 1].T @ -solved[:, : k + 1]
-        softness = balance.softness.copy()
-        softness[0, 0] += self.hold.compliance
-        schur[:k, :k] -= softness[self._imposed][:, self._imposed]
+        softness = balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
+        schur[:k, :k] -= softness
+        if self.hold.compliance:
+            schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
-        return columns, solved, schur * self._scale * self._scale[:, None]
+        return columns, solved, schur * self._scales
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:

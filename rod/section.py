@@ -106,8 +106,7 @@ class Section:
     @cached_property
     def _elastic(self) -> Response:
         """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
-        K0 = self.pre_curvature
-        bound = self.law.bound(K0[:1] if np.ptp(K0) == 0.0 else K0)
+        bound = self.law.bound(self.rest())
         if self.profile is None:
             return bound
         profile = self.profile
@@ -117,6 +116,11 @@ class Section:
             return profile * m, profile * tangent
 
         return scaled
+
+    def rest(self) -> Array:
+        """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
+        K0 = self.pre_curvature
+        return K0[:1] if np.ptp(K0) == 0.0 else K0
 
     def virgin(self) -> tuple[Array, Array]:
         """``relaxed`` and ``reached`` of the mounted cable."""

@@ -27,7 +27,7 @@ from rod.bending_test import BendingTest
 from rod.characteristic import Array, Characteristic
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
-from rod.reduction import Balance, System
+from rod.reduction import Balance, EdgeState, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,14 +194,17 @@ def _step(
     rod, R = step.rod, step.right_reaction
     system = System(rod, step.hold, step.before)
     balance = system.balance(step.angles, R)
+    edge = system.edge_state(step.angles, R)
     given = _explicit(test, step, balance, moves, rest, past)
     stretched = -balance.K[:, None] * given.weights / rod.weights[:, None]
-    gradient, gap, directed = _residuals(system, step, balance, given, moves, stretched)
-    _clamps(system, gradient, moves, rest)
+    gradient, gap, extent = _residuals(system, step, balance, edge, given, moves, stretched)
+    _clamps(system, balance, edge, gradient, gap, moves, rest)
     dangles, dR = system.solve(balance, -gradient, -gap)
     dR[0] += given.reaction
     dK = (dangles[:-1] - dangles[1:]) / rod.weights[:, None] + stretched
-    path = np.cumsum(directed - balance.border[:, :, None] * dangles + _softened(system, step, dR), axis=1)
+    extent -= system.border(edge)[:, :, None] * dangles
+    extent += system.softened(edge, dR[:, None, :])
+    path = np.cumsum(extent, axis=1)
     made = _derivatives(step, moves, dangles, dK, balance.tangent[:, None] * dK + given.moment, path, dR)
     return made, _advanced(test, step, balance, moves, past, dangles, dK)
 
@@ -222,13 +225,7 @@ def _explicit(
     reaction = -moves.scalar("force") if hold.force is not None else moves.scalar("none")
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):
-        h, zero = rod.edges[:, None], np.zeros((1, len(moves.names)))
-        half = 0.5 * (np.concatenate((zero, moves.edges)) + np.concatenate((moves.edges, zero)))
-        length = 0.5 * (np.concatenate((zero[:, :1], h)) + np.concatenate((h, zero[:, :1])))
-        lumped = np.stack(
-            [q * half + length * moves.scalar(name) for q, name in zip(rod.load, ("load_x", "load_y"), strict=True)]
-        )
-        load = np.cumsum(lumped[:, :0:-1], axis=1)[:, ::-1]
+        load = np.stack([_load_beyond(step, moves, axis) for axis in (0, 1)])
     moment = _moment(test, step, balance.K, moves, past)
     ends = (
         _end_moment(step, moves, rest.angles[0], past.left, side="left"),
@@ -237,24 +234,34 @@ def _explicit(
     return _Explicit(moment, _weights(moves), ends, load, position, reaction)
 
 
+def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
+    """Change of the dead load to the right of each edge, one component, (n + 1, q) N."""
+    h, load = step.rod.edges, step.rod.load[axis]
+    share = 0.5 * h + (step.rod.length - np.cumsum(h))
+    change = share[:, None] * moves.scalar("load_y" if axis else "load_x")
+    if load and np.any(moves.edges):
+        after = np.cumsum(moves.edges[::-1], axis=0)[::-1] - moves.edges
+        change += load * (0.5 * moves.edges + after)
+    return change
+
+
 def _moment(test: BendingTest, step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Array:
     """Change of the moment at fixed curvature, (n, q)."""
     section, memory = step.rod.section, step.before
-    law, K0, rate = section.law, section.pre_curvature, section.plastic_rate
-    excess = np.maximum(memory.reached, K - K0)
-    virgin = np.greater(K - K0, memory.reached)[:, None]
-    rest = K0 + rate * excess
-    rest_move = moves.pre_curvature
-    if rate or moves.has("plastic_set"):
-        grown = np.where(virgin, -moves.pre_curvature, past.reached)
-        rest_move = rest_move + rate * grown + excess[:, None] * moves.scalar("plastic_set")
-    moment = law.moment_by_pre_curvature(K, rest)[:, None] * rest_move
+    law, rest, move = section.law, section.rest(), moves.pre_curvature
+    if section.plastic_rate or moves.has("plastic_set"):
+        K0 = section.pre_curvature
+        excess = np.maximum(memory.reached, K - K0)
+        grown = np.where(np.greater(K - K0, memory.reached)[:, None], -move, past.reached)
+        rest = K0 + section.plastic_rate * excess
+        move = move + section.plastic_rate * grown + excess[:, None] * moves.scalar("plastic_set")
+    moment = np.broadcast_to(law.moment_by_pre_curvature(K, rest), K.shape)[:, None] * move
     if isinstance(law, Characteristic) and np.any(moves.ordinates):
-        moment = moment + law.moment_by_ordinates(K, rest) @ moves.ordinates
+        moment += law.moment_by_ordinates(K, rest) @ moves.ordinates
     if section.profile is not None:
-        moment = section.profile[:, None] * moment
+        moment *= section.profile[:, None]
     if np.any(moves.profile):
-        moment = moment + law.moment(K, rest)[:, None] * moves.profile
+        moment += law.moment(K, rest)[:, None] * moves.profile
     friction = section.friction
     if friction is not None:
         stick = friction.stick
@@ -283,35 +290,31 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
 
 
 def _residuals(
-    system: System, step: Equilibrium, balance: Balance, given: _Explicit, moves: Directions, stretched: Array
+    system: System,
+    step: Equilibrium,
+    balance: Balance,
+    edge: EdgeState,
+    given: _Explicit,
+    moves: Directions,
+    stretched: Array,
 ) -> tuple[Array, Array, Array]:
     """Change of gradient (n + 1, q), gap (2, q) and extent of the edges (2, n + 1, q), angles and reaction fixed."""
-    rod, R = step.rod, step.right_reaction
-    h = rod.edges
-    direction = system.edge_directions(step.angles, R)
-    turn = system.turning(step.angles, R)
-    extent = direction[:, :, None] * moves.edges
+    extent = system.directions(edge)[:, :, None] * moves.edges
     moment = balance.tangent[:, None] * stretched + given.moment
-    gradient = -turn[:, None] * moves.edges
+    gradient = -system.turning(edge)[:, None] * moves.edges
     gradient[:-1] += moment
     gradient[1:] -= moment
     gradient[0] += given.ends[0]
     gradient[-1] += given.ends[1]
     if given.load is not None:
         gradient += (balance.border[:, :, None] * given.load).sum(axis=0)
-        extent = extent + np.einsum("abj,bjq->ajq", system.edge_softness(step.angles), given.load)
+        extent += system.softened(edge, given.load)
     if moves.has("axial_flexibility", "shear_flexibility"):
         axial, shear = moves.scalar("axial_flexibility"), moves.scalar("shear_flexibility")
-        cos, sin = np.cos(step.angles), np.sin(step.angles)
-        fx, fy = system.edge_forces(R)
-        along, across = fx * cos + fy * sin, fy * cos - fx * sin
-        gradient -= (h * along * across)[:, None] * (axial - shear)
-        extent = extent + np.stack(
-            [
-                (h * along * cos)[:, None] * axial - (h * across * sin)[:, None] * shear,
-                (h * along * sin)[:, None] * axial + (h * across * cos)[:, None] * shear,
-            ]
-        )
+        along, across = (step.rod.edges * edge.along)[:, None] * axial, (step.rod.edges * edge.across)[:, None] * shear
+        cos, sin = edge.cos[:, None], edge.sin[:, None]
+        gradient -= edge.across[:, None] * along - edge.along[:, None] * across
+        extent += np.stack((cos * along - sin * across, sin * along + cos * across))
     gap = -extent.sum(axis=1)
     gap[0] += given.position
     if step.hold.force is not None:
@@ -320,18 +323,23 @@ def _residuals(
     return gradient, gap, extent
 
 
-def _softened(system: System, step: Equilibrium, dR: Array) -> Array:
-    """Change of the edges' extent with the reaction, (2, n + 1, q)."""
-    return np.asarray(np.einsum("abj,bq->ajq", system.edge_softness(step.angles), dR))
-
-
-def _clamps(system: System, gradient: Array, moves: Directions, rest: _Rest) -> None:
-    """A clamped angle follows the angle of its clamp and nothing else."""
+def _clamps(
+    system: System,
+    balance: Balance,
+    edge: EdgeState,
+    gradient: Array,
+    gap: Array,
+    moves: Directions,
+    rest: _Rest,
+) -> None:
+    """A clamped angle follows its clamp; what that does to the neighbour and to the gap is explicit."""
     rod = system.rod
-    for end, support, name in ((0, rod.left, "clamp_angle_left"), (-1, rod.right, "clamp_angle_right")):
+    for end, near, support, name in ((0, 1, rod.left, "clamp_angle_left"), (-1, -2, rod.right, "clamp_angle_right")):
         if support.kind == "clamp":
             angle = rest.angles[end] if support.angle is None else moves.scalar(name)
             gradient[end] = -system.moment_scale * angle
+            gradient[near] -= balance.tangent[end] / rod.weights[end] * angle
+            gap += system.border(edge)[:, end][:, None] * angle
 
 
 def _derivatives(
