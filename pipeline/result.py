@@ -30,10 +30,10 @@ class SpecimenPart(Part):
     """The cable and the rig, as given."""
 
     id: str
-    length_m: float
-    diameter_m: float
+    length_m: float | None = Field(None, description="None if specimen.toml could not be read")
+    diameter_m: float | None = None
     folder: str
-    moving_bearing: str
+    moving_bearing: str = ""
     description: dict[str, str] = {}
 
 

@@ -84,7 +84,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
     _require(source, cable, "length_mm", "the cable length between the bearing axes")
     _require(source, cable, "diameter_mm", "the diameter of the cable")
     return SpecimenFile(
-        id=cable.get("id", _folder_name(folder)),
+        id=cable.get("id", folder_name(folder)),
         length_m=cable["length_mm"] * 1e-3,
         diameter_m=cable["diameter_mm"] * 1e-3,
         camera=_camera(source, values["camera"], folder, settings),
@@ -187,10 +187,14 @@ def _log(values: dict[str, Any], rig: dict[str, Any]) -> LogSpec:
     return LogSpec(**values, force_sign=rig.get("force_sign"))
 
 
-def _folder_name(folder: Path) -> str:
-    """The folder's own name; its real one if it was given as ``.``; characters no file name may hold become ``_``."""
-    name = folder.name if folder.name not in ("", "..") else folder.resolve().name
-    return "".join("_" if _forbidden(char) else char for char in name).lstrip(".") or "specimen"
+def folder_name(folder: Path) -> str:
+    """The folder's own name as an id; its real one if it was given as ``.``."""
+    return plain_name(folder.name if folder.name not in ("", "..") else folder.resolve().name)
+
+
+def plain_name(name: str) -> str:
+    """A name any file system takes: what no file name may hold becomes ``_``."""
+    return "".join("_" if _forbidden(char) else char for char in name).strip(".") or "specimen"
 
 
 def _identifier(value: Any) -> str:

@@ -1,11 +1,32 @@
-"""Settings of the room ``batch``: unit in the name, reason in the description."""
+"""Settings of the room ``batch``: how many specimens at a time, and how long one may take."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class BatchSettings(BaseModel):
-    """Thresholds of ``batch``."""
+    """Limits of ``batch``; none of them changes a result."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    workers: int = Field(0, ge=0, description="processes on this machine; 0: one a core, each with one thread")
+    timeout_s: float = Field(
+        900.0,
+        gt=0,
+        description="s for one specimen; fifteen times what a full diagnosis of six photos takes",
+    )
+    attempts: int = Field(
+        2,
+        ge=1,
+        le=3,
+        description="times a specimen may lose its worker; once may be bad luck with memory, not twice",
+    )
+    waiting_per_worker: int = Field(
+        2,
+        ge=1,
+        description="specimens handed out a worker; one is measured, the next waits, memory stays flat",
+    )
+    memory_per_worker_gb: float = Field(
+        0.0, ge=0, description="GB after which a worker is stopped and its specimen reported; 0: memory / workers"
+    )

@@ -1,0 +1,164 @@
+"""A whole batch: orders out, outcomes in, log and index written, interrupts survived."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from pipeline.batch.orders import make_orders
+from pipeline.batch.specimen import Outcome, Stages
+from pipeline.batch.store import ENTRY, Store
+from pipeline.result import from_json
+from pipeline.settings import Settings
+
+LOG_NAME = "cablebend.log"
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts of a batch.
+
+    ``unstored`` holds the entries, by name, of failures that could not be written; ``trouble`` sentences for the user.
+    """
+
+    total: int
+    names: tuple[str, ...]
+    measured: int = 0
+    failed: int = 0
+    reused: int = 0
+    interrupted: bool = False
+    unstored: dict[str, dict[str, Any]] = field(default_factory=dict)
+    trouble: tuple[str, ...] = ()
+
+    @property
+    def done(self) -> int:
+        """Specimens that came to an end."""
+        return self.measured + self.failed
+
+    def plus(self, outcome: Outcome) -> Tally:
+        """The tally with one more outcome."""
+        unstored = self.unstored if outcome.entry is None else self.unstored | {outcome.name: outcome.entry}
+        return replace(
+            self,
+            measured=self.measured + (not outcome.failed),
+            failed=self.failed + outcome.failed,
+            reused=self.reused + outcome.reused,
+            unstored=unstored,
+        )
+
+
+def run_batch(
+    folders: Sequence[Path],
+    out: Path,
+    settings: Settings,
+    *,
+    scheduler: str | None = None,
+    options: str = "",
+    on_outcome: Callable[[Outcome, Tally], None] = lambda outcome, tally: None,
+    stages: Stages | None = None,
+) -> Tally:
+    """Measure many specimen folders into a folder of results.
+
+    What is there already and depends on the same inputs, settings and program is kept; the index covers everything in
+    the folder. Ctrl-C ends the batch, keeps what is finished and still writes the index.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Specimen folders.
+    out : Path
+        Folder of the results; made if needed.
+    scheduler : str, optional
+        Address of a dask scheduler.
+    options : str
+        Options for the command that reproduces a result.
+    on_outcome : callable
+        Called with each outcome and the tally so far.
+    stages : Stages, optional
+        What is done with a specimen; the pipeline by default.
+
+    Raises
+    ------
+    InputError
+        ``out/busy``, ``out/unwritable``, ``batch/no-scheduler``.
+    """
+    from pipeline.batch.engine import measure_all  # dask takes half a second to load
+
+    store, stages = Store(out.absolute()), stages or Stages.of_pipeline()
+    with store.locked(), _log(out) as log:
+        orders = make_orders(folders, out, settings, options=options)
+        tally = Tally(len(orders), tuple(order.name for order in orders))
+        log.info("begin: %d specimens", len(orders))
+        outcomes = measure_all(orders, settings.batch, scheduler=scheduler, stages=stages)
+        try:
+            for outcome in outcomes:
+                tally = tally.plus(outcome)
+                how = "kept" if outcome.reused else outcome.status
+                log.info("%s: %s, %.1f s, %s", outcome.name, how, outcome.seconds, outcome.headline)
+                on_outcome(outcome, tally)
+        except KeyboardInterrupt:
+            tally = replace(tally, interrupted=True)
+        finally:
+            outcomes.close()
+        tally = _indexed(store, tally, settings, stages)
+        log.info("end: %d measured, %d failed, %d of them kept", tally.measured, tally.failed, tally.reused)
+    return tally
+
+
+def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
+    """Write tables, reports and index of stored results again, without measuring.
+
+    Yields
+    ------
+    str, str or None
+        Name of a result, and why it could not be drawn.
+
+    Raises
+    ------
+    InputError
+        ``out/busy``, ``out/unwritable``.
+    """
+    store, stages = Store(out.absolute()), Stages.of_pipeline()
+    with store.locked():
+        for name in store.names():
+            try:
+                result = from_json((store.out / name / "result.json").read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                yield name, f"result.json cannot be read ({type(error).__name__}); run the specimen again"
+                continue
+            if result.status == "failed":
+                yield name, result.headline
+                continue
+            with store.staging() as staged:
+                stages.write(result, staged, settings)
+                shutil.copy(store.out / name / ENTRY, staged / ENTRY)
+                store.install(staged, name)
+            yield name, None
+        stages.write_index(store.out, settings)
+
+
+def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
+    """Write the index over everything stored; a folder that takes no more files is a trouble of the tally."""
+    try:
+        stages.write_index(store.out, settings)
+    except OSError as error:
+        return replace(tally, trouble=(*tally.trouble, store.unwritable(error).sentence))
+    return tally
+
+
+@contextmanager
+def _log(out: Path) -> Iterator[logging.Logger]:
+    """A log file beside the results, one line a specimen, appended to by each run."""
+    log = logging.Logger("cablebend.batch")  # not registered: no other logger of the process is touched
+    handler = logging.FileHandler(out / LOG_NAME, encoding="utf-8", errors="backslashreplace")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+    log.addHandler(handler)
+    try:
+        yield log
+    finally:
+        handler.close()

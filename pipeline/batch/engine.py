@@ -1,0 +1,121 @@
+"""Orders -> outcomes through dask: processes of this machine, or any scheduler by its address, with the same code.
+
+Specimens are handed out a few at a time and only short outcomes come back, so the memory of this process does not
+depend on the size of the batch. A worker that dies is replaced and its specimen tried once more (see `specimen`).
+A single specimen is measured in this process: starting another takes 1.5 s and protects nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import time
+import uuid
+from collections.abc import Generator, Iterator, Sequence
+
+import dask
+from dask.system import CPU_COUNT
+from distributed import Client, Future, LocalCluster, as_completed
+
+from pipeline.batch.orders import Order
+from pipeline.batch.specimen import ONE_THREAD, Outcome, Stages, measure_order, store_failure
+from pipeline.errors import InputError
+from pipeline.result import FindingPart
+from pipeline.settings.batch import BatchSettings
+
+# One specimen at a time in a worker, the next one waits in the scheduler and not in a process that may die with it;
+# spilling and pausing are for data in workers, and there is none.
+LOCAL = {
+    "distributed.nanny.pre-spawn-environ": ONE_THREAD,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.scheduler.allowed-failures": 3,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.low-level-log-length": 0,
+}
+CONNECT_S = 10.0  # to a scheduler given by its address; those that answer do so within a second
+
+
+def measure_all(
+    orders: Sequence[Order], settings: BatchSettings, *, scheduler: str | None = None, stages: Stages
+) -> Generator[Outcome]:
+    """Measure all orders; outcomes in the order in which they end.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a running dask scheduler whose workers see the same files; else processes of this machine.
+    stages : Stages
+        What is done with a specimen, see `specimen`.
+
+    Raises
+    ------
+    InputError
+        ``batch/no-scheduler`` if nobody answers at the address.
+    """
+    if len(orders) == 1 and scheduler is None and "timeout_s" not in settings.model_fields_set:
+        yield measure_order(orders[0], stages, guarded=False)
+        return
+    with _client(len(orders), settings, scheduler) as client:
+        yield from _stream(client, orders, settings, stages)
+
+
+@contextlib.contextmanager
+def _client(count: int, settings: BatchSettings, scheduler: str | None) -> Iterator[Client]:
+    """A client of a given scheduler, or of workers on this machine that end with it."""
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"no dask scheduler answers at {scheduler!r}",
+                code="batch/no-scheduler",
+                remedy="start one with `dask scheduler`, or leave --scheduler out to use this machine",
+            ) from error
+        with client:
+            yield client
+        return
+    workers = min(settings.workers or CPU_COUNT, count)
+    limit = f"{settings.memory_per_worker_gb}GB" if settings.memory_per_worker_gb else "auto"
+    with (
+        dask.config.set(LOCAL),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=limit,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def _stream(client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages) -> Iterator[Outcome]:
+    """Keep a few orders per worker under way."""
+    doing: dict[str, tuple[Order, float]] = {}
+
+    def hand_out(order: Order) -> Future[Outcome]:
+        future = client.submit(measure_order, order, stages, key=f"specimen-{uuid.uuid4().hex}", pure=False)
+        doing[str(future.key)] = order, time.monotonic()
+        return future
+
+    workers = max(1, sum(client.ncores().values()))
+    waiting = iter(orders)
+    first = itertools.islice(waiting, workers * settings.waiting_per_worker)
+    finished = as_completed([hand_out(order) for order in first], loop=client.loop)
+    for future in finished:
+        order, started = doing.pop(str(future.key))
+        following = next(waiting, None)
+        if following is not None:
+            finished.add(hand_out(following))
+        if future.status == "finished":
+            yield future.result()
+        else:  # the scheduler gave up: too many workers died around it, or the workers cannot run this program
+            trouble = f"{type(future.exception()).__name__}: {str(future.exception())[:300]}"
+            finding = FindingPart(code="specimen/worker-died", level="error", message=f"its worker failed, {trouble}")
+            yield store_failure(order, finding, started)

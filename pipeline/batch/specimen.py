@@ -1,0 +1,214 @@
+"""One specimen of a batch, in whichever process: an order -> a stored result and a short outcome.
+
+The only place where every error is caught: a specimen that fails, for whatever reason, is stored with its reason and
+costs the batch nothing. A worker that dies cannot say so; the note it made before it began (`Store.begin`) does, and
+after the second death, or once the time was over, the specimen is reported instead of tried again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pipeline.batch.orders import Order, fingerprint
+from pipeline.batch.store import Store, write_entry
+from pipeline.errors import InputError
+from pipeline.intake.folder import read_specimen
+from pipeline.result import FindingPart, Result, SpecimenPart, to_json
+from pipeline.settings import Settings
+
+Measure = Callable[..., Result]
+Write = Callable[..., None]
+WriteIndex = Callable[[Path, Settings], None]
+ENTRY_SCHEMA = "cablebend/entry/1"
+# One thread a worker: processes fill the cores, and threads of libraries beside them only wait for each other.
+THREAD_LIMITS = ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in THREAD_LIMITS} | {"OPENCV_FOR_THREADS_NUM": "1"}
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What is done with a specimen; the pipeline itself unless a test or a notebook says otherwise."""
+
+    measure: Measure
+    write: Write
+    write_index: WriteIndex
+
+    @classmethod
+    def of_pipeline(cls) -> Stages:
+        """The pipeline, imported where it is needed: in the worker, when the first specimen is measured."""
+        return cls(_pipeline_measure, _pipeline_write, _pipeline_write_index)
+
+
+def _pipeline_measure(folder: Path, settings: Settings, *, command: str) -> Result:
+    from pipeline.run import measure
+
+    return measure(folder, settings, command=command)
+
+
+def _pipeline_write(result: Result, folder: Path, settings: Settings) -> None:
+    from pipeline.run import write
+
+    write(result, folder, settings)
+
+
+def _pipeline_write_index(out: Path, settings: Settings) -> None:
+    from pipeline.report.index import write_index
+
+    write_index(out, out, settings.report)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an order. ``entry`` is None if it is stored, else what could not be stored."""
+
+    name: str
+    status: Literal["measured", "partial", "failed"]
+    headline: str
+    reused: bool
+    seconds: float
+    entry: dict[str, Any] | None = None
+
+    @property
+    def failed(self) -> bool:
+        """True if nothing was measured."""
+        return self.status == "failed"
+
+
+def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outcome:
+    """Measure a specimen and store it; never raises but for an interrupt.
+
+    Parameters
+    ----------
+    order : Order
+    stages : Stages
+    guarded : bool
+        Note attempts and end the process when the time is over: in a worker of its own only.
+    """
+    started = time.monotonic()
+    store = Store(order.out)
+    try:
+        if guarded:
+            limit = order.settings.batch
+            refused = _earlier_attempts(store, order, limit.attempts, limit.timeout_s)
+            if refused is not None:
+                return store_failure(order, refused, started)
+            with _deadline(limit.timeout_s, store.overdue(order.name)):
+                outcome = _measured(store, order, stages, started)
+            store.end(order.name)
+            return outcome
+        return _measured(store, order, stages, started)
+    except InputError as error:
+        finding = FindingPart(code=error.code, level="error", message=error.sentence)
+        return store_failure(order, finding, started)
+    except Exception as error:
+        return store_failure(order, _refusal(error), started)
+
+
+def _refusal(error: Exception) -> FindingPart:
+    """What a reader of the index is told about an error nobody foresaw."""
+    code, message = "specimen/program-error", f"the program failed: {type(error).__name__}: {str(error)[:500]}"
+    if isinstance(error, MemoryError):
+        code, message = "specimen/memory", "there was not enough memory for this specimen"
+    elif isinstance(error, OSError):
+        code, message = "specimen/file-system", f"a file could not be read or written: {error.strerror or error}"
+    return FindingPart(code=code, level="error", message=message)
+
+
+def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
+    """Why a specimen is not tried (again); None if it may be."""
+    if store.overdue(order.name).exists():
+        message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
+        return FindingPart(code="specimen/timeout", level="error", message=message)
+    if store.begin(order.name) >= attempts:
+        message = f"its process died {attempts} times (out of memory, or a crash in a library); photos may be damaged"
+        return FindingPart(code="specimen/worker-died", level="error", message=message)
+    return None
+
+
+@contextlib.contextmanager
+def _deadline(seconds: float, note: Path) -> Iterator[None]:
+    """End this process when the time is over: code in a library that hangs cannot be asked to stop."""
+
+    def end() -> None:
+        with contextlib.suppress(OSError):
+            note.touch()
+        os._exit(124)  # the customary exit code of a timeout
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _measured(store: Store, order: Order, stages: Stages, started: float) -> Outcome:
+    """Read, compare with what is stored, measure, store."""
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)  # for workers that were started by others; before the libraries load
+    specimen = read_specimen(order.folder, order.settings.intake)
+    mark = fingerprint(specimen, order)
+    stored = store.entry(order.name)
+    if stored is not None and stored.get("fingerprint") == mark:
+        return Outcome(order.name, stored["status"], str(stored.get("headline", "")), True, time.monotonic() - started)
+    result = stages.measure(order.folder, order.settings, command=order.command)
+    entry = _entry(order, result, mark)
+    with store.staging() as staged:
+        stages.write(result, staged, order.settings)
+        write_entry(entry, staged)
+        store.install(staged, order.name)
+    return Outcome(order.name, result.status, entry["headline"], False, time.monotonic() - started)
+
+
+def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
+    reasons = [finding for finding in result.findings if finding.level == "error"]
+    return {
+        "schema": ENTRY_SCHEMA,
+        "name": order.name,
+        "id": result.specimen.id,
+        "folder": result.specimen.folder,
+        "status": result.status,
+        "headline": result.headline or (reasons[0].message if reasons else ""),
+        "code": reasons[0].code if reasons else None,
+        "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
+    }
+
+
+def store_failure(order: Order, finding: FindingPart, started: float) -> Outcome:
+    """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
+
+    Parameters
+    ----------
+    started : float
+        s, `time.monotonic` when the specimen was begun.
+    """
+    store = Store(order.out)
+    result = failed_result(order, finding)
+    entry = _entry(order, result, "")
+    unstored: dict[str, Any] | None = entry
+    with contextlib.suppress(OSError, InputError), store.staging() as staged:
+        (staged / "result.json").write_text(to_json(result) + "\n", encoding="utf-8")
+        write_entry(entry, staged)
+        store.install(staged, order.name)
+        store.end(order.name)
+        unstored = None
+    return Outcome(order.name, "failed", finding.message, False, time.monotonic() - started, unstored)
+
+
+def failed_result(order: Order, finding: FindingPart) -> Result:
+    """The result of a specimen that could not be measured."""
+    return Result(
+        status="failed",
+        headline=finding.message,
+        specimen=SpecimenPart(id=order.name, folder=str(order.folder).encode("utf-8", "replace").decode()),
+        findings=[finding],
+        provenance={"command": order.command, "version": order.version},
+    )

@@ -1,0 +1,146 @@
+"""The folder of results: one folder a specimen, put in place whole or not at all.
+
+A specimen's files are written into a staging folder beside the others and renamed into place, so a reader, a second
+command or the next one after a power cut never sees half a result. ``entry.json`` in each folder says in a few lines
+what is there and from which inputs (its fingerprint): the index and the next run read it instead of ``result.json``.
+One run at a time writes into a folder; the lock is the operating system's and dies with its process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import locket
+
+from pipeline.errors import InputError
+from pipeline.intake.photos import natural_key
+
+ENTRY = "entry.json"
+WORK = ".cablebend"  # staging, attempts and lock
+OWN_FILES = ("index.html", "summary.csv", "result.schema.json", "cablebend.log")
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of results."""
+
+    out: Path
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the folder for one run; what an earlier, killed run left half done is removed.
+
+        Raises
+        ------
+        InputError
+            ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
+        """
+        try:
+            self._work("staging").mkdir(parents=True, exist_ok=True)
+            lock = locket.lock_file(str(self.out / WORK / "lock"), timeout=0)
+            lock.acquire()
+        except locket.LockError as error:
+            raise InputError(
+                "another run writes into this folder",
+                path=self.out,
+                code="out/busy",
+                remedy="wait or choose another -o",
+            ) from error
+        except OSError as error:
+            raise self.unwritable(error) from error
+        try:
+            for name in ("staging", "attempts"):
+                shutil.rmtree(self._work(name), ignore_errors=True)
+                self._work(name).mkdir(parents=True, exist_ok=True)
+            yield
+        finally:
+            lock.release()
+
+    def unwritable(self, error: OSError) -> InputError:
+        """The error for an output folder that refuses to be written."""
+        return InputError(
+            f"cannot be written ({(error.strerror or type(error).__name__).lower()})",
+            path=self.out,
+            code="out/unwritable",
+            remedy="choose another -o or make room",
+        )
+
+    def _work(self, name: str) -> Path:
+        return self.out / WORK / name
+
+    @contextlib.contextmanager
+    def staging(self) -> Iterator[Path]:
+        """An empty folder that is gone afterwards unless `install` moved it."""
+        folder = self._work("staging") / uuid.uuid4().hex
+        folder.mkdir(parents=True)
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def install(self, staged: Path, name: str) -> None:
+        """Put a finished folder into its place; an earlier result there is replaced.
+
+        Raises
+        ------
+        InputError
+            ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
+        """
+        place = self.out / name
+        if place.exists():
+            if not (place / ENTRY).is_file():
+                raise InputError(
+                    "is in the way of a result and none itself",
+                    path=place,
+                    code="out/foreign-folder",
+                    remedy="move it or choose another -o",
+                )
+            old = self._work("staging") / uuid.uuid4().hex
+            place.rename(old)
+            staged.rename(place)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            staged.rename(place)
+
+    def entry(self, name: str) -> dict[str, Any] | None:
+        """What is stored under a name; None if nothing readable is."""
+        try:
+            entry = json.loads((self.out / name / ENTRY).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return entry if isinstance(entry, dict) else None
+
+    def names(self) -> list[str]:
+        """Names of all stored specimens in natural order."""
+        found = (place.name for place in self.out.iterdir() if (place / ENTRY).is_file())
+        return sorted(found, key=natural_key)
+
+    def begin(self, name: str) -> int:
+        """Note that a specimen is about to be measured; how often that was noted before in this run."""
+        note = self._work("attempts") / name
+        before = len(note.read_bytes()) if note.exists() else 0
+        note.parent.mkdir(parents=True, exist_ok=True)
+        note.write_bytes(b"." * (before + 1))
+        return before
+
+    def overdue(self, name: str) -> Path:
+        """Note that tells why a worker ended itself: the time was over."""
+        return self._work("attempts") / f"{name}.overdue"
+
+    def end(self, name: str) -> None:
+        """Forget the attempts of a specimen that came to an end."""
+        (self._work("attempts") / name).unlink(missing_ok=True)
+        self.overdue(name).unlink(missing_ok=True)
+
+
+def write_entry(entry: dict[str, Any], folder: Path) -> None:
+    """Write ``entry.json`` into a staged folder."""
+    text = json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True)
+    (folder / ENTRY).write_text(text + "\n", encoding="utf-8")

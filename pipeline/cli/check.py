@@ -1,0 +1,82 @@
+"""``cablebend check``: read everything, measure nothing, say what would run and what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pipeline.cli.options import settings_options
+from pipeline.cli.run import found
+from pipeline.errors import InputError
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
+@click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
+@settings_options
+@click.pass_context
+def check(
+    ctx: click.Context,
+    folders: tuple[Path, ...],
+    as_json: bool,
+    settings_file: Path | None,
+    assignments: tuple[str, ...],
+) -> None:
+    """Read specimens without measuring them; print what would run and what is wrong, with file and line."""
+    from pipeline.cli.configuration import read_settings
+
+    settings = read_settings(settings_file, assignments)
+    specimens, refused = found(folders, settings.intake)
+    rows = [checked(folder, settings.intake) for folder in specimens]
+    failed = sum(row["status"] == "error" for row in rows)
+    if as_json:
+        click.echo(json.dumps({"specimens": rows, "runs": len(rows) - failed, "errors": failed}, indent=1))
+    else:
+        echo_rows(rows)
+        click.echo(f"{len(rows) - failed} of {len(rows)} specimens would run")
+    ctx.exit(3 if failed == len(rows) else 1 if failed or refused else 0)
+
+
+def checked(folder: Path, settings: Any) -> dict[str, Any]:
+    """What a run would find in one folder."""
+    from pipeline.intake.folder import read_specimen
+
+    try:
+        specimen = read_specimen(folder, settings)
+    except InputError as error:
+        trouble = {"code": error.code, "level": "error", "message": error.sentence}
+        return {"folder": str(folder), "id": None, "status": "error", "steps": 0, "photos": 0, "findings": [trouble]}
+    findings = [{"code": f.code, "level": f.level, "message": f.message} for f in specimen.findings]
+    status = "warning" if any(finding["level"] != "info" for finding in findings) else "ok"
+    return {
+        "folder": str(folder),
+        "id": specimen.id,
+        "status": status,
+        "steps": len(specimen.steps),
+        "photos": len(specimen.images),
+        "findings": findings,
+    }
+
+
+def echo_rows(rows: list[dict[str, Any]]) -> None:
+    """A table for people: a line a specimen, its findings below it."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}
+    table = Table(box=SIMPLE_HEAD)
+    for name in ("specimen", "state", "steps", "photos", "what is inferred or wrong"):
+        table.add_column(name, justify="right" if name in ("steps", "photos") else "left")
+    for row in rows:
+        notes = Text("\n").join(
+            Text.assemble((finding["level"], colours[finding["level"]]), f" {finding['message']} [{finding['code']}]")
+            for finding in row["findings"]
+        )
+        state = Text(row["status"], colours[row["status"]])
+        table.add_row(Text(row["id"] or row["folder"]), state, str(row["steps"]), str(row["photos"]), notes)
+    Console(soft_wrap=False).print(table)

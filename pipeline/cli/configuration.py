@@ -1,0 +1,133 @@
+"""Settings from a TOML file and from ``--set section.key=value``; unknown names are answered with the nearest one."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from pipeline.errors import InputError
+from pipeline.intake.tomltable import TomlFile, nearest, read_toml
+from pipeline.settings import Settings
+
+SETTINGS_MAX_BYTES = 10_000_000  # a settings file is written by its user; the limit only stops a wrong file early
+
+
+def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
+    """Settings from a file, changed by assignments.
+
+    Raises
+    ------
+    InputError
+        ``settings/unknown-key``, ``settings/wrong-value``, ``settings/assignment``, and those of `read_toml`.
+    """
+    tables: dict[str, Any] = {}
+    source: TomlFile | None = None
+    if file is not None:
+        source = read_toml(file, limit=SETTINGS_MAX_BYTES)
+        tables = source.tables
+        _check_names(tables, Settings, (), source)
+    for assignment in assignments:
+        tables = _assigned(tables, assignment)
+    try:
+        return Settings.model_validate(tables)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = [str(part) for part in first["loc"]]
+        raise InputError(
+            f"{'.'.join(place)} = {first['input']!r} cannot be used",
+            path=file,
+            line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
+            code="settings/wrong-value",
+            remedy=f"give a value as `cablebend init --settings` describes it ({first['msg'].lower()})",
+        ) from error
+
+
+def _check_names(
+    values: dict[str, Any], model: type[BaseModel], above: tuple[str, ...], source: TomlFile | None
+) -> None:
+    """Refuse names that are no settings, at any depth."""
+    for name, value in values.items():
+        if name not in model.model_fields:
+            place, full = ".".join(above), ".".join((*above, name))
+            near = ".".join((*above, nearest(name, tuple(model.model_fields))))
+            raise InputError(
+                f"setting {full} is not known",
+                path=None if source is None else source.path,
+                line=None
+                if source is None
+                else source.line_of(place, name) or source.line_of(".".join((*above, name))),
+                code="settings/unknown-key",
+                remedy=f"the nearest one is {near}",
+            )
+        inner = model.model_fields[name].annotation
+        if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, BaseModel):
+            _check_names(value, inner, (*above, name), source)
+
+
+def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
+    """The tables with one value changed."""
+    name, equals, text = assignment.partition("=")
+    keys = [key.strip() for key in name.split(".")]
+    if not equals or len(keys) < 2 or not all(keys):
+        raise InputError(
+            f"--set {assignment!r} is no assignment", code="settings/assignment", remedy="write --set section.key=value"
+        )
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except ValueError:
+        value = text.strip()
+    change: dict[str, Any] = {keys[-1]: value}
+    for key in reversed(keys[:-1]):
+        change = {key: change}
+    _check_names(change, Settings, (), None)
+    return _merged(tables, change)
+
+
+def _merged(tables: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
+    result = dict(tables)
+    for key, value in change.items():
+        old = result.get(key)
+        result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return result
+
+
+def as_options(file: Path | None, assignments: Sequence[str]) -> str:
+    """The options as they are typed, for the command that reproduces a result."""
+    parts = [] if file is None else [f'--settings "{file}"']
+    return " ".join([*parts, *(f'--set "{assignment}"' for assignment in assignments)])
+
+
+def commented_settings(settings: Settings) -> str:
+    """All settings as TOML: every value with its unit and the reason for it, as comments."""
+    lines = [
+        "# Settings of cablebend with their defaults. Keep the lines you change; what is not given has its default."
+    ]
+    _describe(settings, (), lines)
+    return "\n".join(lines)
+
+
+def _describe(model: BaseModel, above: tuple[str, ...], lines: list[str]) -> None:
+    """Append one table: plain values first, as TOML wants it, then the tables inside."""
+    inner = []
+    if above:
+        lines += ["", f"[{'.'.join(above)}]"]
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if isinstance(value, BaseModel):
+            inner.append((name, value))
+            continue
+        lines += textwrap.wrap(field.description or "", 110, initial_indent="# ", subsequent_indent="# ")
+        lines.append(f"# {name} = ..." if value is None else f"{name} = {_toml(value)}")
+    for name, value in inner:
+        _describe(value, (*above, name), lines)
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML; JSON writes numbers, texts, flags and lists alike."""
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,52 @@
+"""The group of commands. A command's module is loaded when it is called, and heavy libraries when it works."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import click
+
+from pipeline.errors import InputError
+
+# command -> module of this room; each module has a function of the command's name
+COMMANDS = ("run", "check", "init", "report")
+INTERRUPTED = 130
+
+
+class Commands(click.Group):
+    """Commands found by name in their modules; an `InputError` of any of them is one sentence and exit code 2."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of use."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, loaded now."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = getattr(importlib.import_module(f"pipeline.cli.{cmd_name}"), cmd_name)
+        return command if isinstance(command, click.Command) else None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; say what a user's file or setting did wrong without a traceback."""
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            click.echo(f"cablebend: {error.sentence}", err=True)
+            ctx.exit(2)
+        except KeyboardInterrupt:
+            click.echo("cablebend: interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="cablebend", prog_name="cablebend")
+def main() -> None:
+    """Bending stiffness characteristic of cables from photos and forces.
+
+    A specimen is a folder with specimen.toml, a force log and photos; `cablebend init FOLDER` writes the first for you.
+
+    Exit codes: 0 all measured; 1 finished, but a specimen failed; 2 usage or configuration; 3 nothing could be
+    measured; 130 interrupted, the same command resumes.
+    """

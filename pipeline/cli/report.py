@@ -1,0 +1,31 @@
+"""``cablebend report``: draw reports, tables and index again from stored results, without measuring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pipeline.cli.options import settings_options
+from pipeline.errors import InputError
+
+
+@click.command()
+@click.argument("out", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@settings_options
+@click.pass_context
+def report(ctx: click.Context, out: Path, settings_file: Path | None, assignments: tuple[str, ...]) -> None:
+    """Draw everything in the results folder OUT again, for instance with `--set report.language=de`."""
+    from pipeline.batch import redraw
+    from pipeline.cli.configuration import read_settings
+
+    settings = read_settings(settings_file, assignments)
+    drawn = 0
+    for name, trouble in redraw(out, settings):
+        drawn += trouble is None
+        click.echo(f"{name}: {'drawn' if trouble is None else trouble}", err=True)
+    if drawn == 0:
+        error = InputError("holds no results", path=out, code="out/no-results", remedy="give the -o of an earlier run")
+        click.echo(f"cablebend: {error.sentence}", err=True)
+        ctx.exit(3)
+    click.echo(out / "index.html")

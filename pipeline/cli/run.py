@@ -1,0 +1,121 @@
+"""``cablebend run``: specimen folders -> a folder of results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pipeline.cli.options import settings_options
+from pipeline.errors import InputError
+
+if TYPE_CHECKING:
+    from pipeline.batch import Tally
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
+@click.option(
+    "-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the results."
+)
+@click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine; one a core by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
+@click.option("--timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Limit per specimen.")
+@click.option("--json", "as_json", is_flag=True, help="Results as JSON on stdout.")
+@settings_options
+@click.pass_context
+def run(
+    ctx: click.Context,
+    folders: tuple[Path, ...],
+    out: Path,
+    workers: int | None,
+    scheduler: str | None,
+    timeout: float | None,
+    as_json: bool,
+    settings_file: Path | None,
+    assignments: tuple[str, ...],
+) -> None:
+    """Measure specimens and write their reports.
+
+    FOLDER is a specimen or any folder above specimens. What was measured before with the same inputs, settings and
+    program is kept, so the same command resumes an interrupted run.
+    """
+    from pipeline.batch import Store, run_batch
+    from pipeline.cli.configuration import as_options, read_settings
+    from pipeline.cli.progress import progress
+
+    given = {"batch.workers": workers, "batch.timeout_s": timeout}
+    limits = [f"{name}={value}" for name, value in given.items() if value is not None]
+    options = as_options(settings_file, assignments)
+    settings = read_settings(settings_file, (*assignments, *limits))
+    specimens, refused = found(folders, settings.intake)
+    if not specimens:
+        ctx.exit(3)
+    with progress(len(specimens)) as show:
+        tally = run_batch(specimens, out, settings, scheduler=scheduler, options=options, on_outcome=show)
+    for sentence in tally.trouble:
+        click.echo(f"cablebend: {sentence}", err=True)
+    entries = stored_entries(Store(out), tally)
+    if as_json:
+        echo_json(entries, tally, out)
+    else:
+        echo_table(entries, tally, out)
+    ctx.exit(exit_code(tally, refused))
+
+
+def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], int]:
+    """Specimens in all folders, and how many folders were refused, each with a sentence on stderr."""
+    from pipeline.intake.folder import find_specimens
+
+    specimens: dict[Path, None] = {}
+    refused = 0
+    for folder in folders:
+        try:
+            specimens.update(dict.fromkeys(find_specimens([folder], settings)))
+        except InputError as error:
+            refused += 1
+            click.echo(f"cablebend: {error.sentence}", err=True)
+    return list(specimens), refused
+
+
+def exit_code(tally: Tally, refused: int = 0) -> int:
+    """Exit code of the contract."""
+    if tally.interrupted:
+        return 130
+    if tally.measured == 0:
+        return 3
+    return 1 if tally.failed or refused or tally.trouble else 0
+
+
+def stored_entries(store: Any, tally: Tally) -> Iterator[dict[str, Any]]:
+    """What became of each specimen of this run, in the order of the folders; read one at a time."""
+    for name in tally.names:
+        entry = tally.unstored.get(name) or store.entry(name)
+        if entry is not None:
+            yield entry
+
+
+def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:
+    """One JSON document, written piece by piece so that memory does not grow with the batch."""
+    keys = ("name", "id", "folder", "status", "headline", "code")
+    click.echo('{"specimens": [', nl=False)
+    for number, entry in enumerate(entries):
+        shown = {key: entry[key] for key in keys}
+        click.echo(("" if number == 0 else ",") + "\n " + json.dumps(shown), nl=False)
+    counts = {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused}
+    rest = {"counts": counts, "interrupted": tally.interrupted, "out": str(out), "trouble": list(tally.trouble)}
+    click.echo("],\n " + json.dumps(rest)[1:])
+
+
+def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:
+    """One line a specimen, then the counts and where to look."""
+    width = min(30, max((len(name) for name in tally.names), default=0))
+    for entry in entries:
+        click.echo(f"{entry['name']:<{width}}  {entry['status']:<8}  {entry['headline']}")
+    kept = f" ({tally.reused} kept from an earlier run)" if tally.reused else ""
+    click.echo(f"{tally.measured} of {tally.total} measured{kept}, {tally.failed} failed: {out / 'index.html'}")
+    if tally.interrupted:
+        click.echo("interrupted; the same command resumes", err=True)

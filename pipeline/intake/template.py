@@ -1,0 +1,88 @@
+"""A commented ``specimen.toml`` to fill in, for a folder that has photos and a force log but no description yet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.errors import InputError
+from pipeline.intake.folder import candidate_logs
+from pipeline.intake.photos import list_photos
+from pipeline.intake.specimenfile import NAME, folder_name
+from pipeline.settings.intake import IntakeSettings
+
+TEMPLATE = """\
+# Description of one bending test for cablebend. Lines with "# key = ..." are optional: remove the # to use them.
+# In this folder: {photos} photos{logs}.
+
+[specimen]
+id = "{id}"                 # name of the result; default: the folder's name
+length_mm = 0.0             # TO FILL IN: cable length between the two bearing axes
+diameter_mm = 0.0           # TO FILL IN: outer diameter of the cable
+# type = "..."              # free text; specimens of one type are pooled in the index
+# batch = "..."
+# notes = "..."
+# temperature_C = 23.0
+
+[camera]                    # where the scale comes from; the first that is given counts
+# scale_px_per_mm = 10.0    # a number, or
+# calibration = "calibration"                              # a folder of chessboard photos in the plane of the cable
+# board = {{columns = 9, rows = 6, square_mm = 10.0}}        # with inner corners and the measured side of a square
+# distance_mm = 400.0       # camera to that plane, to correct for the height of the cable axis
+# neither: bearing distance by the displacement log, or the diameter of the bearing covers
+
+[rig]
+moving_bearing = "left"     # or "right"
+# bearing_marker_mm = 12.0  # diameter of the round cover on each bearing axis
+# bearings_px = [[100, 500], [2000, 500]]  # axes in the first photo, left and right, where no cover can be seen
+# force_sign = "compression"               # or "tension": which sign of the log means compression
+
+[force_log]                 # only what cannot be told from the file itself
+{file}# columns = {{force = "Kraft [N]", displacement = "Weg [mm]", step = "Schritt", image = "Bild"}}
+# units = {{force = "N", displacement = "mm", time = "s"}}
+# decimal = ","             # or "."
+# separator = ";"           # or "," or "\\t"
+# encoding = "cp1252"       # or "utf-8", "utf-16"
+"""
+
+
+def write_template(folder: Path, settings: IntakeSettings) -> Path:
+    """Write a commented ``specimen.toml`` into a folder.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        ``init/exists`` if there is one already, ``folder/missing``, ``folder/no-photos``.
+    """
+    path = folder / NAME
+    if not folder.is_dir():
+        raise InputError("is no folder", path=folder, code="folder/missing", remedy="give a folder of photos")
+    photos = list_photos(folder, without=None, settings=settings)
+    if not photos:
+        raise InputError(
+            "has no photos", path=folder, code="folder/no-photos", remedy="put the photos into its folder images"
+        )
+    logs = candidate_logs(folder)
+    text = TEMPLATE.format(
+        id=folder_name(folder),
+        photos=len(photos),
+        logs=f" and the table{'s' * (len(logs) > 1)} {', '.join(logs[:5])}" if logs else ", but no force log yet",
+        file=f"file = {_quoted(logs[0])}\n" if len(logs) == 1 else '# file = "force.csv"\n',
+    )
+    try:
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except FileExistsError as error:
+        raise InputError(
+            "exists already", path=path, code="init/exists", remedy="edit it, or remove it first"
+        ) from error
+    return path
+
+
+def _quoted(name: str) -> str:
+    """A TOML string."""
+    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
