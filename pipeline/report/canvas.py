@@ -49,10 +49,13 @@ STEP_LEVELS = 24  # neighbours of a longer test share a colour; no eye tells mor
 # Room above the axes for a legend, in px.
 ONE_ROW, TWO_ROWS = 22.0, 38.0
 
+# Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.
+FONT = "DejaVu Sans"
+
 STYLE = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cablebend",
-    "font.family": "sans-serif",
+    "font.family": FONT,
     "font.size": 11.0,
     "axes.titlesize": 11.0,
     "axes.labelsize": 11.0,

@@ -1,0 +1,304 @@
+"""``report.pdf``: the same answer and the same figures on two to four A4 pages, for the archive.
+
+The same input gives the same bytes: no clock, no random names. Pages: the answer; mechanics; photos with their
+centerlines and where the numbers come from; the diagnosis, if there was one. Photos beyond the number in the settings
+are in report.html.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import textwrap
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.image import imread
+
+from pipeline.report import figures, maps, ranking
+from pipeline.report.answer import answer
+from pipeline.report.canvas import FONT, LIGHT, style
+from pipeline.report.curves import curves
+from pipeline.report.diagnosed import diagnosis_view, residual_map
+from pipeline.report.document import simulation_texts
+from pipeline.report.evidence import force_rows
+from pipeline.report.files import write_atomic
+from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
+from pipeline.report.words import Words
+from pipeline.result import DiagnosisPart, PhotoPart, Result
+from pipeline.settings import ReportSettings
+
+PAGE = (595.0, 842.0)  # A4 in points
+MARGIN = 44.0
+LEADING = 1.45
+# Mean width of a letter of DejaVu Sans over its size, for breaking lines.
+LETTER = 0.56
+# Of pictures on the page: the line over a photo of 250 pt can be judged, six photos stay below 2 MB.
+DOTS_PER_INCH = 150
+
+
+class Sheet:
+    """A page that is filled from the top: texts, then parts for figures.
+
+    Parameters
+    ----------
+    title : str
+        Head of the page.
+    """
+
+    def __init__(self, title: str) -> None:
+        self.figure = Figure(figsize=(PAGE[0] / 72.0, PAGE[1] / 72.0), dpi=72, facecolor="white")
+        self.y = MARGIN
+        self.text(title, size=9.0, color=LIGHT["muted"])
+        self.y += 6.0
+
+    def text(self, text: str, *, size: float = 10.0, bold: bool = False, color: str = LIGHT["ink"]) -> None:
+        """Write a paragraph over the width of the page."""
+        width = PAGE[0] - 2.0 * MARGIN
+        for line in textwrap.wrap(printable(text), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]:
+            self.y += LEADING * size
+            self.figure.text(
+                MARGIN / PAGE[0],
+                1.0 - self.y / PAGE[1],
+                line,
+                size=size,
+                weight="bold" if bold else "normal",
+                color=color,
+            )
+        self.y += 0.4 * size
+
+    def pairs(self, rows: list[tuple[str, str]], *, size: float = 8.5) -> None:
+        """Write names and texts, one pair a paragraph."""
+        for name, text in rows:
+            self.text(f"{name}: {text}", size=size)
+
+    def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> FigureBase:
+        """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
+        inner = PAGE[0] - 2.0 * MARGIN
+        x0, x1 = (MARGIN + share * inner for share in (left, right))
+        grid = self.figure.add_gridspec(
+            1,
+            1,
+            left=x0 / PAGE[0],
+            right=x1 / PAGE[0],
+            top=1.0 - self.y / PAGE[1],
+            bottom=1.0 - (self.y + height) / PAGE[1],
+        )
+        if advance:
+            self.y += height + 8.0
+        return self.figure.add_subfigure(grid[0, 0])
+
+    def room(self) -> float:
+        """Height left on the page in points."""
+        return PAGE[1] - MARGIN - self.y
+
+
+@cache
+def _letters() -> frozenset[int]:
+    return frozenset(get_font(findfont(FontProperties(family=[FONT]))).get_charmap())
+
+
+def printable(text: str) -> str:
+    """Text with every letter the font of the figures has not replaced by a box."""
+    letters = _letters()
+    return "".join(letter if ord(letter) in letters or letter.isspace() else "□" for letter in text)
+
+
+def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
+    """Content of ``report.pdf``."""
+    settings = settings or ReportSettings()
+    words = Words(settings.language)
+    with style():
+        sheets = [_answer_sheet(result, words, settings)]
+        if result.steps or curves(result):
+            sheets.append(_mechanics_sheet(result, words, settings))
+        sheets.append(_photo_sheet(result, words, settings))
+        if result.diagnosis is not None:
+            sheets.append(_diagnosis_sheet(result, result.diagnosis, words, settings))
+        file = io.BytesIO()
+        metadata = {
+            "CreationDate": None,
+            "Producer": None,
+            "Creator": "cablebend",
+            "Title": words("title", id=result.specimen.id),
+        }
+        with PdfPages(file, metadata=metadata) as pages:
+            for number, sheet in enumerate(sheets, start=1):
+                place = words("page_of", page=number, pages=len(sheets))
+                sheet.figure.text(0.5, 20.0 / PAGE[1], place, size=8.0, ha="center", color=LIGHT["muted"])
+                pages.savefig(sheet.figure, dpi=DOTS_PER_INCH)
+    return file.getvalue()
+
+
+def _head(result: Result) -> str:
+    return " · ".join(part for part in (result.specimen.id, result.specimen.description.get("type", "")) if part)
+
+
+def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
+    """Answer, main figure, adequacy, agreement, K0 three ways, what to do next, warnings."""
+    sheet, said = Sheet(_head(result)), answer(result, words, settings)
+    sheet.text(said.sentence, size=14.0, bold=True)
+    if curves(result):
+        figures.draw_characteristic(sheet.part(300.0, left=0.04, right=0.96), result, words, settings)
+        sheet.text(words("convention", coverage=words.number(100.0 * settings.band_coverage)), color=LIGHT["muted"])
+    parts = [("what_next", said.advice)]
+    if result.status != "failed":
+        parts += [
+            ("adequate", f"{said.verdict + '. ' if said.verdict else ''}{said.model}"),
+            ("two_ways", said.agreement),
+        ]
+    for title, text in parts:
+        sheet.text(words(title), bold=True)
+        sheet.text(text)
+    if said.pre_curvatures:
+        sheet.text(words("pre_curvature"), bold=True)
+        sheet.text("; ".join(f"{way}: {value} 1/m" for way, value in said.pre_curvatures))
+    use = simulation_texts(result, words, settings)
+    if use:
+        sheet.text(words("nav_use"), bold=True)
+        for title, key in (("use_equivalent", "equivalent"), ("use_radius", "radius")):
+            if use.get(key):
+                sheet.text(f"{words(title)}: {use[key]}")
+    troubles = [finding for finding in result.findings if finding.level != "info"]
+    if troubles:
+        sheet.text(words("nav_findings"), bold=True)
+        for finding in troubles:
+            if sheet.room() > 30.0:
+                sheet.text(f"{words(f'level_{finding.level}')}: {finding.message}", size=9.0)
+    return sheet
+
+
+def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
+    """Forces with their table, moment curve, curvatures, residual map."""
+    sheet = Sheet(_head(result))
+    sheet.text(words("nav_mechanics"), size=13.0, bold=True)
+    if result.steps:
+        figures.draw_forces(sheet.part(270.0, right=0.52, advance=False), result, words, settings)
+    if curves(result):
+        figures.draw_moment(sheet.part(270.0, left=0.52, advance=False), result, words, settings)
+    sheet.y += 278.0
+    if any(photo.kappa_per_m for photo in result.photos):
+        figures.draw_curvatures(sheet.part(230.0, right=0.5, advance=False), result, words)
+    residuals = maps.measured_map(result)
+    if residuals is not None:
+        maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, settings, title=words("fig_map"))
+    sheet.y += 236.0
+    unit = figures.force_unit(result, words).symbol
+    heads = [words("col_step"), words("col_branch"), words("col_displacement")]
+    heads += [words(key, unit=unit) for key in ("col_force", "col_force_fit", "col_residual")] + [words("col_sigma")]
+    rows = force_rows(result, words)[: max(0, int(sheet.room() / 13.0) - 2)]
+    if rows:
+        _grid(sheet, heads, rows)
+    return sheet
+
+
+def _grid(sheet: Sheet, heads: list[str], rows: list[list[str]]) -> None:
+    """A table over the width of the page."""
+    axes = sheet.part(13.0 * (len(rows) + 1), advance=True).add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    table = axes.table(cellText=rows, colLabels=heads, loc="center", cellLoc="right", edges="horizontal")
+    table.auto_set_font_size(False)
+    table.set_fontsize(7.5)
+    table.scale(1.0, 1.0)
+    for cell in table.get_celld().values():
+        cell.set_linewidth(0.4)
+        cell.set_edgecolor(LIGHT["grid"])
+
+
+def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
+    """Photos with their centerlines, two in a row; specimen, fit and provenance."""
+    sheet = Sheet(_head(result))
+    sheet.text(words("nav_photos"), size=13.0, bold=True)
+    pictures = [photo for photo in result.photos if photo.preview is not None]
+    shown = pictures[: settings.photos_in_pdf]
+    for index in range(0, len(shown), 2):
+        row = shown[index : index + 2]
+        height = 18.0 + max(_height(photo) for photo in row)
+        for column, photo in enumerate(row):
+            _picture(sheet.part(height, left=0.5 * column, right=0.5 * column + 0.48, advance=False), photo, words)
+        sheet.y += height + 4.0
+    if not pictures:
+        sheet.text(words("photo_none"))
+    if len(pictures) > len(shown):
+        sheet.text(words("more_photos", count=len(pictures) - len(shown)), size=8.5)
+    sheet.text(words("nav_data"), size=13.0, bold=True)
+    source = provenance_rows(result)
+    rows = [
+        *specimen_rows(result, words),
+        *fit_rows(result, words),
+        (words("reproduce"), source.command),
+        *source.facts,
+    ]
+    rows += [(name, digest[:16]) for name, digest in source.inputs]
+    for row in rows:
+        if sheet.room() > 24.0:
+            sheet.pairs([row], size=8.0)
+    return sheet
+
+
+def _height(photo: PhotoPart) -> float:
+    """Height of a picture of half the page's width, at most a fifth of the page."""
+    preview = photo.preview
+    width = 0.48 * (PAGE[0] - 2.0 * MARGIN)
+    return 0.0 if preview is None else min(width * preview.height / preview.width, 0.2 * PAGE[1])
+
+
+def _picture(part: FigureBase, photo: PhotoPart, words: Words) -> None:
+    """One photo with its centerline; hidden parts dashed."""
+    if photo.preview is None:
+        return
+    head = 14.0 / part.bbox.height
+    axes = part.add_axes((0.0, 0.0, 1.0, 1.0 - head))
+    axes.set_axis_off()
+    axes.imshow(imread(io.BytesIO(base64.b64decode(photo.preview.jpeg_base64)), format="jpeg"), cmap="gray")
+    axes.set_autoscale_on(False)
+    if photo.u_px:
+        u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction - 0.5
+        v = (np.asarray(photo.v_px) + 0.5) / photo.preview.reduction - 0.5
+        axes.plot(u, v, color="#2aa8dd", lw=0.8, ls=(0, (3, 2)))
+        axes.plot(np.where(photo.seen, u, np.nan), v, color="#ffb000", lw=1.0)
+    status = "" if photo.status == "traced" else f", {words(f'status_{photo.status}')}"
+    label = printable(f"{words('fig_photo', step=photo.step)}{status}")
+    part.text(0.0, 1.0 - 10.0 / part.bbox.height, label, size=8.5, color=LIGHT["ink"])
+
+
+def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> Sheet:
+    """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
+    sheet, view = Sheet(_head(result)), diagnosis_view(result, words, settings)
+    sheet.text(words("nav_diagnosis"), size=13.0, bold=True)
+    sheet.text(part.headline, bold=True)
+    if view is None:
+        return sheet
+    for line in (*view.named, *view.gain, *view.leftover):
+        sheet.text(line)
+    if part.table:
+        height = min(ranking.ranking_height(part, settings), 330.0)
+        ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
+    before, after = (residual_map(values) for values in (part.residuals_before, part.residuals_after))
+    for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
+        if residuals is not None and residuals.steps:
+            area = sheet.part(190.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
+            maps.draw_map(area, residuals, words, settings, title=words(title))
+    if before is not None or after is not None:
+        sheet.y += 196.0
+    texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
+    texts += [(words("blind_spots"), line) for line in view.blind_spots]
+    for text in texts:
+        if sheet.room() > 24.0:
+            sheet.pairs([text], size=9.0)
+    return sheet
+
+
+def write_pdf(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
+    """Write ``report.pdf`` into a folder, at once or not at all.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    return write_atomic(Path(folder) / "report.pdf", pdf_bytes(result, settings))
