@@ -126,11 +126,20 @@ class SegmentationSettings(StageSettings):
     max_covered_share: float = Field(
         0.5, gt=0, le=1, description="share of the photo; a mask that covers more is ground, not cable"
     )
+    crossing_level_dark: float = Field(
+        0.6,
+        gt=0,
+        lt=1,
+        description="share of the contrast at which a dark cable's edge is taken: above a cast shadow's",
+    )
+    crossing_level_bright: float = Field(
+        0.35, gt=0, lt=1, description="share of the contrast; a bright round sheath falls off toward its flanks"
+    )
     smoothing_widths: float = Field(
         0.8, gt=0, description="widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03"
     )
     accepted_width_ratio: tuple[float, float] = Field(
-        (0.75, 1.3), description="ratio of measured width to diameter; shadow and glare leave it within 20 %"
+        (0.6, 1.35), description="ratio of half-level width to diameter; a bright round sheath is dark at its flanks"
     )
     max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
     seen_share: float = Field(
@@ -168,11 +177,29 @@ class BearingSettings(StageSettings):
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"
     )
     sure_rim: float = Field(0.7, gt=0, lt=1, description="share of the rim; with so much seen no other centre is tried")
+    dot_radii: tuple[float, ...] = Field(
+        (0.12, 0.16, 0.21, 0.28, 0.37),
+        description="radii of a cover; sizes of a dot or screw on its axis that are tried",
+    )
+    rim_tolerance: float = Field(
+        0.015,
+        gt=0,
+        description="radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider",
+    )
+    rim_over_texture: float = Field(
+        2.5, gt=0, description="ratio to the median slope of the rays; weaker edges are noise and texture"
+    )
+    pooled_rays: float = Field(1.5, gt=0, description="rays; standard deviation of the pooling along the rim")
+    aside_std_radii: float = Field(
+        0.25,
+        gt=0,
+        description="radii; how far aside of the visible cable's direction the centre lies: bend under the cover",
+    )
     directions: int = Field(
         240, ge=90, description="rays of the circle fit at most; more share their pixels and tell nothing new"
     )
     edge_over_texture: float = Field(
-        3.0, gt=0, description="ratio to the median gradient in the window; below it texture votes for centres"
+        3.0, gt=0, description="ratio to the median gradient in the window; stronger edges count no more than this"
     )
     candidates: int = Field(3, ge=1, description="best voted centres that are fitted; the rim decides among them")
     center_std_floor_px: float = Field(

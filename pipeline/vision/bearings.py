@@ -57,7 +57,7 @@ def find_bearings(
     if radius is None:
         first, second = (_visible_end(end, width_px, settings) for end in ends)
         return first, second
-    circles = [find_cover(photo, end.place, end.outward, radius, settings) for end in ends]
+    circles = [find_cover(photo, end, radius, width_px, settings) for end in ends]
     first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
     return first, second
 

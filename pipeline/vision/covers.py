@@ -1,16 +1,16 @@
 """Round bearing covers: a circle of about known radius near the end of the cable, to a few hundredths of a pixel.
 
-``window -> colour gradient -> votes for centres at one radius (Hough) -> radial profiles -> edges -> robust circle``
+``window -> colour gradient -> best centres for one radius (ring operator) -> radial edges -> robust circle``
 
 Any look serves, brighter or darker than ground and cable, with or without a dot, as long as part of the rim shows:
-edges vote by direction and not by strength, and the circle is fitted with a robust loss, so the sector where the
-cable leaves and sectors without contrast do not count.
+the centre is sought by the mean step around the rim and the circle is fitted with a robust loss, so the sector where
+the cable leaves and sectors without contrast do not count. A cover of exactly the ground's look is found by its dot.
 Units: px of the photo as displayed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -19,6 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 
@@ -45,19 +46,19 @@ class Circle:
 
 
 def find_cover(
-    photo: Photo, end_px: Array, outward: Array, radius_px: float, settings: BearingSettings
+    photo: Photo, end: CableEnd, radius_px: float, width_px: float, settings: BearingSettings
 ) -> Circle | None:
     """The cover at the end of a cable.
 
     Parameters
     ----------
     photo : Photo
-    end_px : (2,) px
+    end : CableEnd
         Where the cable's mask ends: at the rim, or beyond it where cover and cable look alike.
-    outward : (2,)
-        Unit vector in which the cable leaves.
     radius_px : px
         Expected radius; the true one may differ by ``settings.radius_tolerance``.
+    width_px : px
+        Of the cable.
 
     Returns
     -------
@@ -65,11 +66,44 @@ def find_cover(
         None if no circle shows at least ``settings.min_rim`` of its rim.
     """
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
-    window = _Window.cut(photo, end_px, (2.0 + 1.0 + settings.radius_tolerance) * radius_px, radius_px)
+    window = _Window.cut(photo, end.place, (2.0 + 1.0 + settings.radius_tolerance) * radius_px, radius_px)
     if window is None:
         return None
-    votes = _votes(window, radius_px / window.reduction, settings)
-    votes *= _prior(votes.shape, window.to_cells(end_px), outward, radius_px / window.reduction)
+    along, aside = _along_cable(window, end)
+    on_cable = (along < 0) & (np.abs(aside) < 0.8 * width_px)
+    fall = np.maximum(np.abs(along) / radius_px - 1.4, 0.0) / 0.3
+    prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius_px)) ** 2 - 0.5 * fall**2)
+    rim = _best_circle(photo, window, radius_px, on_cable, prior, settings)
+    if rim is not None and rim.rim >= settings.min_rim:
+        return rim
+    return _by_dot(photo, window, radius_px, along, aside, settings)
+
+
+def _by_dot(
+    photo: Photo, window: _Window, radius_px: float, along: Array, aside: Array, settings: BearingSettings
+) -> Circle | None:
+    """Cover of the ground's own look: the cable ends at its rim, and a dot or screw marks the axis."""
+    spread = settings.aside_std_radii * radius_px
+    prior = np.exp(-0.5 * (aside / spread) ** 2 - 0.5 * ((along - radius_px) / spread) ** 2)
+    nowhere = np.zeros(prior.shape, bool)
+    dots = [_best_circle(photo, window, share * radius_px, nowhere, prior, settings) for share in settings.dot_radii]
+    seen = [dot for dot in dots if dot is not None and dot.rim >= settings.sure_rim]
+    if not seen:
+        return None
+    dot = max(seen, key=lambda circle: circle.rim)
+    return replace(dot, radius=radius_px, radius_std=settings.radius_tolerance * radius_px)
+
+
+def _best_circle(
+    photo: Photo,
+    window: _Window,
+    radius_px: float,
+    blind: NDArray[np.bool_],
+    prior: Array,
+    settings: BearingSettings,
+) -> Circle | None:
+    """The circle with the most of its rim seen among the best centres of the window."""
+    votes = _votes(window, radius_px / window.reduction, blind, settings) * prior
     best: Circle | None = None
     for _ in range(settings.candidates):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
@@ -79,7 +113,7 @@ def find_cover(
         if best is not None and best.rim > settings.sure_rim:
             break
         cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius_px / window.reduction)), 0.0, cv2.FILLED)
-    return best if best is not None and best.rim >= settings.min_rim else None
+    return best
 
 
 @dataclass(frozen=True)
@@ -109,35 +143,37 @@ class _Window:
         return np.asarray(cells * self.reduction + (self.reduction - 1) / 2.0 + self.origin)
 
 
-def _votes(window: _Window, radius: float, settings: BearingSettings) -> NDArray[np.float32]:
-    """Picture of votes: each edge votes for the two centres one radius away along its gradient."""
-    blurred = cv2.GaussianBlur(window.grey, (0, 0), max(1.0, 0.04 * radius))
+def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
+    """Distance (px) of each cell beyond the end of the cable and aside of its axis."""
+    v, u = np.mgrid[: window.grey.shape[0], : window.grey.shape[1]]
+    du, dv = np.moveaxis(window.to_pixels(np.stack([u, v], axis=-1)) - end.place, -1, 0)
+    return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
+
+
+def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: BearingSettings) -> NDArray[np.float32]:
+    """Change of the mean grey value across a circle around each cell, colours together.
+
+    That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all
+    round where texture cancels. Strong edges are clipped, and the cable's own, which are straight and would heap up
+    beside it, are left out (``blind``).
+    """
+    blurred = cv2.GaussianBlur(window.grey, (0, 0), max(0.7, 0.04 * radius))
     gu = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 1, 0))
     gv = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 0, 1))
-    strength = np.hypot(gu, gv)
-    channel = np.argmax(strength, axis=2)[..., None]
-    gu, gv, strength = (np.take_along_axis(part, channel, axis=2)[..., 0] for part in (gu, gv, strength))
-    floor = settings.edge_over_texture * float(np.median(strength)) + 1e-6
-    v, u = np.nonzero(strength > floor)
-    directions = np.stack([gu[v, u], gv[v, u]]) / strength[v, u]
-    # A strong edge (the cable's) counts at most three times a weak one (a grey cover on a grey ground).
-    weight = np.minimum(strength[v, u] / floor, 3.0)
+    strength = np.sqrt((gu**2 + gv**2).sum(axis=2))
+    gain = 1.0 / np.maximum(strength, settings.edge_over_texture * float(np.median(strength)) + 1e-6)
+    gain[blind] = 0.0
+    half = int(np.ceil(1.25 * radius))
+    y, x = np.mgrid[-half : half + 1, -half : half + 1].astype(np.float32)
+    distance = np.hypot(x, y) + np.float32(1e-6)
+    ring = np.exp(-0.5 * ((distance - radius) / max(0.7, 0.6 * settings.radius_tolerance * radius)) ** 2)
+    ring /= distance * ring.sum()
     votes = np.zeros(strength.shape, np.float32)
-    for factor in np.linspace(1.0 - settings.radius_tolerance, 1.0 + settings.radius_tolerance, 7):
-        for sign in (-1.0, 1.0):
-            at = np.rint(np.stack([u, v]) + sign * factor * radius * directions).astype(int)
-            inside = (at >= 0).all(axis=0) & (at < np.array([[votes.shape[1]], [votes.shape[0]]])).all(axis=0)
-            np.add.at(votes, (at[1, inside], at[0, inside]), weight[inside])
-    return cv2.GaussianBlur(votes, (0, 0), max(1.0, 0.06 * radius))
-
-
-def _prior(shape: tuple[int, ...], end: Array, outward: Array, radius: float) -> NDArray[np.float32]:
-    """Where a cover can be: the cable's axis runs through its centre, give or take the bend under the cover."""
-    v, u = np.mgrid[: shape[0], : shape[1]]
-    along = (u - end[0]) * outward[0] + (v - end[1]) * outward[1]
-    aside = (v - end[1]) * outward[0] - (u - end[0]) * outward[1]
-    beyond = np.maximum(np.abs(along) - 1.4 * radius, 0.0)
-    return np.exp(-0.5 * (aside / (0.4 * radius)) ** 2 - 0.5 * (beyond / (0.3 * radius)) ** 2).astype(np.float32)
+    for channel in range(gu.shape[2]):
+        across = cv2.filter2D(gu[..., channel] * gain, -1, ring * x, borderType=cv2.BORDER_CONSTANT)
+        across += cv2.filter2D(gv[..., channel] * gain, -1, ring * y, borderType=cv2.BORDER_CONSTANT)
+        votes += np.abs(across)
+    return votes
 
 
 def fit_circle(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Circle | None:
@@ -152,23 +188,25 @@ def fit_circle(photo: Photo, center: Array, radius: float, settings: BearingSett
     span = max(4.0, 2.0 * settings.radius_tolerance * radius)
     parameters = np.array([*center, radius])
     for span_now in (span, max(3.0, 0.5 * span)):
-        edge = _radial_edges(photo, parameters, ray, span_now)
+        edge = _radial_edges(photo, parameters, ray, span_now, settings)
         fitted = _robust_circle(parameters, ray, edge, span_now)
         if fitted is None:
             return None
-        parameters, weight, scale, covariance = fitted
+        parameters, covariance = fitted
     off = np.hypot(*(parameters[:2] - center))
     if off > 0.5 * radius or abs(parameters[2] / radius - 1.0) > 1.5 * settings.radius_tolerance:
         return None
-    rim = float(np.mean(np.isfinite(edge) & (weight > 0.2) & (scale < 0.04 * radius)))
+    edge = _radial_edges(photo, parameters, ray, span, settings)
+    rim = float(np.mean(np.abs(edge) < max(0.75, settings.rim_tolerance * radius)))
     std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
     radius_std = float(np.hypot(np.sqrt(covariance[2, 2]), settings.center_std_floor_px))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
 
-def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float) -> Array:
+def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float, settings: BearingSettings) -> Array:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out."""
-    offsets = np.arange(-span, span + 0.25, 0.5)
+    # The outer halves of the rays tell what is no edge: sheen, texture and noise.
+    offsets = np.arange(-2.0 * span, 2.0 * span + 0.25, 0.5)
     points = parameters[:2] + (parameters[2] + offsets)[None, :, None] * ray[:, None, :]
     low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 2, 0)
     high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 3, photo.size)
@@ -177,19 +215,22 @@ def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float) -> A
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
     u, v = (points[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
     profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
-    slope = gaussian_filter1d(np.gradient(profile, 0.5, axis=1), 2.0, axis=1)
+    # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
+    pooled = gaussian_filter1d(profile, settings.pooled_rays, axis=0, mode="wrap")
+    slope = gaussian_filter1d(np.gradient(pooled, 0.5, axis=1), 2.0, axis=1)
     strength = np.sqrt((slope**2).sum(axis=2))
-    seen = (u >= 1).all(axis=1) & (v >= 1).all(axis=1)
-    seen &= (u <= part.shape[1] - 2).all(axis=1) & (v <= part.shape[0] - 2).all(axis=1)
-    place = np.argmax(strength[:, 3:-3], axis=1) + 3
+    inner = np.abs(offsets) <= span
+    outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
+    seen = ~(outside & inner).any(axis=1)
+    place = np.argmax(np.where(inner, strength, 0.0), axis=1)
     near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(ray)), place]
-    return np.where(seen & (peak > 3.0 * np.median(strength, axis=1)) | (seen & (peak > np.median(peak))), edge, np.nan)
+    return np.where(seen & (peak > settings.rim_over_texture * float(np.median(strength[:, ~inner]))), edge, np.nan)
 
 
-def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> tuple[Array, Array, float, Array] | None:
+def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> tuple[Array, Array] | None:
     found = np.isfinite(edge)
     if found.sum() < 12:
         return None
@@ -212,11 +253,9 @@ def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> t
         scale = max(_MAD_TO_STD * float(np.median(np.abs(residual))), floor)
         if settled:
             break
-    weight = np.zeros(len(edge))
-    weight[found] = tukey
     spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))
     lag = float((residual[1:] * residual[:-1] * tukey[1:] * tukey[:-1]).sum() / ((tukey * residual) ** 2).sum())
     # Neighbouring directions share noise and texture: an autoregression of lag one inflates the variance so much.
     inflation = (1.0 + np.clip(lag, 0.0, 0.95)) / (1.0 - np.clip(lag, 0.0, 0.95))
     covariance = np.linalg.inv(normal) * spread**2 * inflation
-    return fit, weight, spread, covariance
+    return fit, covariance

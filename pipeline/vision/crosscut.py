@@ -30,7 +30,7 @@ class CrossCut:
     path : (k, 2) cells
         Refined middle.
     width : (k,) cells
-        Between the outermost half-level crossings; NaN where one is missing.
+        Between the outermost level crossings; NaN where one is missing.
     step : (k,) fraction of full range
         Core minus ground along ``weights``, positive where the section looks like the cable.
     contrast : float
@@ -75,7 +75,7 @@ def cut_across(standout: Standout, path: Array, width: float, settings: Segmenta
     """Measure the strip along a path, given its approximate width.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; a box of
-    the cable's width slides across each section to centre it (blind to highlights and writing); half-level crossings
+    the cable's width slides across each section to centre it (blind to highlights and writing); level crossings
     from outside give the width.
     """
     path = smooth_path(path, settings.smoothing_widths * width)
@@ -94,7 +94,8 @@ def cut_across(standout: Standout, path: Array, width: float, settings: Segmenta
     shift = _centre(relief, offsets, width)
     step = np.nanmedian(np.where(np.abs(offsets - shift[:, None]) < 0.35 * width, relief, np.nan), axis=1)
     contrast = float(np.median(step))
-    left, right = _outer_crossings(relief, offsets, shift, 0.5 * contrast, width)
+    level = settings.crossing_level_dark if sign < 0 else settings.crossing_level_bright
+    left, right = _outer_crossings(relief, offsets, shift, level * contrast, width)
     middle = np.where(np.isfinite(left + right), 0.5 * (left + right), shift)
     texture = _MAD_TO_STD * float(np.median(np.abs(grey[:, flank] - ground[:, None])))
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width, mode="nearest")
@@ -138,7 +139,7 @@ def _centre(relief: NDArray[np.float32], offsets: Array, width: float) -> Array:
 def _outer_crossings(
     relief: NDArray[np.float32], offsets: Array, shift: Array, level: float, width: float
 ) -> tuple[Array, Array]:
-    """Half-level crossings farthest from the middle but within 0.9 widths of it; NaN where there is none."""
+    """Level crossings farthest from the middle but within 0.9 widths of it; NaN where there is none."""
     distance = offsets[None, :] - shift[:, None]
     above = (relief > level) & (np.abs(distance) <= 0.9 * width)
     rows = np.arange(len(relief))

@@ -32,12 +32,20 @@ class CableEnd:
     at_object: bool = False
 
 
-def find_end(path: Array, reading: Reading, standout: Standout, settings: BearingSettings) -> CableEnd:
-    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins."""
+def find_end(
+    path: Array, reading: Reading, standout: Standout, cover_radius_px: float | None, settings: BearingSettings
+) -> CableEnd:
+    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins.
+
+    A cover hardly wider than the cable stays part of the strip and bends its skeleton; there the piece that is led
+    straight begins a cover's radius earlier.
+    """
     width = reading.width
-    body, outward = _body(path, width, settings)
+    trimmed = settings.trimmed_widths * width
+    trimmed = trimmed if cover_radius_px is None else max(trimmed, 1.2 * cover_radius_px / standout.reduction)
+    body, outward = _body(path, width, trimmed)
     place, at_object = body[-1], False
-    for step in np.arange(0.0, (settings.trimmed_widths + 2.0) * width, 0.5):
+    for step in np.arange(0.0, trimmed + 2.0 * width, 0.5):
         here = body[-1] + step * outward
         u, v = np.rint(here).astype(int)
         inside = 0 <= v < reading.mask.shape[0] and 0 <= u < reading.mask.shape[1]
@@ -48,10 +56,10 @@ def find_end(path: Array, reading: Reading, standout: Standout, settings: Bearin
     return CableEnd(standout.to_pixels(place), outward, at_object)
 
 
-def _body(path: Array, width: float, settings: BearingSettings) -> tuple[Array, Array]:
+def _body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
     """The path without the piece at its end that runs into a corner, and the direction in which it leaves there."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    count = int(np.searchsorted(s, s[-1] - settings.trimmed_widths * width))
+    count = int(np.searchsorted(s, s[-1] - trimmed))
     body = path[: max(3, count)]
     return body, end_direction(body, width)
 
@@ -74,7 +82,9 @@ def lead_to_axes(
         distance = np.hypot(*(path - center).T)
         path = path[: int(np.argmin(distance)) + 1]
         outside = np.flatnonzero(distance[: len(path)] > radius)
-        body, outward = _body(path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, settings)
+        body, outward = _body(
+            path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, settings.trimmed_widths * width
+        )
         steps = np.arange(1.0, max(_to_circle(body[-1], outward, center, radius), 1.0) + 1e-9)
         path = np.vstack([body, body[-1] + steps[:, None] * outward])
     return path

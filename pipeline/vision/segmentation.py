@@ -157,11 +157,10 @@ def _axes(
 ) -> tuple[Bearing, Bearing] | Rejected:
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
-    ends = (
-        find_end(strip.path[::-1], reading, standout, settings.bearings),
-        find_end(strip.path, reading, standout, settings.bearings),
-    )
-    hidden = cable.bearings.cover_radius(1.0) is not None or cable.bearings.given_px is not None
+    cover = cable.bearings.cover_radius(width)
+    paths = (strip.path[::-1], strip.path)
+    ends = tuple(find_end(path, reading, standout, cover, settings.bearings) for path in paths)
+    hidden = cover is not None or cable.bearings.given_px is not None
     leaving = [end for end in ends if at_border(end, photo, width)]
     if leaving and not hidden:
         return _leaves(photo, leaving[0])
