@@ -151,7 +151,7 @@ def _read_header(data: bytes) -> _Header | None:
         # Damaged metadata is no reason to refuse the pixels.
         warnings.simplefilter("ignore", UserWarning)
         try:
-            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "MPO", "BMP", "TIFF")) as image:
+            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "BMP", "TIFF")) as image:
                 kind = {"MPO": "jpg", "JPEG": "jpg", "TIFF": "tif"}.get(
                     image.format or "", (image.format or "").lower()
                 )
@@ -164,6 +164,11 @@ def _read_header(data: bytes) -> _Header | None:
 
 def _orientation(image: Image.Image) -> int:
     try:
+        if image.format == "PNG":
+            # Pillow's getexif decodes a png without EXIF to look behind the pixels; cameras write it in front.
+            exif = Image.Exif()
+            exif.load(image.info.get("exif", b""))
+            return int(exif.get(_ORIENTATION_TAG, 1))
         return int(image.getexif().get(_ORIENTATION_TAG, 1))
     except (OSError, ValueError, SyntaxError, TypeError, struct.error):
         return 1
