@@ -34,11 +34,24 @@ from scipy.special import ellipe, ellipk
 
 from rod.characteristic import Array, MomentCurve
 
-_PANELS, _GAUSS = 48, 8
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_GAUSS)
-_EDGES = np.linspace(0.0, 0.5 * np.pi, _PANELS + 1)
-_PHI = (_EDGES[:-1, None] + 0.5 * (_NODES + 1.0) * np.diff(_EDGES)[:, None]).ravel()
-_DPHI = np.tile(0.5 * _WEIGHTS, _PANELS) * np.repeat(np.diff(_EDGES), _GAUSS)
+
+class _Rule(NamedTuple):
+    """Panels of Gauss points over phi = 0..pi/2: panel edges, points and weights."""
+
+    edges: Array
+    phi: Array
+    weight: Array
+
+
+def _rule(panels: int, gauss: int) -> _Rule:
+    nodes, weights = np.polynomial.legendre.leggauss(gauss)
+    edges = np.linspace(0.0, 0.5 * np.pi, panels + 1)
+    width = np.diff(edges)[:, None]
+    return _Rule(edges, (edges[:-1, None] + 0.5 * (nodes + 1.0) * width).ravel(), (0.5 * weights * width).ravel())
+
+
+#: For the two unknowns; and for the shape, whose Hermite splines between panel edges need short panels (error 1e-9).
+_SOLVING, _SAMPLING, _GAUSS = _rule(48, 8), _rule(240, 4), 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +198,8 @@ def _solve(law: MomentCurve, *, length: float, chord: float, K0: float) -> tuple
     """End slope and mid-span curvature, from a circular arc; through shorter steps of the chord if that fails."""
 
     def misfit(unknown: Array, target: float) -> Array:
-        half = _half(law, _PHI, end_slope=unknown[0], K_mid=K0 + unknown[1] / length, K0=K0)
-        ds = half.rate * _DPHI
+        half = _half(law, _SOLVING.phi, end_slope=unknown[0], K_mid=K0 + unknown[1] / length, K0=K0)
+        ds = half.rate * _SOLVING.weight
         return np.array([2.0 * ds.sum() / length - 1.0, 2.0 * (half.cos @ ds) / length - target])
 
     def attempt(start: Array, target: float) -> Array | None:
@@ -220,14 +233,14 @@ def _sampled(
     law: MomentCurve, s: Array, *, end_slope: float, K_mid: float, K0: float, length: float
 ) -> UniformEquilibrium:
     """Shape at the arc lengths ``s``: panel sums give s and x at the panel edges, Hermite splines what lies between."""
-    ends = _half(law, _EDGES[:-1], end_slope=end_slope, K_mid=K_mid, K0=K0)
-    inner = _half(law, _PHI, end_slope=end_slope, K_mid=K_mid, K0=K0)
-    ds = inner.rate * _DPHI
-    s_edge = np.r_[0.0, ds.reshape(_PANELS, _GAUSS).sum(axis=1).cumsum()]
-    x_edge = np.r_[0.0, (ds * inner.cos).reshape(_PANELS, _GAUSS).sum(axis=1).cumsum()]
+    ends = _half(law, _SAMPLING.edges[:-1], end_slope=end_slope, K_mid=K_mid, K0=K0)
+    inner = _half(law, _SAMPLING.phi, end_slope=end_slope, K_mid=K_mid, K0=K0)
+    ds = inner.rate * _SAMPLING.weight
+    s_edge = np.r_[0.0, ds.reshape(-1, _GAUSS).sum(axis=1).cumsum()]
+    x_edge = np.r_[0.0, (ds * inner.cos).reshape(-1, _GAUSS).sum(axis=1).cumsum()]
     # At mid-span ds/dphi is the limit of 0/0; there cos(phi) = 0 and 1 - W/W_mid ~ K m' rise cos(phi)^2 / (2 W_mid).
     mid_rate = np.sqrt(max(float(law.tangent(K_mid, K0)) * (K_mid - K0) / (K_mid * ends.P), 0.0))
-    phi_of_s = CubicHermiteSpline(s_edge, _EDGES, 1.0 / np.r_[ends.rate, mid_rate])
+    phi_of_s = CubicHermiteSpline(s_edge, _SAMPLING.edges, 1.0 / np.r_[ends.rate, mid_rate])
     x_of_s = CubicHermiteSpline(s_edge, x_edge, np.r_[ends.cos, 1.0])
     left = s <= 0.5 * length
     mirrored = np.clip(np.where(left, s, length - s) * (2.0 * s_edge[-1] / length), 0.0, s_edge[-1])

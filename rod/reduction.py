@@ -78,7 +78,8 @@ class Balance(NamedTuple):
     """Residuals and Hessian of Lambda at one state; see the module for the symbols.
 
     ``gradient`` (n + 2,) N m; ``diagonal`` (n + 2,) and ``off`` (n + 1,) N m/rad; ``border`` (2, n + 2) m; ``softness``
-    (2, 2) m/N without compliance; ``gap`` (2,) m: imposed minus actual position; ``K``, ``m``, ``tangent`` (n + 1,).
+    (2, 2) m/N without compliance; ``gap`` (2,) m: imposed minus actual position, 0 if not imposed; ``K``, ``m``,
+    ``tangent`` (n + 1,).
     """
 
     gradient: Array
@@ -140,8 +141,8 @@ class System:
         diagonal[1:] -= off
         border = self.border(edge)
         gap = -(self.directions(edge) @ h)
-        if self.hold.chord is not None:
-            gap[0] += self.hold.chord - self.hold.compliance * R[0]
+        gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
+        gap[1] *= self.hold.tip is None
         self._hold_ends(angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
 
