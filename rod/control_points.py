@@ -1,0 +1,145 @@
+"""Fits with a given number of control points, and the choice of that number by its evidence.
+
+Control points lie on the range that the fitted cable visits. The evidence of their number is the probability of the
+data with all unknowns and the smoothness of the law averaged over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rod.equilibrium import Equilibrium
+from rod.evaluation import Evaluation, evaluate
+from rod.fit_model import FitModel
+from rod.knots import place_knots
+from rod.options import InverseOptions
+from rod.smoothness import Averaged, averaged, evidence_of_knots
+
+Array = NDArray[np.float64]
+
+FIRST_TAU = 6.0
+"""Smoothness of the first fits: between straight line and mid-range the law may differ by a factor e^(6/8)."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit that ended: model, evaluation at the optimum, number of evaluations, and whether it settled."""
+
+    model: FitModel
+    evaluation: Evaluation
+    evaluations: int
+    settled: bool
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of all whitened residuals."""
+        return float(self.evaluation.value @ self.evaluation.value)
+
+    def visited(self) -> tuple[float, float]:
+        """Smallest and largest curvature of the simulated cable over all steps, 1/m."""
+        kappas = [step.simulated.kappa for step in self.evaluation.steps]
+        return float(min(k.min() for k in kappas)), float(max(k.max() for k in kappas))
+
+    def posterior(self, taus: tuple[float, float]) -> Averaged:
+        """Linearised posterior, averaged over the smoothness."""
+        return averaged(self.model, self.evaluation, taus=taus)
+
+
+def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), evaluations: int = 60) -> Fit:
+    """Least squares from the unknowns `start` (q,), scipy's trust-region reflective method with the exact jacobian.
+
+    Where a trial has no equilibrium its residuals are infinite, and the method shortens its step.
+    """
+    last = evaluate(model, start, starts=starts)
+    if last.failure is not None:
+        return Fit(model, last, 1, False)
+    best, count = last, 1
+
+    def at(u: Array) -> Evaluation:
+        nonlocal last, best, count
+        if not np.array_equal(u, last.unknowns):
+            found = evaluate(model, u, starts=best.equilibria)
+            count += 1
+            if found.failure is not None:
+                found = replace(found, value=np.full(best.value.size, np.inf))
+            elif found.value @ found.value < best.value @ best.value:
+                best = found
+            last = found
+        return last
+
+    # 1e-9 of chi2 is a thousandth of a standard deviation for a thousand data.
+    def value(u: Array) -> Array:
+        return at(u).value
+
+    def jacobian(u: Array) -> Array:
+        return at(u).jacobian
+
+    result = least_squares(
+        value,
+        start,
+        jacobian,
+        x_scale="jac",
+        ftol=1e-9,
+        xtol=1e-9,
+        gtol=1e-10,
+        max_nfev=evaluations,
+    )
+    return Fit(model, best, count, result.status > 0)
+
+
+def refit(known: Fit, knots: Array, *, tau: float, evaluations: int) -> Fit:
+    """The same data with other control points, started from a fit that is known."""
+    model = replace(known.model, knots=knots, tau=tau)
+    u = known.evaluation.unknowns
+    law = known.model.characteristic(u)
+    # Outside its knots the old law is a straight line, which must not start a control point below zero.
+    ordinates = np.maximum(law.f(knots), 0.05 * law.ordinates.min())
+    start = np.concatenate([np.log(ordinates), u[known.model.knots.size :]])
+    return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations)
+
+
+def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, float], int]:
+    """Fit with the number of control points that follows from the data.
+
+    A fit with the largest number is linearised; the evidence of every smaller number follows from it. ``spare`` control
+    points more than the best are used: they leave the error of the spline itself within the smoothness prior's band.
+
+    Returns
+    -------
+    Fit
+        At the mean over the smoothness.
+    dict
+        Log evidence of each number of control points, against the best.
+    int
+        Evaluations used.
+    """
+    least, most = options.knots
+    rich, used = first, 0
+    for _ in range(2):  # the range visited follows from the fit and settles at once
+        found = refit(rich, place_knots(*rich.visited(), most), tau=FIRST_TAU, evaluations=options.evaluations)
+        used += found.evaluations
+        if found.evaluation.failure is not None:
+            return first, {}, used
+        moved = np.abs(np.subtract(found.visited(), rich.visited())).max()
+        rich = found
+        if moved < 0.02 * np.ptp(rich.visited()):
+            break
+    low, high = rich.visited()
+    evidence = {
+        count: evidence_of_knots(rich.model, rich.evaluation, place_knots(low, high, count), taus=options.tau)
+        for count in range(least, most + 1)
+    }
+    best = max(evidence, key=lambda count: evidence[count])
+    count = min(best + options.spare, most)
+    tau = rich.posterior(options.tau).tau
+    chosen = refit(rich, place_knots(low, high, count), tau=tau, evaluations=options.evaluations)
+    posterior = chosen.posterior(options.tau)
+    mean = evaluate(replace(chosen.model, tau=posterior.tau), posterior.mean, starts=chosen.evaluation.equilibria)
+    used += chosen.evaluations + 1
+    if mean.failure is None:
+        chosen = replace(chosen, model=replace(chosen.model, tau=posterior.tau), evaluation=mean)
+    return chosen, {n: value - evidence[best] for n, value in evidence.items()}, used

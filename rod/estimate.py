@@ -1,0 +1,181 @@
+"""What the inverse problem hands over: outcome, characteristic with bands on the visited range, and the fit itself.
+
+Signs and axes: chord frame of `rod.measurement`; f_EI is the tangent reading dm/dK; SI units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.characteristic import Characteristic
+from rod.evaluation import Evaluation
+from rod.fit_model import FitModel
+from rod.options import InverseOptions
+from rod.smoothness import Averaged, averaged
+
+Array = NDArray[np.float64]
+Source = tuple[str, int]
+
+
+class InverseOutcome(Enum):
+    """How the inverse problem ended; the value is advice to the reader."""
+
+    CONVERGED = "the simulation was fitted to all photos and forces"
+    STALLED = (
+        "the fit did not settle; this usually means that a photo or a force contradicts the others: look at the "
+        "residuals of each step"
+    )
+    LIMIT_POINT = (
+        "on the way the bending moment stopped growing with curvature, where no stable shape exists; this usually "
+        "means wrong forces or a wrong scale: check the units of the force and px/mm"
+    )
+    NO_EQUILIBRIUM = (
+        "no simulated cable reaches the measured chords; this usually means that length_mm or the scale is wrong, or "
+        "that the photos belong to other steps"
+    )
+    NOT_VISIBLE = (
+        "the data do not fix every parameter; the bands say which part of the characteristic is open: bend further, or "
+        "add photos"
+    )
+    NO_DATA = (
+        "no loaded step has a photo, so pre-curvature and stiffness cannot be told apart; take photos of the steps"
+    )
+
+
+def _none() -> Array:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The characteristic by the inverse problem, with bands; SI units, tangent reading.
+
+    Attributes
+    ----------
+    outcome : InverseOutcome
+    characteristic : Characteristic or None
+    pre_curvature, pre_curvature_std : 1/m
+    loaded_pre_curvature, loaded_pre_curvature_std : 1/m
+        Without the force-free photo: a witness of its own.
+    ordinates_std : (k,) N m^2
+    kappa : (n,) 1/m
+        Grid over the visited range.
+    moment, tangent, secant : (n,)
+        With ``moment_std``, ``tangent_std``, ``secant_std``.
+    log_covariance : (n, n)
+        Joint covariance of log(tangent) on the grid.
+    gains : dict
+        Response of log(tangent) to the sources of error, keyed as in `rod.balance.BalanceGraph`.
+    evidence : dict of int -> float
+        Log evidence of each number of control points tried, against the best.
+    model, evaluation, unknowns, covariance
+        The fit itself: unknowns (q,) with covariance (q, q), whitened residuals and jacobian.
+    iterations : int
+        Evaluations of the model, all fits together.
+    """
+
+    outcome: InverseOutcome
+    characteristic: Characteristic | None = None
+    pre_curvature: float = np.nan
+    pre_curvature_std: float = np.nan
+    loaded_pre_curvature: float = np.nan
+    loaded_pre_curvature_std: float = np.nan
+    ordinates_std: Array = field(default_factory=_none)
+    kappa: Array = field(default_factory=_none)
+    moment: Array = field(default_factory=_none)
+    moment_std: Array = field(default_factory=_none)
+    tangent: Array = field(default_factory=_none)
+    tangent_std: Array = field(default_factory=_none)
+    secant: Array = field(default_factory=_none)
+    secant_std: Array = field(default_factory=_none)
+    log_covariance: Array = field(default_factory=_none)
+    gains: dict[Source, Array] = field(default_factory=dict)
+    evidence: dict[int, float] = field(default_factory=dict)
+    model: FitModel | None = None
+    evaluation: Evaluation | None = None
+    unknowns: Array = field(default_factory=_none)
+    covariance: Array = field(default_factory=_none)
+    iterations: int = 0
+
+    @property
+    def converged(self) -> bool:
+        """True if there is a characteristic to rely on within its band."""
+        return self.outcome is InverseOutcome.CONVERGED
+
+
+def read_off(
+    model: FitModel, found: Evaluation, posterior: Averaged, *, options: InverseOptions, outcome: InverseOutcome
+) -> Estimate:
+    """Estimate from a settled fit: curves on the visited range with bands by propagation."""
+    k, u, covariance = model.knots.size, found.unknowns, posterior.covariance
+    law, K0 = model.characteristic(u), model.pre_curvature(u)
+    visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
+    kappa = np.linspace(min(visited), max(visited), options.grid)
+    m, f, secant = law.moment(kappa, K0), law.tangent(kappa, K0), law.secant(kappa, K0)
+    by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
+    by_moment[:, :k] = law.moment_by_ordinates(kappa, K0) * law.ordinates
+    by_moment[:, k] = law.moment_by_pre_curvature(kappa, K0) / model.length
+    by_log[:, :k] = law.tangent_by_ordinates(kappa, K0) * law.ordinates / f[:, None]
+    # Secant m / (K - K0); within a thousandth of the range from K0 it is the tangent.
+    D = kappa - K0
+    near = np.abs(D) < 1e-3 * (kappa[-1] - kappa[0])
+    D = np.where(near, 1.0, D)
+    by_secant = by_moment / D[:, None]
+    by_secant[:, k] += m / D**2 / model.length
+    by_secant = np.where(near[:, None], f[:, None] * by_log, by_secant)
+
+    def std(by: Array) -> Array:
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0)))
+
+    rest = tuple(name for name in found.blocks if _is_rest(model, name))
+    loaded = averaged(model, found, taus=options.tau, without=rest) if rest else posterior
+    return Estimate(
+        outcome=outcome,
+        characteristic=law,
+        pre_curvature=K0,
+        pre_curvature_std=float(np.sqrt(covariance[k, k])) / model.length,
+        loaded_pre_curvature=float(loaded.mean[k]) / model.length,
+        loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[k, k])) / model.length,
+        ordinates_std=law.ordinates * np.sqrt(np.diag(covariance)[:k]),
+        kappa=kappa,
+        moment=m,
+        moment_std=std(by_moment),
+        tangent=f,
+        tangent_std=f * std(by_log),
+        secant=secant,
+        secant_std=std(by_secant),
+        log_covariance=by_log @ covariance @ by_log.T,
+        gains=_gains(model, found, by_log @ posterior.response),
+        model=model,
+        evaluation=found,
+        unknowns=u,
+        covariance=covariance,
+    )
+
+
+def _is_rest(model: FitModel, block: str) -> bool:
+    kind, _, step = block.partition("/")
+    return kind in ("shape", "chord") and any(d.at_rest and str(d.step.step) == step for d in model.data)
+
+
+def _gains(model: FitModel, found: Evaluation, response: Array) -> dict[Source, Array]:
+    """Response of log(tangent) to every source of error; `response` (n, q) is its derivative by -J^T dr."""
+    gains: dict[Source, Array] = {}
+    stretched = found.jacobian[:, [model.index("scale")]].copy()
+    stretched[found.blocks["prior"]] = 0.0  # the data are stretched, the prior is not
+    gains["scale", -1] = -response @ (found.jacobian.T @ stretched) / model.nuisances["scale"]
+    for fit in found.steps:
+        step = fit.data.step
+        if fit.force is not None:
+            J = found.jacobian[found.blocks[f"force/{step.step}"]]
+            gains["force", step.step] = -response @ J.T / step.force_std
+        if fit.data.midline is not None and step.shape is not None:
+            J, white = found.jacobian[found.blocks[f"shape/{step.step}"]], fit.data.midline.whitener
+            at = fit.data.midline.s
+            moved = np.column_stack([np.interp(at, step.shape.s, c) for c in step.shape.basis_normal.T])
+            gains["curve", step.step] = -response @ (J.T @ (white @ moved))
+    return gains

@@ -1,0 +1,172 @@
+"""Unknowns and data of the inverse problem: what is fitted, with which priors, to which steps.
+
+Unknowns u, all of order one:
+
+    z      log f_EI at the knots (tangent reading), so the stiffness is positive
+    k0     K0 times the length
+    then, in units of their prior standard deviations, the nuisances: the cable's ``length``, the common ``scale`` of
+    the photos, the ``zero`` of displacement (only where a step has no photo), and for each photo the position of both
+    bearing axes, along and across the chord
+
+Signs and units: `rod.measurement`; SI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.bending_test import BendingTest
+from rod.characteristic import Characteristic
+from rod.measurement import MeasuredStep, MeasuredTest
+from rod.whitening import Midline, midline
+
+Array = NDArray[np.float64]
+
+POSE = ("left_along", "left_across", "right_along", "right_across")
+
+NO_ERROR = 1e-7
+"""Relative standard deviation of a length for which none is stated: below any photo's resolution."""
+
+
+@dataclass(frozen=True)
+class StepData:
+    """One step of the fit.
+
+    Attributes
+    ----------
+    step : MeasuredStep
+    midline : Midline or None
+        Independent data of its photo.
+    chord : m or None
+        By the photo.
+    axis_std : m
+        Of each coordinate of a bearing axis.
+    """
+
+    step: MeasuredStep
+    midline: Midline | None
+    chord: float | None
+    axis_std: float
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the cable is free of force: the mounted step."""
+        return self.step.branch == "mounted"
+
+
+@dataclass(frozen=True)
+class FitModel:
+    """Data and fixed choices of one fit.
+
+    Attributes
+    ----------
+    data : tuple of StepData
+    length : m
+        As told.
+    knots : (k,) 1/m
+    tau : float
+        Prior standard deviation of d^2 log f / dt^2, see `rod.knots`.
+    elements : int
+        Of the simulated rod.
+    zero : m or None
+        Distance of the axes at displacement zero by the photos; None: the natural chord.
+    nuisances : dict of name -> std
+        In the order of the unknowns; m, the scale relative.
+    """
+
+    data: tuple[StepData, ...]
+    length: float
+    knots: Array
+    tau: float
+    elements: int
+    zero: float | None
+    nuisances: dict[str, float]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.knots.size + 1 + len(self.nuisances)
+
+    @property
+    def laws(self) -> int:
+        """Number of unknowns that are not nuisances: control points and K0."""
+        return self.knots.size + 1
+
+    def index(self, name: str) -> int:
+        """Place of a nuisance among the unknowns."""
+        return self.laws + list(self.nuisances).index(name)
+
+    def nuisance(self, u: Array, name: str) -> float:
+        """A nuisance in its own unit."""
+        return float(u[self.index(name)]) * self.nuisances[name]
+
+    def cable_length(self, u: Array) -> float:
+        """Length of the cable, m."""
+        return self.length + self.nuisance(u, "length")
+
+    def pre_curvature(self, u: Array) -> float:
+        """K0, 1/m."""
+        return float(u[self.knots.size]) / self.length
+
+    def characteristic(self, u: Array) -> Characteristic:
+        """f_EI through the control points, tangent reading."""
+        return Characteristic.from_ordinates(self.knots, np.exp(u[: self.knots.size]), reading="tangent")
+
+    def bending_test(self, u: Array) -> BendingTest:
+        """The simulated experiment."""
+        return BendingTest(self.cable_length(u), self.characteristic(u), self.pre_curvature(u), elements=self.elements)
+
+    def start(self, ordinates: Array, pre_curvature: float) -> Array:
+        """Unknowns of the given control points (k,) N m^2 and K0, nuisances at their prior means."""
+        u = np.zeros(self.size)
+        u[: self.knots.size] = np.log(ordinates)
+        u[self.knots.size] = pre_curvature * self.length
+        return u
+
+
+def step_data(test: MeasuredTest, *, blocks: int = 160) -> tuple[StepData, ...]:
+    """Data of every step that says something about the cable: photos, and forces of loaded steps."""
+    data = []
+    for step in test.steps:
+        shape = step.shape if step.shape is not None and step.shape.section_s.size >= 8 else None
+        if shape is None and (step.branch == "mounted" or step.displacement is None):
+            continue
+        chord = step.chord
+        if shape is not None and chord is None:
+            chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0]))
+        axis_std = max((step.chord_std or 0.0) / np.sqrt(2.0), NO_ERROR * test.length)
+        photo = None if shape is None else midline(shape, blocks=blocks)
+        data.append(StepData(step, photo, None if photo is None else chord, axis_std))
+    return tuple(data)
+
+
+def zero_of_displacement(data: tuple[StepData, ...]) -> tuple[float, float] | None:
+    """Distance of the axes at displacement zero by the photos and its std with their scatter, m; None without photos."""
+    pairs = [
+        (d.chord + d.step.displacement, np.sqrt(2.0) * d.axis_std)
+        for d in data
+        if d.chord is not None and d.step.displacement is not None
+    ]
+    if not pairs:
+        return None
+    zeros, stds = np.array(pairs).T
+    spread = float(zeros.std(ddof=1)) if zeros.size > 1 else 0.0
+    return float(zeros.mean()), float(np.hypot(spread, stds.max()))
+
+
+def fit_model(test: MeasuredTest, data: tuple[StepData, ...], knots: Array, *, tau: float, elements: int) -> FitModel:
+    """Model of the given steps with its nuisances."""
+    nuisances = {
+        "length": max(test.length_std, NO_ERROR * test.length),
+        "scale": max(test.scale_std, NO_ERROR),
+    }
+    zero = zero_of_displacement(data)
+    if zero is not None and any(d.midline is None for d in data):
+        nuisances["zero"] = zero[1]
+    for d in data:
+        if d.midline is not None:
+            nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}
+    return FitModel(data, test.length, knots, tau, elements, None if zero is None else zero[0], nuisances)

@@ -1,0 +1,132 @@
+"""Way one, the inverse problem: from photos and forces to the characteristic by simulating the experiment (Sec. 4).
+
+The discrete rod is fitted to the positions of the midlines and to the forces of all steps at once, each residual
+divided by its standard deviation (Eq. (7) with statistical weights in place of w; the paper's own objective is in
+`rod.paper_fit`). Unknowns and data: `rod.fit_model`; residuals and exact jacobian: `rod.evaluation`; scipy's
+trust-region reflective method.
+
+Strategy: (1) a fit with three control points from a straight line of K over P y; (2) a fit with many control points
+over the range that the cable visits, whose linearisation gives the evidence of every smaller number; (3) a fit with the
+chosen number, the smoothness of log f averaged over with its evidence as the weight, so the band holds the error of the
+spline itself; (4) bands by propagation, on the visited range only.
+
+Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; f_EI is the
+tangent reading dm/dK; SI units.
+
+Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulation*, Sec. 4, Eqs. (6), (7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.control_points import FIRST_TAU, Fit, chosen_knots, fit
+from rod.equilibrium import Outcome
+from rod.estimate import Estimate, InverseOutcome, read_off
+from rod.evaluation import Evaluation, evaluate
+from rod.fit_model import FitModel, StepData, fit_model, step_data
+from rod.knots import place_knots
+from rod.measurement import MeasuredTest
+from rod.options import InverseOptions
+
+__all__ = ["Estimate", "InverseOptions", "InverseOutcome", "estimate"]
+
+Array = NDArray[np.float64]
+
+
+def estimate(
+    test: MeasuredTest, *, start: tuple[float, float] | None = None, options: InverseOptions | None = None
+) -> Estimate:
+    """Characteristic, pre-curvature and their uncertainty by fitting the simulated experiment.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    start : (N m^2, 1/m) or None
+        Constant EI and K0 to start from; None takes both from a straight line of curvature over moment.
+    options : InverseOptions or None
+        None means the defaults.
+
+    Returns
+    -------
+    Estimate
+        Look at ``outcome``.
+    """
+    options = options or InverseOptions()
+    data = step_data(test, blocks=options.blocks)
+    if not any(d.midline is not None and not d.at_rest for d in data):
+        return Estimate(InverseOutcome.NO_DATA)
+    line = straight_line(data)
+    fits = [first_fit(test, data, begin, line, options) for begin in ([start] if start else []) + [line]]
+    best = min(fits, key=lambda f: f.chi2)
+    if best.evaluation.failure is not None:
+        return Estimate(_refusal(best.evaluation.failure), iterations=sum(f.evaluations for f in fits))
+    chosen, evidence, evaluations = chosen_knots(best, options)
+    result = read_off(
+        chosen.model,
+        chosen.evaluation,
+        chosen.posterior(options.tau),
+        options=options,
+        outcome=_outcome(chosen, options),
+    )
+    return replace(result, evidence=evidence, iterations=evaluations + sum(f.evaluations for f in fits))
+
+
+def straight_line(data: tuple[StepData, ...]) -> tuple[float, float]:
+    """Constant EI (N m^2) and K0 (1/m) by a straight line of the photos' curvature over P y: a rough start only."""
+    moments, curvatures = [], []
+    for d in data:
+        shape = d.step.shape
+        if d.midline is not None and shape is not None:
+            moments.append(np.zeros(int(shape.seen.sum())) if d.at_rest else d.step.force * shape.y[shape.seen])
+            curvatures.append(shape.kappa[shape.seen])
+    m, K = np.concatenate(moments), np.concatenate(curvatures)
+    slope, K0 = np.polyfit(m / np.abs(m).max(), K, 1)
+    # Forces of the wrong sign give a negative slope; the size is still a start, and the misfit will tell.
+    return float(np.abs(m).max() / max(abs(slope), 1e-3 * np.ptp(K))), float(K0)
+
+
+def first_fit(
+    test: MeasuredTest,
+    data: tuple[StepData, ...],
+    begin: tuple[float, float],
+    line: tuple[float, float],
+    options: InverseOptions,
+) -> Fit:
+    """Three control points over the measured range of curvature, from a constant EI and K0."""
+    EI, K0 = begin
+    seen = np.concatenate([d.step.shape.kappa[d.step.shape.seen] for d in data if d.step.shape is not None])
+    low, high = line[1], float(np.quantile(seen, 0.995))
+    knots = place_knots(min(low, high - 0.2 * abs(high)), high, 3)
+    model = fit_model(test, data, knots, tau=FIRST_TAU, elements=options.elements)
+    u = model.start(np.full(3, EI), K0)
+    trial = evaluate(model, u)
+    if trial.failure is None:
+        u = rescaled(model, trial)
+    return fit(model, u, starts=trial.equilibria, evaluations=options.evaluations)
+
+
+def rescaled(model: FitModel, trial: Evaluation) -> Array:
+    """Unknowns with the stiffness scaled to the forces: f -> c f leaves the shapes and multiplies the forces by c."""
+    pairs = [(s.data.step.force, s.simulated.force, s.data.step.force_std) for s in trial.steps if s.force is not None]
+    measured, simulated, std = np.array(pairs).T
+    c = float(np.sum(measured * simulated / std**2) / np.sum((simulated / std) ** 2))
+    u = trial.unknowns.copy()
+    if c > 0.0:
+        u[: model.knots.size] += np.log(c)
+    return u
+
+
+def _refusal(failure: Outcome) -> InverseOutcome:
+    return InverseOutcome.LIMIT_POINT if failure is Outcome.LIMIT_POINT else InverseOutcome.NO_EQUILIBRIUM
+
+
+def _outcome(found: Fit, options: InverseOptions) -> InverseOutcome:
+    if not found.settled:
+        return InverseOutcome.STALLED
+    k = found.model.knots.size
+    stds = np.sqrt(np.diag(found.posterior(options.tau).covariance))[:k]
+    return InverseOutcome.NOT_VISIBLE if np.any(stds > options.invisible) else InverseOutcome.CONVERGED
