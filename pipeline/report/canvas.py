@@ -52,7 +52,7 @@ ONE_ROW, TWO_ROWS = 22.0, 38.0
 # Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.
 FONT = "DejaVu Sans"
 
-STYLE = {
+STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cablebend",
     "font.family": FONT,
@@ -110,9 +110,10 @@ class Drawing:
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """The look of all figures, and only while they are drawn."""
-    with mpl.rc_context(STYLE):
+def style(scale: float = 1.0) -> Iterator[None]:
+    """The look of all figures, and only while they are drawn; ``scale`` makes letters and lines smaller or larger."""
+    sizes = {key: scale * value for key, value in STYLE.items() if key.endswith(("size", "width"))}
+    with mpl.rc_context({**STYLE, **sizes}):
         yield
 
 
@@ -190,7 +191,11 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
         axis.set_major_formatter(number_ticks(decimal))
     axes.tick_params(length=3)
     if legend:
-        axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=legend, borderaxespad=0.1, columnspacing=1.4)
+        place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
+        many = (
+            {"handlelength": 1.1, "columnspacing": 0.9, "handletextpad": 0.4} if legend > 4 else {"columnspacing": 1.4}
+        )
+        axes.legend(ncols=legend, **place, **many)
     return axes
 
 

@@ -36,9 +36,11 @@ PAGE = (595.0, 842.0)  # A4 in points
 MARGIN = 44.0
 LEADING = 1.45
 # Mean width of a letter of DejaVu Sans over its size, for breaking lines.
-LETTER = 0.56
+LETTER = 0.52
 # Of pictures on the page: the line over a photo of 250 pt can be judged, six photos stay below 2 MB.
 DOTS_PER_INCH = 150
+# Figures of half the page's width beside letters of 10 pt.
+SMALL = 0.75
 
 
 class Sheet:
@@ -80,17 +82,16 @@ class Sheet:
         """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
         inner = PAGE[0] - 2.0 * MARGIN
         x0, x1 = (MARGIN + share * inner for share in (left, right))
+        # a part of a figure takes its place from the ratios of its grid alone: the part is the middle of nine fields
         grid = self.figure.add_gridspec(
-            1,
-            1,
-            left=x0 / PAGE[0],
-            right=x1 / PAGE[0],
-            top=1.0 - self.y / PAGE[1],
-            bottom=1.0 - (self.y + height) / PAGE[1],
+            3,
+            3,
+            width_ratios=(x0, x1 - x0, PAGE[0] - x1),
+            height_ratios=(self.y, height, PAGE[1] - self.y - height),
         )
         if advance:
             self.y += height + 8.0
-        return self.figure.add_subfigure(grid[0, 0])
+        return self.figure.add_subfigure(grid[1, 1])
 
     def room(self) -> float:
         """Height left on the page in points."""
@@ -112,7 +113,7 @@ def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
     """Content of ``report.pdf``."""
     settings = settings or ReportSettings()
     words = Words(settings.language)
-    with style():
+    with style(SMALL):
         sheets = [_answer_sheet(result, words, settings)]
         if result.steps or curves(result):
             sheets.append(_mechanics_sheet(result, words, settings))

@@ -1,0 +1,190 @@
+"""report.html: one file without network, complete for every kind of result, and nothing of a user is ever markup."""
+
+import base64
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from pipeline.report.canvas import page_colours
+from pipeline.report.document import report_html, write_report
+from pipeline.settings import ReportSettings
+
+VOID = {"meta", "link", "img", "input", "br", "hr"}
+LARGEST_BYTES = 3_000_000
+
+
+class Page(HTMLParser):
+    """Elements, texts, identifiers of a page; complains about tags that do not match."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.attributes, self.texts = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes.append(dict(attrs))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes.append(dict(attrs))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "script" not in self.open and "style" not in self.open:
+            self.texts.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r"\s+", " ", " ".join(self.texts))
+
+
+@pytest.fixture(scope="module")
+def page(full_result):
+    return report_html(full_result)
+
+
+def test_the_answer_comes_first_with_its_uncertainty(page):
+    heading = re.search(r"<h1>(.*?)</h1>", page, re.DOTALL)[1]
+    assert "falls from 20.00 ± 0.13\u00a0mN m² at κ = 2.00 1/m to 8.54 ± 0.13\u00a0mN m²" in heading
+    assert "K0 = 2.004 ± 0.013 1/m" in heading
+    assert page.index("<h1>") < page.index('id="characteristic"') < page.index('id="photos"') < page.index('id="data"')
+
+
+def test_pre_curvature_stands_there_three_ways(page):
+    assert all(text in Page(page).text for text in ("2.001 ± 0.006 1/m", "1.99 ± 0.04 1/m", "2.004 ± 0.013 1/m"))
+
+
+def test_everything_is_inside_the_file(page):
+    links = [a[k] for a in Page(page).attributes for k in ("src", "href") if k in a]
+    assert links
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert not re.search(r"@import|url\((?!#)", page)
+
+
+def test_identifiers_are_unique_and_references_have_a_target(page):
+    parsed = Page(page)
+    names = [a["id"] for a in parsed.attributes if "id" in a]
+    assert len(names) == len(set(names))
+    wanted = {a["href"][1:] for a in parsed.attributes if a.get("href", "").startswith("#")}
+    wanted |= set(re.findall(r"url\(#([^)]+)\)", page))
+    assert wanted <= set(names)
+
+
+def test_every_figure_and_photo_has_a_text_alternative(page, full_result):
+    parsed = Page(page)
+    plots = [a for t, a in zip(parsed.tags, parsed.attributes, strict=True) if t == "svg" and a.get("class") == "plot"]
+    assert len(plots) == 1 + 5 + len(full_result.photos)
+    assert all(a["role"] == "img" and a["aria-labelledby"] for a in plots)
+    pictures = [a for t, a in zip(parsed.tags, parsed.attributes, strict=True) if t == "img"]
+    assert len(pictures) == 2 * len(full_result.photos)
+    assert all(a["alt"] for a in pictures)
+
+
+def test_axes_carry_units(page):
+    for label in ("curvature κ [1/m]", "bending stiffness f_EI = dm/dκ [mN m²]", "force P [N]", "arc length s [mm]"):
+        assert label in page
+
+
+def test_colours_follow_the_page(page):
+    plots = "".join(re.findall(r'<svg xmlns="http://www.w3.org/2000/svg".*?</svg>', page, re.DOTALL))
+    assert "var(--inverse)" in plots
+    assert not [light for light, _ in page_colours().values() if light in plots]
+
+
+def test_centerline_lies_on_the_photo(page, full_result):
+    photo = full_result.photos[3]
+    first = re.findall(r'class="seen" d="M([\d.]+) ([\d.]+)L', page)[3]
+    index = photo.seen.index(True)
+    expected = ((photo.u_px[index] + 0.5) / 2.4, (photo.v_px[index] + 0.5) / 2.4)
+    assert [float(v) for v in first] == pytest.approx(expected, abs=0.06)  # half of the last digit written
+
+
+def test_provenance_is_shown(page, full_result):
+    text = Page(page).text
+    assert full_result.provenance["command"] in text
+    assert "ab" * 32 in text
+    assert "versions: numpy" in text
+
+
+@pytest.mark.parametrize("verdict", ["adequate", "named", "class", "two_causes", "unexplained", "underpowered"])
+def test_every_verdict_has_its_sections(diagnosed, verdict):
+    page = report_html(diagnosed(verdict))
+    text = Page(page).text
+    assert f"The verdict is {verdict}: hysteresis between the wires bends <the> answer." in text
+    assert 'id="ranking"' in page
+    assert 'id="cosines"' in page
+    assert "dead weights" in text
+    found = verdict in ("named", "class", "two_causes")
+    assert ('id="map-after"' in page) == found
+    assert ("removes 94 %" in text) == found
+    assert ("A hump at mid-span" in text) == (verdict == "unexplained")
+    assert ("turn the cable end for end" in text) == (verdict != "adequate")
+    assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
+
+
+def test_answer_is_that_of_the_extended_model(diagnosed):
+    result = diagnosed("named")
+    curve = result.diagnosis.extended
+    heading = re.search(r"<h1>(.*?)</h1>", report_html(result), re.DOTALL)[1]
+    assert f"{1e3 * curve.tangent_Nm2[0]:.2f} ± {1e3 * curve.tangent_std_Nm2[0]:.2f}" in heading
+
+
+def test_nothing_of_a_user_is_markup(partial_result):
+    page = report_html(partial_result)
+    parsed = Page(page)
+    assert page.count("<script") == 2
+    assert not [a for a in parsed.attributes if "onerror" in a]
+    assert "<script>alert(1)</script>" in parsed.text
+    assert "<b>step_01</b> was rejected." in parsed.text
+    assert "the file does not exist" in parsed.text
+
+
+def test_failed_specimen_says_why(failed_result):
+    text = Page(report_html(failed_result)).text
+    assert "cable-13 was not measured: force.csv: the log is empty; export it again." in text
+    assert "Mend what is named below" in text
+
+
+def test_disagreement_and_misfit_are_said(full_result):
+    agreement = full_result.agreement.model_copy(update={"compatible": False, "rms_relative": 0.2, "p_value": 1e-4})
+    misfit = full_result.inverse.misfit.model_copy(update={"chi2": 2000.0})
+    inverse = full_result.inverse.model_copy(update={"misfit": misfit})
+    text = Page(report_html(full_result.model_copy(update={"agreement": agreement, "inverse": inverse}))).text
+    assert "The two independent ways disagree: they differ by 20 % rms" in text
+    assert "does not explain forces and shapes within their noise (χ² per degree of freedom 2.53" in text
+
+
+def test_german_page_has_german_words_and_numbers(full_result):
+    page = report_html(full_result, ReportSettings(language="de"))
+    text = Page(page).text
+    assert '<html lang="de">' in page
+    assert "Die Biegesteifigkeit f_EI von cable-07 fällt von 20,00 ± 0,13" in text
+    assert "Krümmung κ [1/m]" in text
+    assert not re.search(r"\d\.\d+ ± ", text)
+
+
+def test_unsupported_points_are_not_drawn(full_result):
+    curve = full_result.inverse.curve
+    supported = [kappa < 6.0 for kappa in curve.kappa_per_m]
+    inverse = full_result.inverse.model_copy(update={"curve": curve.model_copy(update={"supported": supported})})
+    last = max(kappa for kappa in curve.kappa_per_m if kappa < 6.0)
+    heading = re.search(r"<h1>(.*?)</h1>", report_html(full_result.model_copy(update={"inverse": inverse})), re.DOTALL)[
+        1
+    ]
+    assert f"at κ = {last:.2f} 1/m" in heading
+
+
+def test_report_is_small_and_the_same_each_time(full_result, tmp_path):
+    path = write_report(full_result, tmp_path / "a")
+    assert path.stat().st_size < LARGEST_BYTES
+    assert path.read_bytes() == write_report(full_result, tmp_path / "b").read_bytes()
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["report.html"]
+    assert base64.b64decode(full_result.photos[0].preview.jpeg_base64)[:2] == b"\xff\xd8"
