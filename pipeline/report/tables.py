@@ -54,5 +54,8 @@ def csv_text(frame: pd.DataFrame) -> str:
 
 
 def neutral(cell: object) -> object:
-    """Text that no spreadsheet takes for a formula; anything but text unchanged."""
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA_STARTS) else cell
+    """Text that no spreadsheet takes for a formula or for the end of a row; anything but text unchanged."""
+    if not isinstance(cell, str):
+        return cell
+    text = cell.replace("\r", " ")  # the writer quotes line feeds, but not a lone carriage return
+    return f"'{text}" if cell.startswith(FORMULA_STARTS) else text

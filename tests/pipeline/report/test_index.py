@@ -1,0 +1,86 @@
+"""index.html and summary.csv: every specimen is there, with its reason if it failed; also after half a run."""
+
+import json
+import re
+
+import pandas as pd
+import pytest
+
+from pipeline.report.index import write_index
+from pipeline.report.tables import write_result
+from pipeline.settings import ReportSettings
+
+
+def named(result, name, kind="HV 35"):
+    specimen = result.specimen.model_copy(update={"id": name, "description": {"type": kind} if kind else {}})
+    return result.model_copy(update={"specimen": specimen})
+
+
+@pytest.fixture(scope="module")
+def batch(full_result, diagnosed, partial_result, failed_result):
+    return [named(full_result, "a"), named(diagnosed("class"), "b"), partial_result, failed_result]
+
+
+def test_summary_has_a_row_a_specimen(batch, tmp_path):
+    _, summary = write_index(batch, tmp_path)
+    table = pd.read_csv(summary)
+    assert list(table.status) == ["measured", "measured", "partial", "failed"]
+    assert list(table.verdict) == ["none", "class", "none", "none"]
+    assert table.low_tangent_Nm2[0] == pytest.approx(batch[0].inverse.curve.tangent_Nm2[0], rel=1e-8)
+    assert table.pre_curvature_std_per_m[0] == 0.013
+    assert table.reason[3] == "force.csv: the log is empty; export it again."
+    assert table.id[2].startswith("'=")
+    assert table.report[0] == "a/report.html"
+
+
+def test_page_links_every_report_and_escapes_names(batch, tmp_path):
+    page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
+    assert page.count("<tr class=") == 4
+    assert 'href="a/report.html"' in page
+    assert "<img" not in page
+    assert page.count("<script") == 2
+    assert "the log is empty" in page
+
+
+def test_folder_of_half_a_run_is_enough(batch, tmp_path):
+    for result in batch[:2]:
+        write_result(result, tmp_path / "deep" / result.specimen.id)
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "result.json").write_text('{"schema": "cablebend/res', encoding="utf-8")
+    page, summary = write_index(tmp_path, tmp_path)
+    table = pd.read_csv(summary)
+    assert list(table.id) == ["broken", "a", "b"]
+    assert "cannot be read" in table.reason[0]
+    assert 'href="deep/a/report.html"' in page.read_text(encoding="utf-8")
+
+
+def test_empty_batch_gives_an_empty_index(tmp_path):
+    page, summary = write_index(tmp_path, tmp_path)
+    assert "0 specimens" in page.read_text(encoding="utf-8")
+    assert pd.read_csv(summary).empty
+
+
+def test_overlay_data_are_the_curves(batch, tmp_path):
+    page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
+    assert data["rows"][3] is None
+    kappa, value, std = data["rows"][0]
+    assert len(kappa) == len(value) == len(std) == ReportSettings().index_curve_points
+    assert value[0] == pytest.approx(1e3 * batch[0].inverse.curve.tangent_Nm2[0], rel=1e-3)  # four digits
+
+
+def test_repeat_specimens_are_pooled_by_type(full_result, tmp_path):
+    repeats = [named(full_result, str(i), "B") for i in range(3)] + [
+        named(full_result, "x", "C"),
+        named(full_result, "y", ""),
+    ]
+    page = write_index(repeats, tmp_path)[0].read_text(encoding="utf-8")
+    assert page.count("<figcaption>") == 1
+    assert "3 specimens. Mean f_EI over 2.00 to 8.70 1/m: 13.2" in page
+    assert "the specimens differ no more than their errors (p = 1)" in page
+
+
+def test_german_index(batch, tmp_path):
+    page = write_index(batch, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
+    assert "4 Proben: 2 vermessen, 1 teilweise, 1 gescheitert." in page
+    assert "20,00 ± 0,13" in page

@@ -1,0 +1,54 @@
+"""Words: both languages complete, the same values in both, every key used, nothing asked for that is not there."""
+
+import re
+import string
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipeline.report.words import TABLE, Words
+
+SOURCES = [p for p in Path(TABLE).parents[1].rglob("*") if p.suffix in (".py", ".html")]
+ENTRIES = {
+    f"{section}.{key}": texts
+    for section, rows in tomllib.loads(Path(TABLE).read_text(encoding="utf-8")).items()
+    for key, texts in rows.items()
+}
+
+
+def fields(text):
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name}
+
+
+@pytest.mark.parametrize("key", ENTRIES)
+def test_entry_has_two_languages_with_the_same_values(key):
+    english, german = ENTRIES[key]
+    assert english.strip()
+    assert german.strip()
+    assert fields(english) == fields(german)
+
+
+def test_every_word_is_used():
+    text = "".join(path.read_text(encoding="utf-8") for path in SOURCES)
+    prefixes = set(re.findall(r"""["']([a-z0-9]+(?:_[a-z0-9]+)*_)(?:\{|["'] ~)""", text))
+    for key in (name.split(".")[1] for name in ENTRIES if name.startswith(("words.", "tips."))):
+        assert re.search(rf"""["']{key}["']""", text) or any(key.startswith(prefix) for prefix in prefixes), (
+            f"{key} is never used"
+        )
+
+
+def test_every_cause_of_the_contract_has_a_name():
+    assert len([key for key in ENTRIES if key.startswith("causes.")]) == 20
+    assert Words("de").cause("hysteresis") == "Hysterese"
+    assert Words("de").cause("my_new_cause") == "my new cause"
+
+
+def test_unknown_language_is_a_mistake_of_the_caller():
+    with pytest.raises(ValueError, match="one of en, de"):
+        Words("fr")
+
+
+def test_unknown_key_is_not_passed_over():
+    with pytest.raises(KeyError):
+        Words()("no such words")
