@@ -41,17 +41,33 @@ class CurveSettings(BaseModel):
     profile_windows: int = Field(
         16, ge=1, description="along the cable; in each, blur and shading of the edges are found: light turns slowly"
     )
-    sections: int = Field(
-        240,
-        ge=60,
-        description="sections after averaging; their errors are nearly independent at this spacing, and"
-        " kappa's resolution (a tenth of the length) is spanned by twenty",
+    section_spacing_diameters: float = Field(
+        0.6, gt=0, description="diameters; sections closer than that tell the same of kappa, see knot_spacing_diameters"
     )
+    min_sections: int = Field(
+        240, ge=60, description="of a short cable; fewer would average over bends, their errors are nearly independent"
+    )
+    max_sections: int = Field(1000, ge=60, description="of a long cable; bounds the time of the fit")
     knot_spacing_diameters: float = Field(
         1.5, gt=0, description="diameters; a cable cannot bend more sharply than over its own width"
     )
     min_intervals: int = Field(16, ge=4, description="knot intervals; fewer bias kappa at mid-span above 0.05 %")
-    max_intervals: int = Field(36, ge=4, description="knot intervals; more only cost time, the penalty decides")
+    first_intervals: int = Field(
+        36, ge=4, description="knot intervals tried first; a bow between two bearings uses ten to fifteen"
+    )
+    crowded_share: float = Field(
+        0.6,
+        gt=0,
+        lt=1,
+        description="of the parameters in effective use, above which knots are doubled: the penalty, not"
+        " the knots, shall decide",
+    )
+    path_knot_diameters: float = Field(
+        5.0,
+        gt=0,
+        description="diameters; knots of the path that the edges are sought along, and first try of a long cable",
+    )
+    most_path_intervals: int = Field(120, ge=16, description="knot intervals of that path; bounds the time")
     penalty_order: int = Field(
         3,
         ge=1,
@@ -59,8 +75,10 @@ class CurveSettings(BaseModel):
         description="derivative of kappa that is penalised: 3 leaves a parabola free, the bow's first shape;"
         " 2 was 30 % worse inside the span",
     )
-    longest_correlation: float = Field(
-        0.05, gt=0, le=0.2, description="of the length; longer errors cannot be told from curvature"
+    longest_correlation_diameters: float = Field(
+        2.0,
+        gt=0,
+        description="diameters; bound of the errors' correlation length, longer ones cannot be told from a bend",
     )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
     max_blur_radii: float = Field(

@@ -21,9 +21,9 @@ import numpy as np
 from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import CurveFit, fit_curve, initial_curve
+from pipeline.vision.curvature import CurveFit
 from pipeline.vision.midline import Sections
-from pipeline.vision.path import follow, knots_along
+from pipeline.vision.path import fit_along, follow
 from pipeline.vision.plane import PlaneMap
 from pipeline.vision.rough import RoughCable
 from rod.measurement import MeasuredShape
@@ -168,16 +168,16 @@ def _fit(sections: Sections, chord: ChordFrame, width: Array, options: CurveSett
     ends = np.array([[0.0, 0.0], [chord.chord, 0.0]])
     gap = np.hypot(*(points[0] - ends[0])), np.hypot(*(points[-1] - ends[1]))
     s += gap[0]
-    frame = knots_along(float(s[-1] + gap[1]), float(np.median(width)), options)
     # Sections without noise (drawn pictures) must not count as infinitely certain.
     std = np.maximum(sections.std, 1e-3) * metres
-    return fit_curve(
+    return fit_along(
         points,
         std,
-        start=initial_curve(points, s, frame),
+        guide=points,
         s=s,
-        order=options.penalty_order,
-        longest=options.longest_correlation * float(s[-1]),
+        length=float(s[-1] + gap[1]),
+        diameter=float(np.median(width)),
+        settings=options,
     )
 
 
@@ -193,7 +193,7 @@ def _assemble(
     ends = np.array([[0.0, 0.0], [chord.chord, 0.0]])
     feet = fit.curve.foot(ends, np.array([0.0, fit.curve.frame.knots[-1]]))
     misses = np.hypot(*(fit.curve.at(feet)[0] - ends).T)
-    s = np.linspace(feet[0], feet[1], options.points)
+    s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
     where, theta = fit.curve.at(s)
     bases = fit.curve.bases(s)
     covariance, systematic = _covariance(fit, sections, chord, width)
@@ -275,7 +275,7 @@ def _assemble(
 
 
 def _std(basis: Array, covariance: Array) -> Array:
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", basis, covariance, basis), 0.0)))
+    return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
 
 
 def _covariance(

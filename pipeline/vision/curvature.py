@@ -29,12 +29,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
+from scipy.linalg import lstsq
 
 from pipeline.records import Array
-from pipeline.vision.smoothing import Smooth, smooth
+from pipeline.vision.smoothing import Problem, Smooth
 
 DEGREE = 3
-_CELLS = 8  # cells of quadrature per knot interval: Simpson leaves 1e-9 of the length at a turn of 0.3 rad per interval
+_CELLS = 256  # of quadrature, about: Simpson leaves 1e-12 of the length at a turn of 0.03 rad per cell
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,8 @@ def make_frame(start: float, end: float, *, intervals: int, order: int, breaks: 
     count = len(knots) - DEGREE - 1
     spline = BSpline(knots, np.eye(count), DEGREE)
     edges = np.unique(knots)
-    cells = [np.linspace(a, b, _CELLS + 1) for a, b in pairwise(edges)]
+    each = max(2, round(_CELLS / intervals)) + 1
+    cells = [np.linspace(a, b, each) for a, b in pairwise(edges)]
     nodes = np.unique(np.concatenate(cells))
     grid = np.empty(2 * len(nodes) - 1)
     grid[::2], grid[1::2] = nodes, 0.5 * (nodes[1:] + nodes[:-1])
@@ -230,7 +232,7 @@ def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
     # A share of 1e-6 leaves wiggles longer than about a fifth of the range: the shape, not the noise of the polyline.
     penalty *= 1e-3 * np.linalg.norm(turns * weight[:, None]) / np.linalg.norm(penalty)
     rows = np.concatenate([turns * weight[:, None], penalty])
-    solution = np.linalg.lstsq(rows, np.r_[theta * weight, np.zeros(len(penalty))], rcond=None)[0]
+    solution = lstsq(rows, np.r_[theta * weight, np.zeros(len(penalty))], lapack_driver="gelsy", check_finite=False)[0]
     curve = PlaneCurve(frame, solution[1:], np.zeros(2), float(solution[0]))
     return PlaneCurve(frame, solution[1:], np.mean(points - curve.at(s)[0], axis=0), float(solution[0]))
 
@@ -244,7 +246,6 @@ def fit_curve(
     order: int,
     longest: float,
     correlation_length: float | None = None,
-    robust: float = 4.0,
     iterations: int = 8,
 ) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
@@ -259,44 +260,78 @@ def fit_curve(
         Order of the penalised derivative of the curvature, as in `make_frame`.
     longest : length
         Bound of the correlation length: longer errors cannot be told from the curve.
-    robust : float
-        Points beyond this many standard deviations lose weight (Tukey's biweight, at 1.5 times it none).
+    correlation_length : length, optional
+        Of the errors; sought if not given.
     """
-    curve, frame = start, start.frame
+    curve, s, weight, length = _settle(
+        points,
+        std,
+        start,
+        s,
+        order=order,
+        longest=longest,
+        correlation_length=correlation_length,
+        iterations=iterations,
+    )
+    s = curve.foot(points, s)
+    smooth = _linear(curve, s, _residual(curve, points, s), std, weight, order).smooth(length)
+    curve = curve.moved(smooth.estimate - np.r_[0.0, 0.0, curve.coefficients])
+    s = curve.foot(points, s)
+    return CurveFit(curve, smooth, points, s, _residual(curve, points, s), weight)
+
+
+def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int) -> PlaneCurve:
+    """Smooth curve along points ``(n, 2)`` of equal errors, for the next search: two steps, no covariance."""
+    spacing = float(np.median(np.diff(s)))
+    return _settle(
+        points, np.ones(len(points)), start, s, order=order, longest=spacing, correlation_length=spacing, iterations=2
+    )[0]
+
+
+def _settle(
+    points: Array,
+    std: Array,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    order: int,
+    longest: float,
+    correlation_length: float | None,
+    iterations: int,
+) -> tuple[PlaneCurve, Array, Array, float]:
+    """Gauss-Newton with robust weights: curve, feet of the points, their weights and correlation length."""
     weight = np.ones(len(points))
-    length = correlation_length
-    smooth_: Smooth | None = None
+    # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
+    length = float(np.median(np.diff(s))) if correlation_length is None else correlation_length
     for iteration in range(iterations):
         s = curve.foot(points, s, steps=2)
         residual = _residual(curve, points, s)
-        normal = curve.bases(s)[0]
-        spread = 1.4826 * np.median(np.abs(residual / std))
+        spread = max(1.4826 * float(np.median(np.abs(residual / std))), 1e-12)
         if iteration:
-            weight = _biweight(residual / std, max(spread, 1e-12), robust)
-        data = residual + normal[:, 2:] @ curve.coefficients
-        # The correlation is sought once, when the curve is nearly there: each search costs ten factorisations.
-        if correlation_length is None:
-            length = float(np.median(np.diff(s))) if iteration == 0 else None if iteration == 1 else length
-        used = weight > 0.0
-        before = smooth_
-        smooth_ = smooth(
-            normal[used],
-            data[used],
-            penalty=frame.penalty,
-            null=2 + order,
-            std=(std / np.sqrt(np.maximum(weight, 1e-9)))[used],
-            position=s[used],
-            longest=longest,
-            correlation_length=length,
-        )
-        length = smooth_.correlation_length
-        step = smooth_.estimate - np.r_[0.0, 0.0, curve.coefficients]
+            weight = _biweight(residual / std, spread)
+        problem = _linear(curve, s, residual, std, weight, order)
+        if iteration == 1 and correlation_length is None:
+            length = problem.correlation_length(longest)
+        step = problem.estimate(length) - np.r_[0.0, 0.0, curve.coefficients]
         curve = curve.moved(step)
-        if before is not None and iteration > 2 and np.max(np.abs(normal @ step)) < 1e-3 * spread * np.median(std):
+        # A hundredth of a point's error: the curve's own is a tenth to a third of it.
+        if iteration > 1 and np.max(np.abs(problem.design @ step)) < 0.01 * spread * np.median(std):
             break
-    assert smooth_ is not None
-    s = curve.foot(points, s)
-    return CurveFit(curve, smooth_, points, s, _residual(curve, points, s), weight)
+    return curve, s, weight, length
+
+
+def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array, order: int) -> Problem:
+    """Distances along the normal, linear in q; points without weight left out."""
+    used = weight > 0.0
+    normal = curve.bases(s[used])[0]
+    return Problem(
+        design=normal,
+        data=residual[used] + normal[:, 2:] @ curve.coefficients,
+        penalty=curve.frame.penalty,
+        null=2 + order,
+        std=std[used] / np.sqrt(weight[used]),
+        position=s[used],
+    )
 
 
 def _residual(curve: PlaneCurve, points: Array, s: Array) -> Array:
@@ -304,7 +339,7 @@ def _residual(curve: PlaneCurve, points: Array, s: Array) -> Array:
     return np.asarray(-np.sin(angle) * (points[:, 0] - where[:, 0]) + np.cos(angle) * (points[:, 1] - where[:, 1]))
 
 
-def _biweight(residual: Array, spread: float, limit: float) -> Array:
-    """Weights: 1 up to ``limit`` spreads, falling to 0 at 1.5 times it."""
-    beyond = np.clip((np.abs(residual) / spread - limit) / (0.5 * limit), 0.0, 1.0)
+def _biweight(residual: Array, spread: float) -> Array:
+    """Weights: 1 up to four spreads, which Gaussian errors pass once in 16,000, falling to 0 at six."""
+    beyond = np.clip((np.abs(residual) / spread - 4.0) / 2.0, 0.0, 1.0)
     return np.asarray((1.0 - beyond**2) ** 2)

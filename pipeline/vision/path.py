@@ -4,19 +4,57 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.records import Rejected
+from pipeline.records import Array, Rejected
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import Frame, PlaneCurve, fit_curve, initial_curve, make_frame
+from pipeline.vision.curvature import CurveFit, PlaneCurve, fit_curve, follow_points, initial_curve, make_frame
 from pipeline.vision.edges import Ground, in_picture, search_edges
 from pipeline.vision.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.rough import Bearing, RoughCable
 
 
-def knots_along(length: float, diameter: float, settings: CurveSettings) -> Frame:
-    """Knots over a cable from axis to axis, lengths in any one unit."""
-    wanted = round(length / (settings.knot_spacing_diameters * diameter))
-    intervals = int(np.clip(wanted, settings.min_intervals, settings.max_intervals))
-    return make_frame(0.0, length, intervals=intervals, order=settings.penalty_order)
+def fit_along(
+    points: Array, std: Array, *, guide: Array, s: Array, length: float, diameter: float, settings: CurveSettings
+) -> CurveFit:
+    """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
+
+    Parameters
+    ----------
+    points : (n, 2)
+    std : (n,)
+    guide : (n, 2)
+        Smooth path at the same arc lengths, for the start.
+    s : (n,)
+        About the arc lengths of the points from the left axis.
+    length, diameter : float
+        From axis to axis, and of the cable; one unit with the points.
+    """
+    most = max(settings.min_intervals, round(length / (settings.knot_spacing_diameters * diameter)))
+    intervals = min(most, max(settings.first_intervals, round(length / (settings.path_knot_diameters * diameter))))
+
+    def fit(correlation_length: float | None, iterations: int) -> CurveFit:
+        frame = make_frame(0.0, length, intervals=intervals, order=settings.penalty_order)
+        return fit_curve(
+            points,
+            std,
+            start=initial_curve(guide, s, frame),
+            s=s,
+            order=settings.penalty_order,
+            longest=settings.longest_correlation_diameters * diameter,
+            correlation_length=correlation_length,
+            iterations=iterations,
+        )
+
+    while intervals < most:  # long cables only
+        quick = fit(float(np.median(np.diff(s))), 1)
+        if quick.smooth.freedom < settings.crowded_share * quick.curve.frame.size:
+            break
+        intervals = min(2 * intervals, most)
+    return fit(None, 8)
+
+
+def _path_intervals(length: float, diameter: float, settings: CurveSettings) -> int:
+    wanted = length / (settings.path_knot_diameters * diameter)
+    return int(np.clip(wanted, settings.min_intervals, settings.most_path_intervals))
 
 
 def follow(
@@ -34,21 +72,13 @@ def follow(
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
-    frame = knots_along(float(along[-1]), 2.0 * half_width, settings)
-    points, s = rough.path_px[first : last + 1], along[first : last + 1]
-    spacing = float(np.median(np.diff(s)))
-    path = fit_curve(
-        points,
-        np.full(len(points), 0.1 * half_width),
-        start=initial_curve(points, s, frame),
-        s=s,
-        order=settings.penalty_order,
-        longest=spacing,
-        correlation_length=2.0 * spacing,
-        iterations=3,
-    ).curve
+    thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
+    points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
+    intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
+    frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
-    span = _span(path, (float(s[0]), float(s[-1])), covers, half_width)
+    span = _span(path, (float(along[first]), float(along[last])), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
     tolerance = settings.width_tolerance * (1.0 if known else 2.0)
@@ -61,18 +91,9 @@ def follow(
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
     points = where + found.edges.mean(axis=1)[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
-    spacing = float(np.median(np.diff(found.s)))
-    path = fit_curve(
-        points[usable],
-        np.full(np.count_nonzero(usable), 0.3),
-        start=path,
-        s=found.s[usable],
-        order=settings.penalty_order,
-        longest=spacing,
-        correlation_length=spacing,
-        iterations=3,
-    ).curve
-    count = min(settings.sections, int(span[1] - span[0]))
+    path = follow_points(points[usable], start=path, s=found.s[usable], order=settings.penalty_order)
+    count = round((span[1] - span[0]) / (settings.section_spacing_diameters * diameter))
+    count = min(max(count, settings.min_sections), settings.max_sections, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[free_of_covers(path, s, 0.6 * half_width, covers) & in_picture(ground, path, s, 1.5 * half_width + 4.0)]
     if len(s) < 20:

@@ -17,9 +17,10 @@ Source: Patterson and Thompson (1971), Biometrika 58, 545; Wood (2017), Generali
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize_scalar
 
 from pipeline.records import Array
@@ -74,127 +75,149 @@ def _correlations(gaps: Array, length: float) -> Array:
 
 @dataclass(frozen=True)
 class _Diagonal:
-    """The problem in the coordinates in which data and penalty are both diagonal."""
+    """The problem in the coordinates in which data and penalty are both diagonal.
 
-    gamma2: Array  # share of the data in each coordinate; 1 - gamma2 that of the penalty
-    projected: Array  # data in these coordinates
-    left: Array  # (n, p) whitened data to coordinates
-    back: Array  # (p, p) coordinates to q
-    total: float  # squared length of the data
+    Attributes
+    ----------
+    gamma2 : (p,)
+        Share of the data in each coordinate; 1 - gamma2 is that of the penalty.
+    projected : (p,)
+        Data in these coordinates.
+    back : (p, p)
+        Coordinates to q.
+    total : float
+        Squared length of the data.
+    count, null : int
+        Number of data, dimension of what is not penalised.
+    noise_log_det : float
+        Of the correlation matrix.
+    """
+
+    gamma2: Array
+    projected: Array
+    back: Array
+    total: float
+    count: int
     null: int
     noise_log_det: float
 
-    def shrinkage(self, weight: Array | float) -> Array:
+    def shrinkage(self, weight: Array) -> Array:
+        """Diagonal of the normal matrix at every weight, ``(w, p)``."""
         return np.asarray(self.gamma2 + np.multiply.outer(weight, 1.0 - self.gamma2))
 
     def weights(self) -> Array:
+        """Weights of the penalty over all that can matter."""
         ratio = np.sort(np.maximum(self.gamma2, _FLOOR) / np.maximum(1.0 - self.gamma2, _FLOOR))[: -self.null]
         return np.geomspace(0.1 * ratio[0], 1e3 * ratio[-1], _GRID)
 
     def criterion(self, weights: Array) -> tuple[Array, Array]:
         """Restricted likelihood, -2 log, and sigma squared at every weight."""
         share = self.shrinkage(weights)
-        count = len(self.left) - self.null
-        sigma2 = (self.total - (self.gamma2 * self.projected**2 / share).sum(axis=1)) / count
+        freedom = self.count - self.null
+        sigma2 = (self.total - (self.gamma2 * self.projected**2 / share).sum(axis=1)) / freedom
         rank = len(self.gamma2) - self.null
-        value = count * np.log(sigma2) + np.log(share).sum(axis=1) - rank * np.log(weights)
+        value = freedom * np.log(sigma2) + np.log(share).sum(axis=1) - rank * np.log(weights)
         return value + self.noise_log_det, sigma2
 
 
-def _diagonal(design: Array, data: Array, penalty: Array, null: int, noise_log_det: float) -> _Diagonal:
-    size = design.shape[1]
-    full = np.zeros((len(penalty), size))
-    full[:, size - penalty.shape[1] :] = penalty
-    full *= np.linalg.norm(design) / np.linalg.norm(full)
-    q, r = qr(design, mode="economic", check_finite=False)
-    stacked = np.concatenate([r, full])
+def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float) -> _Diagonal:
+    """Diagonal form of whitened columns ``[design, data]``."""
+    size = whitened.shape[1] - 1
+    triangle = np.asarray(np.linalg.qr(whitened, mode="r"))  # its last column holds the data: Q itself is never needed
+    r, data = triangle[:size, :size], triangle[:, size]
+    stacked = np.zeros((size + len(penalty), size))
+    stacked[:size] = r
+    stacked[size:, size - penalty.shape[1] :] = penalty * (np.linalg.norm(r) / np.linalg.norm(penalty))
     length = np.linalg.norm(stacked, axis=0)
-    q0, r0 = qr(stacked / length, mode="economic", check_finite=False)
+    q0, r0 = np.linalg.qr(stacked / length)
     u, gamma, vt = np.linalg.svd(q0[:size])
-    left = q @ u
-    back = solve_triangular(r0, vt.T, check_finite=False) / length[:, None]
-    gamma = np.minimum(gamma, 1.0)
-    # `left` spans what the data see; coordinate i of q is gamma_i (u_i . y) / shrinkage.
     return _Diagonal(
-        gamma**2,
-        gamma * (left.T @ data) / np.maximum(gamma, 1e-300),
-        left,
-        back,
-        float(data @ data),
-        null,
-        noise_log_det,
+        gamma2=np.minimum(gamma, 1.0) ** 2,
+        projected=u.T @ data[:size],
+        back=solve_triangular(r0, vt.T, check_finite=False) / length[:, None],
+        total=float(data @ data),
+        count=len(whitened),
+        null=null,
+        noise_log_det=noise_log_det,
     )
 
 
-def smooth(
-    design: Array,
-    data: Array,
-    *,
-    penalty: Array,
-    null: int,
-    std: Array,
-    position: Array,
-    longest: float,
-    correlation_length: float | None = None,
-) -> Smooth:
-    """Solve the penalised problem; the correlation length is sought up to ``longest`` unless given.
+@dataclass(frozen=True)
+class Problem:
+    """A penalised least-squares problem.
 
-    Parameters
+    Attributes
     ----------
     design : (n, p)
     data : (n,)
     penalty : (d, k)
         Of the last k parameters; its null space with the p - k free ones has dimension ``null``.
+    null : int
     std : (n,)
         Relative size of the errors.
     position : (n,)
         Along s, ascending.
     """
-    gaps = np.diff(position)
-    shortest = 0.2 * float(np.median(gaps))
 
-    def problem(length: float) -> _Diagonal:
-        rho = _correlations(gaps, length)
-        both = whiten(np.column_stack([design, data]), std, gaps, length)
-        return _diagonal(both[:, :-1], both[:, -1], penalty, null, float(np.log1p(-(rho**2)).sum()))
+    design: Array
+    data: Array
+    penalty: Array
+    null: int
+    std: Array
+    position: Array
 
-    if correlation_length is None:
+    @cached_property
+    def gaps(self) -> Array:
+        """Distances of neighbours, ``(n - 1,)``."""
+        return np.diff(self.position)
+
+    def correlation_length(self, longest: float) -> float:
+        """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``."""
+        shortest = 0.2 * float(np.median(self.gaps))
 
         def value(log_length: float) -> float:
-            chosen = problem(float(np.exp(log_length)))
-            return float(chosen.criterion(chosen.weights())[0].min())
+            diagonal = self._diagonal(float(np.exp(log_length)))
+            return float(diagonal.criterion(diagonal.weights())[0].min())
 
         bounds = (np.log(shortest), np.log(max(longest, 2.0 * shortest)))
-        found = minimize_scalar(value, bounds=bounds, method="bounded", options={"xatol": 0.1})
-        correlation_length = float(np.exp(found.x))
-    chosen = problem(correlation_length)
-    return _average(chosen, std, gaps, correlation_length)
+        return float(np.exp(minimize_scalar(value, bounds=bounds, method="bounded", options={"xatol": 0.2}).x))
 
+    def estimate(self, correlation_length: float) -> Array:
+        """Estimate ``(p,)`` at the likeliest weight of the penalty."""
+        diagonal = self._diagonal(correlation_length)
+        weights = diagonal.weights()
+        best = weights[[int(np.argmin(diagonal.criterion(weights)[0]))]]
+        return np.asarray(diagonal.back @ (np.sqrt(diagonal.gamma2) * diagonal.projected / diagonal.shrinkage(best)[0]))
 
-def _average(chosen: _Diagonal, std: Array, gaps: Array, length: float) -> Smooth:
-    """Estimate and covariance over the likelihood of the weight."""
-    weights = chosen.weights()
-    value, sigma2 = chosen.criterion(weights)
-    odds = np.exp(-0.5 * (value - value.min()))
-    odds /= odds.sum()
-    share = chosen.shrinkage(weights)
-    gamma = np.sqrt(chosen.gamma2)
-    each = gamma * chosen.projected / share
-    mean = odds @ each
-    spread = np.sqrt(odds)[:, None] * (each - mean)
-    variance = np.diag(odds @ (sigma2[:, None] / share)) + spread.T @ spread
-    values, vectors = np.linalg.eigh(variance)
-    root = chosen.back @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    filter_ = odds @ (gamma / share)
-    white = (chosen.back * filter_) @ chosen.left.T  # (p, n), acts on whitened data
-    return Smooth(
-        estimate=chosen.back @ mean,
-        root=root,
-        gain=_unwhiten(white, std, gaps, length),
-        sigma=float(np.sqrt(odds @ sigma2)),
-        freedom=float((odds @ (chosen.gamma2 / share)).sum()),
-        correlation_length=length,
-    )
+    def smooth(self, correlation_length: float) -> Smooth:
+        """Estimate, covariance and gain, averaged over the likelihood of the weight."""
+        diagonal = self._diagonal(correlation_length)
+        weights = diagonal.weights()
+        value, sigma2 = diagonal.criterion(weights)
+        odds = np.exp(-0.5 * (value - value.min()))
+        odds /= odds.sum()
+        share = diagonal.shrinkage(weights)
+        each = np.sqrt(diagonal.gamma2) * diagonal.projected / share
+        mean = odds @ each
+        spread = np.sqrt(odds)[:, None] * (each - mean)
+        variance = np.diag(odds @ (sigma2[:, None] / share)) + spread.T @ spread
+        values, vectors = np.linalg.eigh(variance)
+        # In these coordinates the whitened design is orthogonal, with squared column lengths gamma2.
+        orthogonal = whiten(self.design, self.std, self.gaps, correlation_length) @ diagonal.back
+        white = (diagonal.back * (odds @ (1.0 / share))) @ orthogonal.T
+        return Smooth(
+            estimate=diagonal.back @ mean,
+            root=diagonal.back @ (vectors * np.sqrt(np.maximum(values, 0.0))),
+            gain=_unwhiten(white, self.std, self.gaps, correlation_length),
+            sigma=float(np.sqrt(odds @ sigma2)),
+            freedom=float((odds @ (diagonal.gamma2 / share)).sum()),
+            correlation_length=correlation_length,
+        )
+
+    def _diagonal(self, length: float) -> _Diagonal:
+        rho = _correlations(self.gaps, length)
+        columns = whiten(np.column_stack([self.design, self.data]), self.std, self.gaps, length)
+        return _diagonal(columns, self.penalty, self.null, float(np.log1p(-(rho**2)).sum()))
 
 
 def _unwhiten(gain: Array, std: Array, gaps: Array, length: float) -> Array:
