@@ -144,7 +144,7 @@ def step_data(test: MeasuredTest, *, blocks: int = 160) -> tuple[StepData, ...]:
 
 
 def zero_of_displacement(data: tuple[StepData, ...]) -> tuple[float, float] | None:
-    """Distance of the axes at displacement zero by the photos and its std with their scatter, m; None without photos."""
+    """Distance of the axes at displacement zero by the photos and its std with scatter, m; None without photos."""
     pairs = [
         (d.chord + d.step.displacement, np.sqrt(2.0) * d.axis_std)
         for d in data

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.measurement import MeasuredShape
 from rod.whitening import Midline
 
 Array = NDArray[np.float64]
@@ -67,8 +68,8 @@ class Pose:
 class Distance:
     """Distances of the points of a midline (b,) m, and derivatives.
 
-    ``by_model`` (b, q) is minus the normal displacement at the foot; ``by_pose`` (b, 5) in the order of `Pose`, with the
-    imposed chord held, whose change is the model's; ``s`` (b,) m are the feet on the simulated curve.
+    ``by_model`` (b, q) is minus the normal displacement at the foot; ``by_pose`` (b, 5) in the order of `Pose`, with
+    the imposed chord held, whose change is the model's; ``s`` (b,) m are the feet on the simulated curve.
     """
 
     value: Array
@@ -88,11 +89,34 @@ def distance(data: Midline, shape: Simulated, pose: Pose, chord: float) -> Dista
     chord : m
         Of the photo; turns the sideways errors of the axes into a roll.
     """
+    turned_x, turned_y = _turned(data.x, data.y, pose, chord)
+    stretch = 1.0 + pose.scale
+    value, s, nx, ny = _feet(
+        shape, data.s * stretch, pose.left_along + stretch * turned_x, pose.left_across + stretch * turned_y
+    )
+    moved = nx[:, None] * _between(shape.s, s, shape.x_by, -np.sin(shape.theta)[:, None] * shape.theta_by)
+    moved += ny[:, None] * _between(shape.s, s, shape.y_by, np.cos(shape.theta)[:, None] * shape.theta_by)
+    spin = stretch / chord * (nx * -turned_y + ny * turned_x)
+    by_pose = np.column_stack([nx, ny - spin, np.zeros_like(nx), spin, nx * turned_x + ny * turned_y])
+    return Distance(value, -moved, by_pose, s)
+
+
+def curve_distance(curve: MeasuredShape, shape: Simulated, pose: Pose, chord: float) -> tuple[Array, Array]:
+    """Distance of the smooth curve of a photo from a simulated shape at its n points, and their feet, (n,) m each."""
+    x, y = _turned(curve.x, curve.y, pose, chord)
+    stretch = 1.0 + pose.scale
+    return _feet(shape, curve.s * stretch, pose.left_along + stretch * x, pose.left_across + stretch * y)[:2]
+
+
+def _turned(x: Array, y: Array, pose: Pose, chord: float) -> tuple[Array, Array]:
     roll = (pose.right_across - pose.left_across) / chord
-    c, sn, stretch = np.cos(roll), np.sin(roll), 1.0 + pose.scale
-    turned_x, turned_y = c * data.x - sn * data.y, sn * data.x + c * data.y
-    px, py = pose.left_along + stretch * turned_x, pose.left_across + stretch * turned_y
-    s = np.clip(data.s * stretch, shape.s[0], shape.s[-1])
+    c, sn = np.cos(roll), np.sin(roll)
+    return c * x - sn * y, sn * x + c * y
+
+
+def _feet(shape: Simulated, guess: Array, px: Array, py: Array) -> tuple[Array, Array, Array, Array]:
+    """Distance of points (px, py) from the curve, arc length of their feet, and the normal there."""
+    s = np.clip(guess, shape.s[0], shape.s[-1])
     for _ in range(FEET):
         x, y, theta = _on_curve(shape, s)
         along = np.cos(theta) * (px - x) + np.sin(theta) * (py - y)
@@ -101,12 +125,7 @@ def distance(data: Midline, shape: Simulated, pose: Pose, chord: float) -> Dista
         s = s + along / np.maximum(1.0 + np.interp(s, shape.s, shape.kappa) * across, 0.2)
     x, y, theta = _on_curve(shape, s)
     nx, ny = -np.sin(theta), np.cos(theta)
-    value = nx * (px - x) + ny * (py - y)
-    moved = nx[:, None] * _between(shape.s, s, shape.x_by, -np.sin(shape.theta)[:, None] * shape.theta_by)
-    moved += ny[:, None] * _between(shape.s, s, shape.y_by, np.cos(shape.theta)[:, None] * shape.theta_by)
-    spin = stretch / chord * (nx * -turned_y + ny * turned_x)
-    by_pose = np.column_stack([nx, ny - spin, np.zeros_like(nx), spin, nx * turned_x + ny * turned_y])
-    return Distance(value, -moved, by_pose, s)
+    return nx * (px - x) + ny * (py - y), s, nx, ny
 
 
 def _between(grid: Array, s: Array, value: Array, slope: Array) -> Array:

@@ -1,0 +1,172 @@
+"""What identification noticed: contradictions between photos, log and model, each as one sentence with its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtrc
+
+from pipeline.records import Finding
+from pipeline.settings.identify import IdentifySettings
+from rod.balance import BalanceOutcome
+from rod.inverse import InverseOutcome
+from rod.measurement import MeasuredTest
+
+if TYPE_CHECKING:
+    from pipeline.identify.ways import Identification
+
+
+def identification_findings(found: Identification, settings: IdentifySettings) -> tuple[Finding, ...]:
+    """All findings of an identification, in the order a reader needs them."""
+    return (
+        *_outcomes(found),
+        *force_findings(found.test, settings),
+        *chord_findings(found.test, settings),
+        *_pre_curvature(found, settings),
+        *_nuisances(found, settings),
+        *_misfit(found, settings),
+        *_comparisons(found, settings),
+    )
+
+
+def _outcomes(found: Identification) -> Iterator[Finding]:
+    inverse, graph = found.inverse.outcome, found.balance.outcome
+    if inverse is not InverseOutcome.CONVERGED:
+        level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
+        yield Finding(f"identify/inverse-{_code(inverse.name)}", level, f"inverse problem: {inverse.value}")
+    if graph is not BalanceOutcome.MEASURED:
+        yield Finding(f"identify/balance-{_code(graph.name)}", "warning", f"balance equations: {graph.value}")
+
+
+def _code(name: str) -> str:
+    return name.lower().replace("_", "-")
+
+
+def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
+    """Sign of the forces, and the load cell's zero in the force-free step."""
+    loaded = [step.force for step in test.steps if step.branch != "mounted"]
+    if loaded and np.median(loaded) < 0.0:
+        yield Finding(
+            "identify/force-sign",
+            "warning",
+            f"the forces of the loaded steps are tension (median {np.median(loaded):.3g} N), but a cable pushed "
+            'together is compressed; if the log counts compression as negative, set rig.force_sign = "tension"',
+        )
+    for step in test.steps:
+        if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
+            yield Finding(
+                "identify/force-zero",
+                "warning",
+                f"the load cell reads {step.force:.4g} N in the force-free step {step.step}, "
+                f"{abs(step.force) / step.force_std:.1f} standard deviations from zero",
+            )
+
+
+def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
+    """Chord change on the photos against displacement in the log."""
+    both = [s for s in test.steps if s.chord is not None and s.displacement is not None]
+    if len(both) < 2:
+        return
+    chord = np.array([s.chord for s in both], dtype=float)
+    moved = np.array([s.displacement for s in both], dtype=float)
+    std = np.hypot([s.chord_std or 0.0 for s in both], settings.displacement_std_m)
+    zero = np.average(chord + moved, weights=1.0 / std**2)
+    off = chord + moved - zero
+    worst = int(np.argmax(np.abs(off) / std))
+    # The scale of the photos may be off by its own standard deviation; its part grows with the way.
+    allowed = settings.chord_sigma * np.hypot(std[worst], test.scale_std * np.ptp(moved))
+    if abs(off[worst]) > allowed:
+        slope = -np.polyfit(moved, chord, 1)[0] if np.ptp(moved) > 0.0 else np.nan
+        yield Finding(
+            "identify/chord-displacement",
+            "warning",
+            f"chord on the photos and displacement in the log disagree by up to {1e3 * abs(off[worst]):.3f} mm (step "
+            f"{both[worst].step}, {abs(off[worst]) / std[worst]:.0f} standard deviations); on the photos the bearings "
+            f"approach by {slope:.1%} of what the log says",
+        )
+
+
+def _pre_curvature(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+    sources = pre_curvature_sources(found)
+    if "photo" not in sources:
+        return
+    photo, photo_std = sources["photo"]
+    for name, what in (("inverse", "the fit"), ("balance", "the zero of the moment")):
+        if name not in sources:
+            continue
+        value, std = sources[name]
+        z = (value - photo) / np.hypot(std, photo_std)
+        if abs(z) > settings.pre_curvature_sigma:
+            yield Finding(
+                f"identify/pre-curvature-{name}",
+                "warning",
+                f"the force-free photo shows a pre-curvature of {photo:.3f} +- {photo_std:.3f} 1/m, {what} of the "
+                f"loaded photos says {value:.3f} +- {std:.3f} 1/m ({abs(z):.1f} standard deviations apart)",
+            )
+
+
+def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float]]:
+    """K0 and its std by independent sources, 1/m: force-free photo, balance and inverse without that photo."""
+    sources = {} if found.rest is None else {"photo": found.rest}
+    ways = (("balance", found.balance), ("inverse", found.inverse))
+    for name, way in ways:
+        if np.isfinite(way.loaded_pre_curvature) and np.isfinite(way.loaded_pre_curvature_std):
+            sources[name] = (way.loaded_pre_curvature, way.loaded_pre_curvature_std)
+    return sources
+
+
+def _nuisances(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+    model, u = found.inverse.model, found.inverse.unknowns
+    if model is None:
+        return
+    pulls = {name: float(u[model.index(name)]) for name in ("length", "scale")}
+    texts = {
+        "length": f"the fitted length is {1e3 * model.cable_length(u):.2f} mm, {1e3 * model.length:.2f} mm were given",
+        "scale": f"the photos fit better at a scale changed by {100 * model.nuisance(u, 'scale'):.2f} %",
+    }
+    for name, pull in pulls.items():
+        if abs(pull) > settings.nuisance_sigma:
+            yield Finding(
+                f"identify/{name}", "warning", f"{texts[name]} ({abs(pull):.1f} of its standard deviations away)"
+            )
+
+
+def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+    evaluation = found.inverse.evaluation
+    if evaluation is None:
+        return
+    for kind, what in (("shape", "shapes"), ("force", "forces")):
+        squares = [
+            float(evaluation.value[b] @ evaluation.value[b]) for n, b in evaluation.blocks.items() if n[:5] == kind
+        ]
+        count = sum(b.stop - b.start for n, b in evaluation.blocks.items() if n[:5] == kind)
+        if count and chdtrc(count, sum(squares)) < settings.misfit_level:
+            yield Finding(
+                f"identify/misfit-{kind}",
+                "warning",
+                f"the simulation leaves residuals in the {what} beyond their noise, "
+                f"{np.sqrt(sum(squares) / count):.1f} standard deviations rms; the diagnosis looks for the cause",
+            )
+
+
+def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+    if found.branches_p is not None and found.branches_p < settings.branch_level:
+        one, two = found.branches["loading"], found.branches["unloading"]
+        yield Finding(
+            "identify/branches",
+            "warning",
+            "loading and unloading show different characteristics: pre-curvature "
+            f"{one.pre_curvature:.3f} +- {one.pre_curvature_std:.3f} against "
+            f"{two.pre_curvature:.3f} +- {two.pre_curvature_std:.3f} 1/m (p = {found.branches_p:.1e}); "
+            "the common fit is a mean of both",
+        )
+    agreement = found.agreement
+    if agreement is not None and not agreement.compatible:
+        yield Finding(
+            "identify/agreement",
+            "warning",
+            f"inverse and balance differ by {agreement.rms_relative:.1%} rms, more than their joint uncertainty "
+            f"(p = {agreement.p_value:.1e}); " + "; ".join(agreement.hints),
+        )

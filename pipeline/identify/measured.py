@@ -1,0 +1,82 @@
+"""From the records of the folder and of the photos to the one record that the mechanics reads.
+
+Steps of the force log and centerlines of the photos meet by the photo's name. SI units; axes of `rod.measurement`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.records import Array, Centerline, LoadStep, Specimen, Traces
+from pipeline.settings.identify import IdentifySettings
+from rod.measurement import MeasuredStep, MeasuredTest
+
+
+def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings) -> MeasuredTest:
+    """The bending test as the mechanics sees it.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    traces : Traces
+        Outcome of each photo; rejected ones leave a step with its force only.
+    settings : IdentifySettings
+
+    Returns
+    -------
+    MeasuredTest
+        Steps in the order of the test.
+    """
+    lines = {photo.image: photo for photo in traces.photos if isinstance(photo, Centerline)}
+    floor = settings.force_std_floor_relative * max((abs(step.force_N) for step in specimen.steps), default=0.0)
+    steps = tuple(
+        _step(step, lines.get(step.image) if step.image is not None else None, floor, traces.scale.px_per_m)
+        for step in specimen.steps
+    )
+    diagonals = [
+        0.5 * np.hypot(line.preview.width, line.preview.height) * line.preview.reduction / traces.scale.px_per_m
+        for line in lines.values()
+        if line.preview is not None
+    ]
+    return MeasuredTest(
+        length=specimen.length_m,
+        length_std=settings.length_std_relative * specimen.length_m,
+        scale_std=traces.scale.std_relative,
+        steps=steps,
+        moving=specimen.rig.moving_bearing,
+        picture_half_diagonal=float(max(diagonals)) if diagonals else None,
+    )
+
+
+def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float) -> MeasuredStep:
+    return MeasuredStep(
+        step=step.step,
+        branch=step.branch,
+        displacement=step.displacement_m if np.isfinite(step.displacement_m) else None,
+        force=step.force_N,
+        # A log of zeros has no scale of its own; the smallest positive number keeps the weights finite.
+        force_std=max(step.force_std_N if np.isfinite(step.force_std_N) else 0.0, floor, np.finfo(float).tiny),
+        chord=None if line is None else line.chord_m,
+        chord_std=None if line is None else line.chord_std_m,
+        shape=None if line is None else line.shape,
+        time=step.photo_time_s,
+        hold_times=step.times_s if step.times_s.size else None,
+        hold_forces=step.forces_N if step.forces_N.size else None,
+        picture_centre=None if line is None else picture_centre(line, px_per_m),
+    )
+
+
+def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | None:
+    """Centre of the picture in the chord frame of its photo, m; None where the size of the picture is not known."""
+    if line.preview is None:
+        return None
+    size = np.array([line.preview.width, line.preview.height]) * line.preview.reduction
+    left, right = np.array(line.left_px), np.array(line.right_px)
+    along = (right - left) / np.hypot(*(right - left))
+    across = np.array([-along[1], along[0]])
+    middle = line.u_px.size // 2
+    bow: Array = np.array([line.u_px[middle], line.v_px[middle]]) - left
+    if bow @ across < 0.0:  # y of the chord frame points to the bow
+        across = -across
+    centre = (0.5 * (size - 1.0) - left) / px_per_m
+    return float(centre @ along), float(centre @ across)

@@ -1,0 +1,136 @@
+"""Both ways side by side: the inverse problem and the balance equations, branches apart and together.
+
+Loading and unloading are never merged silently: where a test has both, the inverse problem is solved for each alone and
+for all steps together, and a test says whether the two show the same characteristic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from pipeline.identify.agreement import Agreement, Characterised, compare, rest_curvature
+from pipeline.identify.findings import identification_findings
+from pipeline.identify.measured import measured_test
+from pipeline.records import Array, Finding, Specimen, Traces
+from pipeline.settings.identify import IdentifySettings
+from rod.balance import BalanceGraph, BalanceOptions, balance
+from rod.inverse import Estimate, InverseOptions, estimate
+from rod.measurement import MeasuredTest
+
+LEAST_PHOTOS = 2
+"""Photos of loaded steps that a branch needs to be fitted on its own."""
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What both ways make of one test.
+
+    Attributes
+    ----------
+    test : MeasuredTest
+    inverse : Estimate
+        All steps together.
+    balance : BalanceGraph
+    branches : dict of branch -> Estimate
+        ``loading`` (with the force-free photo) and ``unloading`` apart, where the test has both.
+    branches_p : float or None
+        Probability of a difference between the branches as large as this if both had one characteristic.
+    rest : (K0, std) or None
+        Mean curvature of the force-free photo, 1/m.
+    agreement : Agreement or None
+    images : dict of step -> name of its photo
+    findings : tuple of Finding
+    """
+
+    test: MeasuredTest
+    inverse: Estimate
+    balance: BalanceGraph
+    branches: dict[str, Estimate] = field(default_factory=dict)
+    branches_p: float | None = None
+    rest: tuple[float, float] | None = None
+    agreement: Agreement | None = None
+    images: dict[int, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+def identify(specimen: Specimen, traces: Traces, settings: IdentifySettings) -> Identification:
+    """Characteristic of a specimen by both ways.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    traces : Traces
+    settings : IdentifySettings
+
+    Returns
+    -------
+    Identification
+        Whatever the data refuse is an outcome in it, with advice, and a finding.
+    """
+    found = identify_test(measured_test(specimen, traces, settings), settings)
+    images = {step.step: step.image for step in specimen.steps if step.image is not None}
+    return replace(found, images=images)
+
+
+def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identification:
+    """`identify` for a test that is measured already."""
+    options = inverse_options(settings)
+    inverse = estimate(test, options=options)
+    graph = balance(test, options=BalanceOptions(grid=settings.grid))
+    branches = _branches(test, options)
+    found = Identification(
+        test=test,
+        inverse=inverse,
+        balance=graph,
+        branches=branches,
+        branches_p=_branches_p(branches),
+        rest=rest_curvature(test),
+    )
+    if inverse.characteristic is not None and graph.measured:
+        found = replace(found, agreement=compare(test, inverse, graph, level=settings.agreement_level))
+    return replace(found, findings=identification_findings(found, settings))
+
+
+def inverse_options(settings: IdentifySettings) -> InverseOptions:
+    """The settings as the options of the inverse problem."""
+    return InverseOptions(
+        elements=settings.elements,
+        blocks=settings.blocks,
+        knots=(settings.least_knots, max(settings.least_knots, settings.most_knots)),
+        spare=settings.spare_knots,
+        grid=settings.grid,
+    )
+
+
+def _branches(test: MeasuredTest, options: InverseOptions) -> dict[str, Estimate]:
+    groups = {"loading": ("mounted", "loading"), "unloading": ("unloading",)}
+    apart = {}
+    for name, members in groups.items():
+        steps = tuple(step for step in test.steps if step.branch in members)
+        photos = sum(step.shape is not None and step.branch != "mounted" for step in steps)
+        if photos < LEAST_PHOTOS:
+            return {}
+        apart[name] = estimate(replace(test, steps=steps), options=options)
+    return apart if all(e.characteristic is not None for e in apart.values()) else {}
+
+
+def _branches_p(branches: dict[str, Estimate]) -> float | None:
+    """Test of equal characteristic and K0; the branches share no photo and no force: their errors are independent."""
+    if len(branches) < 2:
+        return None
+    one, two = Characterised.of_inverse(branches["loading"]), Characterised.of_inverse(branches["unloading"])
+    shift = one.pre_curvature - two.pre_curvature
+    z = shift / np.hypot(one.pre_curvature_std, two.pre_curvature_std)
+    common = one.common_grid(two)
+    chi2, free = float(z**2), 1
+    if common is not None:
+        contract_one, contract_two = one.contraction(common), two.contraction(common)
+        difference: Array = contract_one @ np.log(one.tangent) - contract_two @ np.log(two.tangent)
+        covariance = contract_one @ one.log_covariance @ contract_one.T
+        covariance += contract_two @ two.log_covariance @ contract_two.T
+        chi2 += float(difference @ np.linalg.solve(covariance, difference))
+        free += difference.size
+    return float(chdtrc(free, chi2))
