@@ -234,5 +234,5 @@ def _on_board(back: Array, camera: Camera, u: Array, v: Array) -> tuple[Array, A
 def _wave(at: Array, square: float, corners: int, sigma: float) -> Array:
     """Square wave of +-1 that changes sign at the corners' lines, blurred by ``sigma``."""
     line = at / square + 0.5 * (corners - 1)
-    near = np.rint(line)
+    near = np.clip(np.rint(line), 0, corners - 1)  # the outer border is drawn by the sheet, not by a sign
     return (2.0 * ndtr((line - near) * square / sigma) - 1.0) * np.where(near % 2 == 0, 1.0, -1.0)

@@ -72,7 +72,7 @@ def _cloth(ground: Ground, width: int, height: int, rng: Rng) -> Image:
     weave = np.cos(2 * np.pi * u / period) * np.cos(2 * np.pi * v / period)
     folds = _unit(_noise(width, height, 150.0, 50.0, rng))
     threads = _unit(_along(ground, width, height, 15 * ground.grain_px, ground.grain_px, rng))
-    return _unit(weave + 0.8 * folds + 0.5 * threads)
+    return _unit(weave + 0.5 * folds + 0.2 * threads)
 
 
 def _wood(ground: Ground, width: int, height: int, rng: Rng) -> Image:
