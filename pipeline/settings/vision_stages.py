@@ -47,8 +47,10 @@ class CalibrationSettings(StageSettings):
     lens_photos: int = Field(10, ge=3, description="photos; from so many on they may show the board in any position")
     lens_sigmas: float = Field(3.0, gt=0, description="sigmas; a weaker lens term adds more error than it removes")
     max_board_rms_px: float = Field(0.5, gt=0, description="px; real boards reach 0.12 to 0.16 px, bent ones do not")
-    max_focal_std: float = Field(
-        0.05, gt=0, description="relative; photos all in one plane do not tell the focal length and so no distance"
+    one_plane_ratio: float = Field(
+        1.5,
+        gt=1,
+        description="ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it",
     )
     usual_distance_m: float = Field(
         0.4, gt=0, description="m; camera above the cable where nobody says: half the height of a bench stand"

@@ -165,9 +165,12 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | Non
 
 def fit_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
     """Plane map of the board's surface from one photo or more."""
-    if len(views) >= settings.lens_photos:
-        return _fit_free_views(views, settings)
-    return _fit_plane_views(views, settings)
+    flat = _fit_plane_views(views, settings)
+    if len(views) < settings.lens_photos:
+        return flat
+    free = _fit_free_views(views, settings)
+    # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
+    return free if flat.rms_px > settings.one_plane_ratio * free.rms_px else flat
 
 
 def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
@@ -253,7 +256,7 @@ def _least_squares(
             parts.append((shown * radius + middle - view.uv).ravel())
         return np.concatenate(parts)
 
-    found = least_squares(residual, (start / scale)[free], x_scale="jac", loss="soft_l1", f_scale=0.5)
+    found = least_squares(residual, (start / scale)[free], x_scale="jac", loss="soft_l1", f_scale=0.5, max_nfev=60)
     error = residual(found.x)
     spare = max(len(error) - len(found.x), 1)
     rms = float(np.sqrt(error @ error / spare))
@@ -266,21 +269,26 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     """Ten or more positions: camera matrix and lens from all, the plane from the first photo."""
     objects = [np.column_stack([v.board_m, np.zeros(len(v.board_m))]).astype(np.float32) for v in views]
     images = [v.uv.astype(np.float32).reshape(-1, 1, 2) for v in views]
-    flags = cv2.CALIB_FIX_K3
-    rms, camera, distortion, turns, shifts, inner_std, _, _ = cv2.calibrateCameraExtended(
-        objects, images, views[0].size, np.eye(3), np.zeros(5), flags=flags
-    )
+    simple = cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K2 | cv2.CALIB_ZERO_TANGENT_DIST
+    fits = [
+        cv2.calibrateCamera(objects, images, views[0].size, np.eye(3), np.zeros(5), flags=flags)
+        for flags in (simple, cv2.CALIB_FIX_K3)
+    ]
+    # k2 and the tangential terms run wild outside the board unless the corners really show them.
+    drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
+    rms, camera, distortion, turns, shifts = fits[1] if drop > settings.lens_sigmas**2 * 3 else fits[0]
     lens = Lens(np.asarray(camera), np.ravel(distortion)[:5])
     ideal = lens.undistort(views[0].uv)
     homography, _ = cv2.findHomography(ideal, views[0].board_m)
     rotation, _ = cv2.Rodrigues(turns[0])
     # The board's z axis points away from or toward the camera; the distance from the plane is the same.
     distance = float(abs(rotation[:, 2] @ np.ravel(shifts[0])))
-    focal_std = float(np.ravel(inner_std)[0] / camera[0, 0])
-    known = distance if focal_std < settings.max_focal_std else None
     spread = float(np.hypot(*np.ptp(views[0].uv, axis=0)))
     std = float(rms) * np.sqrt(8.0 / (2 * len(ideal))) / spread
-    return PlaneFit(PlaneMap(homography, lens), float(rms), std, known, f"lens from {len(views)} photos")
+    # OpenCV counts distances, here as above coordinates.
+    return PlaneFit(
+        PlaneMap(homography, lens), float(rms) / np.sqrt(2.0), std, distance, f"lens from {len(views)} photos"
+    )
 
 
 def _raise_to_axis(

@@ -6,14 +6,13 @@ Plane axes: right-handed as the pixel axes are (``x`` roughly along ``u``, ``y``
 photo), origin anywhere: only differences matter, the chord frame follows from the bearing axes.
 A plain scale is the trivial case, and a photo without any scale has one "metre" per pixel.
 
-Lens model: Brown-Conrady as in OpenCV; ``(u, v) = K distort(K^-1 (u', v'))``.
+Lens model: Brown-Conrady with the coefficients of OpenCV (k1, k2, p1, p2, k3); ``(u, v) = K distort(K^-1 (u', v'))``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from pipeline.records import Array
@@ -26,19 +25,33 @@ class Lens:
     camera: Array
     distortion: Array
 
-    def undistort(self, uv: Array) -> Array:
-        """Pixels ``(n, 2)`` a camera without distortion would have shown."""
-        # OpenCV's default of five fixed-point steps leaves 1e-3 px at 5 % distortion; forty leave nothing.
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
-        points = np.ascontiguousarray(uv, dtype=np.float64).reshape(-1, 1, 2)
-        ideal = cv2.undistortPointsIter(points, self.camera, self.distortion, None, self.camera, criteria)
-        return np.asarray(ideal, dtype=np.float64).reshape(-1, 2)
-
     def distort(self, uv: Array) -> Array:
-        """Inverse of `undistort`."""
-        rays = np.linalg.solve(self.camera, np.column_stack([uv, np.ones(len(uv))]).T).T
-        shown, _ = cv2.projectPoints(rays.reshape(-1, 1, 3), np.zeros(3), np.zeros(3), self.camera, self.distortion)
-        return np.asarray(shown, dtype=np.float64).reshape(-1, 2)
+        """Photo pixels ``(n, 2)`` of the pixels a camera without distortion would have shown."""
+        x, y = self._rays(uv).T
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        shown_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        shown_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.column_stack([shown_x, shown_y, np.ones_like(x)]) @ self.camera.T[:, :2]
+
+    def undistort(self, uv: Array) -> Array:
+        """Inverse of `distort`, by fixed-point steps.
+
+        Each step leaves about three times the relative distortion of the error: at 5 % twenty steps reach rounding.
+        """
+        uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
+        ideal = uv.copy()
+        for _ in range(60):
+            miss = uv - self.distort(ideal)
+            ideal += miss
+            if np.abs(miss).max(initial=0.0) < 1e-9:
+                break
+        return ideal
+
+    def _rays(self, uv: Array) -> Array:
+        homogeneous = np.column_stack([uv, np.ones(len(uv))])
+        return np.linalg.solve(self.camera, homogeneous.T).T[:, :2]
 
 
 def _project(matrix: Array, points: Array) -> Array:

@@ -1,0 +1,231 @@
+"""Scale and plane; truth comes from the camera of the rendered photos, which knows its own geometry exactly."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.records import Board, CameraSpec, LoadStep, RigSpec, Specimen
+from pipeline.settings.vision import VisionSettings
+from pipeline.settings.vision_stages import CalibrationSettings
+from pipeline.vision.board import BoardView, calibrate_by_board, fit_views
+from pipeline.vision.calibration import check_scale, from_found, from_number
+from pipeline.vision.plane import Lens, PlaneMap
+from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
+from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.strand import Curve
+
+STAGE = CalibrationSettings()
+SETTINGS = VisionSettings()
+CURVE = Curve.from_curvature(5.0, 0.18)
+SQUARE = 0.010
+BOARD = Board(13, 7, SQUARE)
+
+
+def grid(camera: Camera) -> np.ndarray:
+    """Pixels spread over the inner nine tenths of the picture."""
+    u, v = np.meshgrid(np.linspace(0.05, 0.95, 12) * camera.width, np.linspace(0.05, 0.95, 8) * camera.height)
+    return np.column_stack([u.ravel(), v.ravel()])
+
+
+def shape_error(plane: PlaneMap, camera: Camera, *, height_m: float = 0.0) -> float:
+    """Largest distance (m) between mapped and true points after the best rigid move: no scale is fitted."""
+    uv = grid(camera)
+    true = np.column_stack(camera.plane(uv[:, 0], uv[:, 1], height_m=height_m))
+    found = plane.to_plane(uv)
+    a, b = true - true.mean(axis=0), found - found.mean(axis=0)
+    left, _, right = np.linalg.svd(a.T @ b)
+    return float(np.hypot(*(b - a @ left @ right).T).max())
+
+
+def board_photo(folder: Path, camera: Camera, board: ChessBoard, name: str = "board.png") -> None:
+    scene = Scene(Strand(CURVE), camera, sensor=Sensor(blur_px=0.8, noise=0.01), ground=Ground(colour=(0.5, 0.5, 0.5)))
+    assert cv2.imwrite(str(folder / name), render_board(scene, board))
+
+
+def test_plain_scale_maps_and_inverts() -> None:
+    plane = PlaneMap.from_scale(8_000.0)
+    np.testing.assert_allclose(plane.to_plane(np.array([[800.0, -400.0]])), [[0.1, -0.05]], rtol=1e-12)
+    np.testing.assert_allclose(plane.to_pixels(np.array([[0.1, -0.05]])), [[800.0, -400.0]], rtol=1e-12)
+    np.testing.assert_allclose(plane.local_scale(np.array([[3.0, 4.0]])), [8_000.0], rtol=1e-9)
+
+
+def test_lens_and_homography_invert_each_other_to_rounding() -> None:
+    lens = Lens(np.array([[900.0, 0, 640], [0, 900, 480], [0, 0, 1]]), np.array([-0.12, 0.03, 1e-3, -5e-4, 0.0]))
+    plane = PlaneMap(np.array([[1e-4, 2e-6, 0.01], [-1e-6, 1.1e-4, 0.0], [1e-5, -2e-5, 1.0]]), lens)
+    uv = np.array([[10.0, 20.0], [640.0, 480.0], [1200.0, 900.0]])
+    np.testing.assert_allclose(plane.to_pixels(plane.to_plane(uv)), uv, atol=1e-6)
+
+
+def test_jacobian_is_the_derivative_of_the_map() -> None:
+    plane = PlaneMap(np.array([[1e-4, 0, 0], [0, 1e-4, 0], [2e-5, 1e-5, 1.0]]))
+    at = np.array([[500.0, 300.0]])
+    step = 1e-3
+    for axis in range(2):
+        move = step * np.eye(2)[axis]
+        slope = (plane.to_plane(at + move) - plane.to_plane(at - move)) / (2 * step)
+        np.testing.assert_allclose(plane.jacobian(at)[0, :, axis], slope[0], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("tilt_deg", "k1", "columns"), [(0.0, 0.0, 13), (2.0, 0.0, 13), (2.0, -0.01, 19), (0.0, 0.01, 19)]
+)
+def test_one_board_photo_takes_tilt_and_distortion_away(
+    tmp_path: Path, tilt_deg: float, k1: float, columns: int
+) -> None:
+    distance = 0.4
+    camera = Camera(2000, 1000, 9_000.0, k1=k1, perspective_per_m=(np.sin(np.radians(tilt_deg)) / distance, 0.0))
+    camera = replace(camera, distance_m=distance)
+    board_photo(tmp_path, camera, ChessBoard(columns, 9, SQUARE))
+    spec = CameraSpec(calibration=tmp_path, board=Board(columns, 9, SQUARE), distance_m=1e9)
+    calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+    # Uncorrected, 1 % of distortion is 1 mm at the border and 2 degrees are 8 mm; 40 um over 0.2 m are 0.02 %, a
+    # fifth of what curvature may be off.
+    assert 1e6 * shape_error(calibration.plane, camera) < 40.0
+    true_scale = 9_000.0
+    assert abs(calibration.scale.px_per_m / true_scale - 1.0) < 3.0 * calibration.scale.std_relative
+
+
+def test_scale_of_the_axis_above_the_board_is_corrected_by_the_camera_distance(tmp_path: Path) -> None:
+    distance, diameter = 0.4, 0.006
+    camera = Camera(1800, 1000, 8_000.0, distance_m=distance, perspective_per_m=(0.03, 0.02))
+    # the board lies on the table, the camera's scale is that of the cable axis, half a diameter above
+    board_photo(tmp_path, camera, ChessBoard(13, 7, SQUARE, height_m=-0.5 * diameter))
+    spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=distance + 0.5 * diameter)
+    raised = calibrate_by_board(spec, diameter, SETTINGS)
+    assert 1e6 * shape_error(raised.plane, camera) < 40.0
+    flat = calibrate_by_board(replace(spec, distance_m=None), diameter, SETTINGS)
+    # without the distance the scale is off by h / Z = 0.75 %, and says so
+    assert 1e6 * shape_error(flat.plane, camera) > 500.0
+    assert flat.scale.std_relative > 0.5 * 0.5 * diameter / distance
+    assert [finding.code for finding in flat.findings] == ["calibration/height"]
+
+
+def test_charuco_board_is_found_whatever_its_dictionary(tmp_path: Path) -> None:
+    for name in (cv2.aruco.DICT_4X4_50, cv2.aruco.DICT_6X6_250):
+        dictionary = cv2.aruco.getPredefinedDictionary(name)
+        pattern = cv2.aruco.CharucoBoard((12, 8), SQUARE, 0.7 * SQUARE, dictionary)
+        # 80 px a square and a white border of 100 px: the picture itself is the photo, at 8000 px/m
+        sheet = pattern.generateImage((12 * 80, 8 * 80))
+        assert cv2.imwrite(
+            str(tmp_path / "board.png"), cv2.copyMakeBorder(sheet, *[100] * 4, cv2.BORDER_CONSTANT, value=255)
+        )
+        spec = CameraSpec(
+            calibration=tmp_path, board=Board(11, 7, SQUARE, charuco=True, marker_m=0.7 * SQUARE), distance_m=1e9
+        )
+        calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+        assert calibration.scale.px_per_m == pytest.approx(8_000.0, rel=2e-4)
+
+
+def views_of(camera: Camera, poses: list[ChessBoard], noise_px: float, seed: int) -> list[BoardView]:
+    rng = np.random.default_rng(seed)
+    views = []
+    for i, board in enumerate(poses):
+        corners = board.corners(camera)
+        a, b = np.meshgrid(np.arange(board.columns) * board.square_m, np.arange(board.rows) * board.square_m)
+        points = np.column_stack([a.ravel(), b.ravel()])
+        noisy = corners + noise_px * rng.standard_normal(corners.shape)
+        views.append(BoardView(f"{i}", points, noisy, (camera.width, camera.height)))
+    return views
+
+
+def test_several_photos_in_the_plane_share_one_fit() -> None:
+    camera = Camera(2000, 1000, 9_000.0, k1=-0.01, perspective_per_m=(0.05, -0.04))
+    poses = [ChessBoard(7, 5, SQUARE, (x, y), (0, 0, turn)) for x, y, turn in ((0.04, 0.03, 0.1), (0.14, 0.03, -0.4))]
+    errors = [shape_error(fit_views(views_of(camera, poses[:n], 0.1, 3), STAGE).plane, camera) for n in (1, 2)]
+    # One small board at the left tells little about the right half of the picture.
+    assert 1e6 * errors[1] < 60.0
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_ten_positions_give_the_lens_and_the_camera_distance() -> None:
+    camera = Camera(2000, 1200, 5_000.0, k1=-0.02, distance_m=0.45)
+    rng = np.random.default_rng(5)
+    poses = [ChessBoard(13, 7, SQUARE)]
+    poses += [
+        ChessBoard(
+            13, 7, SQUARE, tuple((0.09, 0.03) + 0.03 * rng.uniform(-1, 1, 2)), tuple(0.5 * rng.uniform(-1, 1, 3))
+        )
+        for _ in range(11)
+    ]
+    fit = fit_views(views_of(camera, poses, 0.1, 7), STAGE)
+    assert fit.distance_m == pytest.approx(0.45, rel=0.01)
+    assert fit.rms_px == pytest.approx(
+        0.1 * np.sqrt(2), rel=0.15
+    )  # OpenCV's rms is of the distance, not of a coordinate
+    assert 1e6 * shape_error(fit.plane, camera) < 200.0  # 0.05 % of the picture's 0.4 m, the boards leave the rim out
+
+
+def test_positions_in_one_plane_give_no_distance() -> None:
+    camera = Camera(2000, 1200, 6_000.0, distance_m=0.45)
+    poses = [ChessBoard(9, 6, SQUARE, (0.06 + 0.005 * i, 0.03), (0.0, 0.0, 0.2 * i)) for i in range(11)]
+    assert fit_views(views_of(camera, poses, 0.1, 2), STAGE).distance_m is None
+
+
+def test_folder_without_a_board_is_the_users_error(tmp_path: Path) -> None:
+    assert cv2.imwrite(str(tmp_path / "a.png"), np.full((300, 400), 128, np.uint8))
+    with pytest.raises(InputError, match="13 x 7 inner corners") as raised:
+        calibrate_by_board(CameraSpec(calibration=tmp_path, board=BOARD), 0.005, SETTINGS)
+    assert raised.value.code == "calibration/no-board"
+
+
+def test_unreadable_calibration_photo_is_a_finding(tmp_path: Path) -> None:
+    board_photo(tmp_path, Camera(1800, 1000, 8_000.0), ChessBoard(13, 7, SQUARE))
+    (tmp_path / "empty.jpg").write_bytes(b"")
+    spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=1.0)
+    calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+    assert [f.code for f in calibration.findings] == ["calibration/photo"]
+    assert "empty.jpg" in calibration.findings[0].message
+
+
+def found(left: float, right: float, radius: float | None = None, std: float = 0.02) -> RoughCable:
+    """A cable whose axes lie at the given u; only what calibration reads is filled."""
+    path = np.column_stack([np.linspace(left, right, 50), np.zeros(50)])
+    bearings = [Bearing((u, 0.0), std, radius, 0.02 if radius else None) for u in (left, right)]
+    grey = np.zeros((1, 1), np.float32)
+    return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 0.01, 1.0)
+
+
+def specimen(*, marker_m: float | None = 0.012, length_m: float = 0.18) -> Specimen:
+    step = LoadStep(0, "loading", 0.0, 0.0, 0.0, None, np.empty(0), np.empty(0), None)
+    rig = RigSpec(marker_diameter_m=marker_m)
+    return Specimen("a", Path(), length_m, 0.005, CameraSpec(), rig, (step,), {})
+
+
+def test_scale_by_travel_against_the_log() -> None:
+    scale, travel = 9_500.0, np.array([0.0, 0.004, 0.008, 0.012])
+    rng = np.random.default_rng(2)
+    cables = [found(200 + scale * d + 0.02 * rng.standard_normal(), 1900.0) for d in travel]
+    calibration = from_found(specimen(marker_m=None), cables, travel, STAGE)
+    assert calibration is not None
+    assert "displacement log" in calibration.scale.source
+    assert abs(calibration.scale.px_per_m - scale) < 3.0 * calibration.scale.std_relative * scale
+    assert calibration.scale.std_relative < 1e-3
+
+
+def test_scale_by_covers_where_nothing_moved() -> None:
+    calibration = from_found(specimen(), [found(200, 1900, 57.0)], np.array([0.0]), STAGE)
+    assert calibration is not None
+    assert calibration.scale.px_per_m == pytest.approx(2 * 57.0 / 0.012)
+    assert "covers" in calibration.scale.source
+
+
+def test_scale_by_the_length_where_nothing_else_tells() -> None:
+    calibration = from_found(specimen(marker_m=None), [found(200, 1910)], np.array([0.0]), STAGE)
+    assert calibration is not None
+    assert calibration.scale.px_per_m == pytest.approx(1710 / 0.18)
+    assert calibration.scale.std_relative == STAGE.length_scale_std
+    assert from_found(specimen(), [], np.empty(0), STAGE) is None
+
+
+@pytest.mark.parametrize(("error", "codes"), [(0.0, []), (0.002, []), (0.03, ["scale/covers", "scale/displacement"])])
+def test_wrong_scale_is_found_by_covers_and_travel(error: float, codes: list[str]) -> None:
+    true, travel = 9_500.0, np.array([0.0, 0.005, 0.010])
+    cables = [found(200 + true * d, 1900.0, 0.006 * true) for d in travel]
+    calibration = from_number(true * (1 + error), STAGE)
+    findings = check_scale(specimen(), calibration, cables, travel, STAGE)
+    assert [finding.code for finding in findings] == codes
+    assert all("-2.9" in finding.message for finding in findings)
