@@ -77,26 +77,26 @@ def test_one_board_photo_takes_tilt_and_distortion_away(
     tmp_path: Path, tilt_deg: float, k1: float, columns: int
 ) -> None:
     distance = 0.4
-    camera = Camera(2000, 1000, 9_000.0, k1=k1, perspective_per_m=(np.sin(np.radians(tilt_deg)) / distance, 0.0))
+    camera = Camera(1200, 600, 5_400.0, k1=k1, perspective_per_m=(np.sin(np.radians(tilt_deg)) / distance, 0.0))
     camera = replace(camera, distance_m=distance)
     board_photo(tmp_path, camera, ChessBoard(columns, 9, SQUARE))
     spec = CameraSpec(calibration=tmp_path, board=Board(columns, 9, SQUARE), distance_m=1e9)
     calibration = calibrate_by_board(spec, 0.005, SETTINGS)
-    # Uncorrected, 1 % of distortion is 1 mm at the border and 2 degrees are 8 mm; 40 um over 0.2 m are 0.02 %, a
-    # fifth of what curvature may be off.
-    assert 1e6 * shape_error(calibration.plane, camera) < 40.0
-    true_scale = 9_000.0
+    # Uncorrected, 1 % of distortion is 1 mm at the border and 2 degrees are 8 mm; 60 um over 0.2 m are 0.03 %, a
+    # third of what curvature may be off.
+    assert 1e6 * shape_error(calibration.plane, camera) < 60.0
+    true_scale = 5_400.0
     assert abs(calibration.scale.px_per_m / true_scale - 1.0) < 3.0 * calibration.scale.std_relative
 
 
 def test_scale_of_the_axis_above_the_board_is_corrected_by_the_camera_distance(tmp_path: Path) -> None:
     distance, diameter = 0.4, 0.006
-    camera = Camera(1800, 1000, 8_000.0, distance_m=distance, perspective_per_m=(0.03, 0.02))
+    camera = Camera(1100, 600, 5_000.0, distance_m=distance, perspective_per_m=(0.03, 0.02))
     # the board lies on the table, the camera's scale is that of the cable axis, half a diameter above
     board_photo(tmp_path, camera, ChessBoard(13, 7, SQUARE, height_m=-0.5 * diameter))
     spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=distance + 0.5 * diameter)
     raised = calibrate_by_board(spec, diameter, SETTINGS)
-    assert 1e6 * shape_error(raised.plane, camera) < 40.0
+    assert 1e6 * shape_error(raised.plane, camera) < 60.0
     flat = calibrate_by_board(replace(spec, distance_m=None), diameter, SETTINGS)
     # without the distance the scale is off by h / Z = 0.75 %, and says so
     assert 1e6 * shape_error(flat.plane, camera) > 500.0
@@ -108,16 +108,16 @@ def test_charuco_board_is_found_whatever_its_dictionary(tmp_path: Path) -> None:
     for name in (cv2.aruco.DICT_4X4_50, cv2.aruco.DICT_6X6_250):
         dictionary = cv2.aruco.getPredefinedDictionary(name)
         pattern = cv2.aruco.CharucoBoard((12, 8), SQUARE, 0.7 * SQUARE, dictionary)
-        # 80 px a square and a white border of 100 px: the picture itself is the photo, at 8000 px/m
-        sheet = pattern.generateImage((12 * 80, 8 * 80))
+        # 40 px a square and a white border of 50 px: the picture itself is the photo, at 4000 px/m
+        sheet = pattern.generateImage((12 * 40, 8 * 40))
         assert cv2.imwrite(
-            str(tmp_path / "board.png"), cv2.copyMakeBorder(sheet, *[100] * 4, cv2.BORDER_CONSTANT, value=255)
+            str(tmp_path / "board.png"), cv2.copyMakeBorder(sheet, *[50] * 4, cv2.BORDER_CONSTANT, value=255)
         )
         spec = CameraSpec(
             calibration=tmp_path, board=Board(11, 7, SQUARE, charuco=True, marker_m=0.7 * SQUARE), distance_m=1e9
         )
         calibration = calibrate_by_board(spec, 0.005, SETTINGS)
-        assert calibration.scale.px_per_m == pytest.approx(8_000.0, rel=2e-4)
+        assert calibration.scale.px_per_m == pytest.approx(4_000.0, rel=4e-4)
 
 
 def views_of(camera: Camera, poses: list[ChessBoard], noise_px: float, seed: int) -> list[BoardView]:
@@ -153,9 +153,7 @@ def test_ten_positions_give_the_lens_and_the_camera_distance() -> None:
     ]
     fit = fit_views(views_of(camera, poses, 0.1, 7), STAGE)
     assert fit.distance_m == pytest.approx(0.45, rel=0.01)
-    assert fit.rms_px == pytest.approx(
-        0.1 * np.sqrt(2), rel=0.15
-    )  # OpenCV's rms is of the distance, not of a coordinate
+    assert fit.rms_px == pytest.approx(0.1, rel=0.1)
     assert 1e6 * shape_error(fit.plane, camera) < 200.0  # 0.05 % of the picture's 0.4 m, the boards leave the rim out
 
 
@@ -173,7 +171,7 @@ def test_folder_without_a_board_is_the_users_error(tmp_path: Path) -> None:
 
 
 def test_unreadable_calibration_photo_is_a_finding(tmp_path: Path) -> None:
-    board_photo(tmp_path, Camera(1800, 1000, 8_000.0), ChessBoard(13, 7, SQUARE))
+    board_photo(tmp_path, Camera(1100, 600, 5_000.0), ChessBoard(13, 7, SQUARE))
     (tmp_path / "empty.jpg").write_bytes(b"")
     spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=1.0)
     calibration = calibrate_by_board(spec, 0.005, SETTINGS)
