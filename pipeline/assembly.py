@@ -1,0 +1,210 @@
+"""Stages' records to one `Result`: nothing is measured here, only put in its place and dated.
+
+``Specimen, Traces, Identification, diagnosis -> Result``. The provenance holds all that a stranger needs to get the same
+numbers again: versions of the program and its libraries, SHA-256 of every input, the settings, the command. Only
+``provenance["clock"]`` differs between two runs over the same input.
+"""
+
+from __future__ import annotations
+
+import base64
+import datetime
+import importlib.metadata
+import platform
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from pipeline import __version__
+from pipeline.identify import Identification, IdentificationParts, identification_parts
+from pipeline.identify.parts import PhotoResidual
+from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces
+from pipeline.result import (
+    DiagnosisPart,
+    FindingPart,
+    PhotoPart,
+    PreviewPart,
+    Result,
+    ScalePart,
+    SpecimenPart,
+)
+from pipeline.rounding import rounded
+from pipeline.settings import Settings
+
+PROGRAM = "cablebend"
+LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
+SIGNIFICANT_DIGITS = 9  # of an array in result.json: finer than any error bar, a third of the size of full precision
+
+
+def listed(values: Iterable[float] | np.ndarray) -> list[float]:
+    """Array as a list of numbers with `SIGNIFICANT_DIGITS`."""
+    return [float(f"{value:.{SIGNIFICANT_DIGITS}g}") for value in np.asarray(values, float).ravel()]
+
+
+def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str, Any]:
+    """Versions, input hashes, settings and command; the clock under its own key."""
+    return {
+        "program": PROGRAM,
+        "version": __version__,
+        "python": platform.python_version(),
+        "libraries": {name: importlib.metadata.version(name) for name in LIBRARIES},
+        "inputs_sha256": specimen.hashes,
+        "settings": settings.model_dump(mode="json"),
+        "command": command or f"{PROGRAM} run {specimen.folder} -o OUT",
+        "clock": {"created_utc": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")},
+    }
+
+
+def assemble(
+    specimen: Specimen,
+    traces: Traces,
+    identification: Identification,
+    diagnosis: DiagnosisPart | None,
+    *,
+    findings: Iterable[Finding] = (),
+    settings: Settings,
+    command: str = "",
+) -> Result:
+    """Put everything measured on one specimen into its `Result`.
+
+    Parameters
+    ----------
+    specimen, traces, identification
+        The stages' records.
+    diagnosis : DiagnosisPart or None
+        None where identification left nothing to diagnose.
+    findings : iterable of Finding
+        Of the diagnosis; those of the other stages are in their records.
+    settings : Settings
+    command : str
+        The command that reproduces the result.
+    """
+    parts = identification_parts(identification)
+    measured = parts.inverse.converged or parts.balance.curve is not None
+    gathered = [
+        *specimen.findings,
+        *traces.findings,
+        *(finding for photo in traces.photos if isinstance(photo, Centerline) for finding in photo.findings),
+        *parts.findings,
+        *findings,
+    ]
+    return Result(
+        status="measured" if parts.inverse.converged else "partial" if measured else "failed",
+        headline=headline(parts, diagnosis),
+        specimen=SpecimenPart(
+            id=specimen.id,
+            length_m=specimen.length_m,
+            diameter_m=specimen.diameter_m,
+            folder=str(specimen.folder),
+            moving_bearing=specimen.rig.moving_bearing,
+            description=specimen.description,
+        ),
+        scale=ScalePart(
+            px_per_mm=traces.scale.px_per_m / 1e3,
+            std_relative=traces.scale.std_relative,
+            source=traces.scale.source,
+        ),
+        photos=photo_parts(specimen, traces, parts),
+        steps=parts.steps,
+        inverse=parts.inverse,
+        balance=parts.balance,
+        agreement=parts.agreement,
+        diagnosis=diagnosis,
+        findings=[FindingPart(code=f.code, level=f.level, message=f.message) for f in unique(gathered)],
+        provenance=provenance(specimen, settings, command),
+    )
+
+
+def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None) -> str:
+    """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree."""
+    way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
+    if way.curve is None:
+        return f"No characteristic was measured: {parts.inverse.advice}."
+    curve = way.curve
+    low, high = (
+        f"{rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i])} mN m² at {curve.kappa_per_m[i]:.3g} 1/m"
+        for i in (0, -1)
+    )
+    start = rounded(way.pre_curvature_per_m, way.pre_curvature_std_per_m)
+    answer = f"By the {name}, f_EI (tangent) goes from {low} to {high}; pre-curvature {start} 1/m"
+    agrees = parts.agreement.compatible
+    if agrees is not None and parts.agreement.rms_relative is not None:
+        share = f"{100 * parts.agreement.rms_relative:.2g} % rms"
+        answer += f"; both ways {'agree' if agrees else 'disagree beyond their bands'} ({share})"
+    if diagnosis is not None:
+        answer += f". {diagnosis.headline}"
+    return answer if answer.endswith(".") else f"{answer}."
+
+
+def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:
+    """One part per photo of the log: traced, rejected or missing."""
+    outcomes = {photo.image: photo for photo in traces.photos}
+    return [
+        _photo_part(step, outcomes.get(step.image), parts.photos.get(step.step))
+        for step in specimen.steps
+        if step.image is not None
+    ]
+
+
+def unique(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings in their order, each once: two stages may have seen the same thing."""
+    return list(dict.fromkeys(findings))
+
+
+def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
+    image = str(step.image)
+    if photo is None:
+        reason = "the photo named in the force log is not in the folder"
+        return PhotoPart(image=image, step=step.step, status="missing", reason=reason, code="photo/missing")
+    if isinstance(photo, Rejected):
+        return PhotoPart(
+            image=image,
+            step=step.step,
+            status="rejected",
+            reason=photo.reason,
+            code=photo.code,
+            quality=photo.figure,
+            preview=_preview_part(photo.preview),
+        )
+    shape = photo.shape
+    fitted = {} if residual is None else asdict(residual)
+    return PhotoPart(
+        image=image,
+        step=step.step,
+        status="traced",
+        chord_m=photo.chord_m,
+        chord_std_m=photo.chord_std_m,
+        traced_length_m=photo.traced_length_m,
+        traced_length_std_m=photo.traced_length_std_m,
+        width_m=photo.width_m,
+        width_std_m=photo.width_std_m,
+        left_px=photo.left_px,
+        right_px=photo.right_px,
+        mirrored=photo.mirrored,
+        s_m=listed(shape.s),
+        x_m=listed(shape.x),
+        y_m=listed(shape.y),
+        u_px=listed(photo.u_px),
+        v_px=listed(photo.v_px),
+        theta_rad=listed(shape.theta),
+        kappa_per_m=listed(shape.kappa),
+        kappa_std_per_m=listed(photo.kappa_std),
+        seen=[bool(seen) for seen in shape.seen],
+        quality={name: float(value) for name, value in photo.quality.items()},
+        preview=_preview_part(photo.preview),
+        **fitted,
+    )
+
+
+def _preview_part(preview: Preview | None) -> PreviewPart | None:
+    if preview is None:
+        return None
+    return PreviewPart(
+        jpeg_base64=base64.b64encode(preview.jpeg).decode(),
+        width=preview.width,
+        height=preview.height,
+        reduction=preview.reduction,
+        strip_base64=None if preview.strip is None else base64.b64encode(preview.strip).decode(),
+    )

@@ -1,0 +1,58 @@
+"""One specimen: the whole pipeline spelled out on one screen.
+
+folder -> `Specimen` -> photos -> `Traces` -> `Identification` -> diagnosis -> `Result` -> files.
+`measure` is what the command line, the batch and the Python API all call; `write` puts what people and programs read
+beside ``result.json``. A bad file of the user raises `InputError`; nature's refusals are values in the result.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.assembly import assemble
+from pipeline.diagnosis import diagnose
+from pipeline.identify import identify
+from pipeline.intake.folder import read_specimen
+from pipeline.report.document import write_report
+from pipeline.report.pdf import write_pdf
+from pipeline.report.tables import write_result, write_tables
+from pipeline.result import Result
+from pipeline.settings import Settings
+from pipeline.vision.series import trace_series
+
+
+def measure(folder: Path | str, settings: Settings | None = None, *, command: str = "") -> Result:
+    """Measure one specimen folder.
+
+    Parameters
+    ----------
+    folder : Path or str
+        Holds ``specimen.toml``, the force log and the photos.
+    settings : Settings, optional
+    command : str
+        The command that reproduces the result, kept in its provenance.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used.
+    """
+    settings = settings or Settings()
+    specimen = read_specimen(Path(folder), settings.intake)
+    traces = trace_series(specimen, settings.vision)
+    identification = identify(specimen, traces, settings.identify)
+    diagnosis, findings = diagnose(identification.test, identification, settings.diagnosis)
+    return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
+
+
+def write(result: Result, folder: Path, settings: Settings | None = None) -> None:
+    """Write ``result.json``, the tables and the report of one specimen into an existing folder."""
+    settings = settings or Settings()
+    write_result(result, folder)
+    write_tables(result, folder, settings.report)
+    write_report(result, folder, settings.report)
+    write_pdf(result, folder, settings.report)
