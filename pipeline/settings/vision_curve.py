@@ -80,6 +80,12 @@ class CurveSettings(BaseModel):
         gt=0,
         description="diameters; bound of the errors' correlation length, longer ones cannot be told from a bend",
     )
+    light_length_share: float = Field(
+        0.25,
+        gt=0,
+        description="of the seen length; correlation length of the light's error: it follows the cable's"
+        " direction, which turns once from end to end",
+    )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
     max_blur_radii: float = Field(
         0.4, gt=0, description="of the radius; with more blur the two edges run into each other and move inward"

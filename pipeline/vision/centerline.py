@@ -14,13 +14,13 @@ bearing with some play, and the curvature at the ends would follow that play. Th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_curve import CurveSettings
+from pipeline.vision.chord import ChordFrame, chord_frame
 from pipeline.vision.curvature import CurveFit
 from pipeline.vision.midline import Sections
 from pipeline.vision.path import fit_along, follow
@@ -28,9 +28,16 @@ from pipeline.vision.plane import PlaneMap
 from pipeline.vision.rough import RoughCable
 from rod.measurement import MeasuredShape
 
+_LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
+
 
 def measure_centerline(
-    rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, settings: VisionSettings
+    rough: RoughCable,
+    *,
+    plane: PlaneMap,
+    diameter_m: float | None,
+    settings: VisionSettings,
+    breaks_m: tuple[float, ...] = (),
 ) -> Centerline | Rejected:
     """Centerline of the cable in the chord frame, or why there is none.
 
@@ -42,73 +49,30 @@ def measure_centerline(
         Pixels to metres on the plane of the cable axis.
     diameter_m : m or None
         Of the cable, in the unit of the plane; a check on the measured width.
+    settings : VisionSettings
+    breaks_m : tuple of m
+        Arc lengths from the left axis at which a point load is assumed: the slope of the curvature may jump there.
+
+    Raises
+    ------
+    ValueError
+        If a break lies outside the cable.
     """
     options = settings.curve
     half_width = rough.half_width_px
     if diameter_m is not None:
         scale = float(np.median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)])))
         half_width = 0.5 * diameter_m * scale
-    found = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
-    if isinstance(found, Rejected):
-        return found
-    sections, _ = found
-    chord = chord_frame(plane, rough)
+    sections = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
+    if isinstance(sections, Rejected):
+        return sections
+    chord = chord_frame(rough, plane)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     refused = _refusal(rough, sections, width, diameter_m, options)
     if refused is not None:
         return refused
-    fit = _fit(sections, chord, width, options)
+    fit = _fit(sections, chord, width, breaks_m, options)
     return _assemble(rough, sections, chord, width, fit, diameter_m, options)
-
-
-@dataclass(frozen=True)
-class ChordFrame:
-    """Pixels of the photo to the chord frame in m, and back.
-
-    Attributes
-    ----------
-    plane : PlaneMap
-    origin : (2,) m
-        Left bearing axis on the plane.
-    rotation : (2, 2)
-        Rows: unit vectors of x and y on the plane.
-    chord, axis_std : m
-        Distance of the axes; standard deviation of each axis' coordinates.
-    mirrored : bool
-        True if y points up on the photo.
-    """
-
-    plane: PlaneMap
-    origin: Array
-    rotation: Array
-    chord: float
-    axis_std: float
-    mirrored: bool
-
-    def to_frame(self, uv: Array) -> Array:
-        """Chord frame ``(n, 2)`` in m of pixels ``(n, 2)``."""
-        return np.asarray((self.plane.to_plane(uv) - self.origin) @ self.rotation.T)
-
-    def to_pixels(self, xy: Array) -> Array:
-        """Pixels ``(n, 2)`` of points ``(n, 2)`` of the chord frame."""
-        return self.plane.to_pixels(xy @ self.rotation + self.origin)
-
-
-def chord_frame(plane: PlaneMap, rough: RoughCable) -> ChordFrame:
-    """Chord frame of the photo: y to the side on which the cable lies."""
-    axes = np.array([rough.left.center_px, rough.right.center_px])
-    left, right = plane.to_plane(axes)
-    chord = float(np.hypot(*(right - left)))
-    along = (right - left) / chord
-    across = np.array([-along[1], along[0]])  # downward on the photo for a path from left to right
-    first, last = rough.visible
-    bow = float(np.mean((plane.to_plane(rough.path_px[first : last + 1]) - left) @ across))
-    up = bow < 0.0
-    rotation = np.stack([along, -across if up else across])
-    axis_std = float(
-        np.hypot(rough.left.std_px, rough.right.std_px) / np.sqrt(2.0) / np.median(plane.local_scale(axes))
-    )
-    return ChordFrame(plane, left, rotation, chord, axis_std, bool((rotation[1, 1]) < 0.0))
 
 
 def _refusal(
@@ -116,8 +80,7 @@ def _refusal(
 ) -> Rejected | None:
     """What the figures forbid."""
     radius = 0.5 * float(np.median(sections.width))
-    middle = float(np.median(width))
-    scatter = 1.4826 * float(np.median(np.abs(width - middle))) / middle
+    middle, scatter = _width(width)
     ratio = sections.contrast / max(sections.noise, 1e-9)
     figure = {
         "contrast_to_noise": ratio,
@@ -160,24 +123,22 @@ def _refusal(
     return None
 
 
-def _fit(sections: Sections, chord: ChordFrame, width: Array, options: CurveSettings) -> CurveFit:
+def _fit(
+    sections: Sections, chord: ChordFrame, width: Array, breaks: tuple[float, ...], options: CurveSettings
+) -> CurveFit:
     """Curvature spline through the midline in the chord frame, ``s = 0`` near the left axis."""
     points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second))
-    metres = np.median(width / sections.width)
-    s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
-    ends = np.array([[0.0, 0.0], [chord.chord, 0.0]])
-    gap = np.hypot(*(points[0] - ends[0])), np.hypot(*(points[-1] - ends[1]))
-    s += gap[0]
-    # Sections without noise (drawn pictures) must not count as infinitely certain.
-    std = np.maximum(sections.std, 1e-3) * metres
+    before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
+    s = before + np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     return fit_along(
         points,
-        std,
+        np.maximum(sections.std, _LEAST_STD_PX) * width / sections.width,
         guide=points,
         s=s,
-        length=float(s[-1] + gap[1]),
+        length=float(s[-1] + after),
         diameter=float(np.median(width)),
         settings=options,
+        breaks=breaks,
     )
 
 
@@ -190,66 +151,43 @@ def _assemble(
     diameter: float | None,
     options: CurveSettings,
 ) -> Centerline:
-    ends = np.array([[0.0, 0.0], [chord.chord, 0.0]])
-    feet = fit.curve.foot(ends, np.array([0.0, fit.curve.frame.knots[-1]]))
-    misses = np.hypot(*(fit.curve.at(feet)[0] - ends).T)
+    """Record of a fitted curve, from foot to foot of the bearing axes."""
+    feet = fit.curve.foot(chord.axes, np.array([0.0, fit.curve.frame.knots[-1]]))
+    misses = np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T)
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
+    metres = float(np.median(width / sections.width))
+    light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
+    covariance = _with_light(fit, light_std, light_length)
+    length_std = _length_std(fit, s, covariance)
+    # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
+    covariance[0, 0] += chord.axis_std**2
+    covariance[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
     where, theta = fit.curve.at(s)
-    bases = fit.curve.bases(s)
-    covariance, systematic = _covariance(fit, sections, chord, width)
-    uv = chord.to_pixels(where)
-    normal, turn, bend = bases
+    normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
-    section_s = fit.s[used] - feet[0]
-    spacing = float(np.median(np.diff(fit.s)))
-    seen = (s >= fit.s[0] - spacing) & (s <= fit.s[-1] + spacing)
-    metres = width / sections.width
+    gap = float(np.median(np.diff(fit.s)))
     shape = MeasuredShape(
         s=s - feet[0],
         x=where[:, 0],
         y=where[:, 1],
         theta=theta,
         kappa=-fit.curve.curvature(s),
-        seen=seen,
+        seen=(s >= fit.s[0] - gap) & (s <= fit.s[-1] + gap),
         basis_normal=normal,
         basis_theta=turn,
         basis_kappa=-bend,
         covariance=covariance,
-        section_s=section_s,
+        section_s=fit.s[used] - feet[0],
         section_x=fit.points[used, 0],
         section_y=fit.points[used, 1],
-        section_std=fit.smooth.sigma * np.maximum(sections.std, 1e-3)[used] * metres[used],
+        section_std=fit.smooth.sigma * (fit.std / np.sqrt(np.maximum(fit.weight, 1e-9)))[used],
         correlation_length=fit.smooth.correlation_length,
-        systematic_std=systematic[0],
-        systematic_length=systematic[1],
+        systematic_std=light_std,
+        systematic_length=light_length,
     )
-    length = float(s[-1] - s[0])
-    middle = float(np.median(width))
-    sway = normal[-1] * 0.0
-    radius = 0.5 * middle
-    findings = tuple(rough.findings)
-    if misses.max() > options.axis_distance_radii * radius:
-        findings += (
-            Finding(
-                "photo/bearing", "warning", f"the centerline passes {1e3 * misses.max():.2f} mm beside a bearing axis"
-            ),
-        )
-    quality = {
-        **rough.quality,
-        "contrast_to_noise": sections.contrast / max(sections.noise, 1e-9),
-        "noise": sections.noise,
-        "blur_px": sections.blur,
-        "edge_asymmetry": sections.asymmetry,
-        "section_std_px": float(np.median(sections.std) * fit.smooth.sigma),
-        "noise_scale": fit.smooth.sigma,
-        "correlation_px": fit.smooth.correlation_length / float(np.median(metres)),
-        "systematic_px": sections.systematic_std,
-        "measured_share": sections.share,
-        "rejected_sections": float(np.mean(~used)),
-        "effective_parameters": fit.smooth.freedom,
-        "axis_distance_px": float(misses.max() / np.median(metres)),
-        "width_scatter": float(1.4826 * np.median(np.abs(width - middle)) / middle),
-    }
+    uv = chord.to_pixels(where)
+    middle, scatter = _width(width)
+    quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
     if diameter is not None:
         quality["width_over_diameter"] = middle / diameter
     return Centerline(
@@ -261,36 +199,64 @@ def _assemble(
         position_std=_std(normal, covariance),
         chord_m=chord.chord,
         chord_std_m=float(np.sqrt(2.0)) * chord.axis_std,
-        traced_length_m=length,
-        traced_length_std_m=float(np.hypot(np.sqrt(2.0) * chord.axis_std, np.sqrt(sway @ covariance @ sway))),
+        traced_length_m=float(s[-1] - s[0]),
+        traced_length_std_m=float(np.hypot(np.sqrt(2.0) * chord.axis_std, length_std)),
         left_px=rough.left.center_px,
         right_px=rough.right.center_px,
         axis_std_px=float(np.hypot(rough.left.std_px, rough.right.std_px) / np.sqrt(2.0)),
         width_m=middle,
-        width_std_m=quality["width_scatter"] * middle,
+        width_std_m=scatter * middle,
         mirrored=chord.mirrored,
         quality=quality,
-        findings=findings,
+        findings=rough.findings + _beside(float(misses.max()), middle, options),
     )
+
+
+def _width(width: Array) -> tuple[float, float]:
+    """Median width, and its robust relative scatter along s."""
+    middle = float(np.median(width))
+    return middle, 1.4826 * float(np.median(np.abs(width - middle))) / middle
+
+
+def _beside(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
+    if miss <= 0.5 * options.axis_distance_radii * width:
+        return ()
+    message = f"the centerline passes {miss / width:.1f} cable diameters beside a bearing axis: is the axis right?"
+    return (Finding("photo/bearing", "warning", message),)
+
+
+def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.bool_]) -> dict[str, float]:
+    return {
+        "contrast_to_noise": sections.contrast / max(sections.noise, 1e-9),
+        "noise": sections.noise,
+        "blur_px": sections.blur,
+        "edge_asymmetry": sections.asymmetry,
+        "section_std_px": float(np.median(fit.std)) / metres * fit.smooth.sigma,
+        "noise_scale": fit.smooth.sigma,
+        "correlation_px": fit.smooth.correlation_length / metres,
+        "systematic_px": sections.systematic_std,
+        "measured_share": sections.share,
+        "rejected_sections": float(np.mean(~used)),
+        "effective_parameters": fit.smooth.freedom,
+        "width_scatter": _width(sections.width)[1],
+    }
 
 
 def _std(basis: Array, covariance: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
 
 
-def _covariance(
-    fit: CurveFit, sections: Sections, chord: ChordFrame, width: Array
-) -> tuple[Array, tuple[float, float]]:
-    """Covariance of q with the light's slow error and the axes' errors; std and length of the light's, m."""
-    std = sections.systematic_std * float(np.median(width / sections.width))
-    length = 0.25 * float(fit.s[-1] - fit.s[0])
-    used = fit.weight > 0.0
-    s = fit.s[used]
-    # A light's error follows the direction of the cable, a smooth function of s: Gaussian correlation.
+def _with_light(fit: CurveFit, std: float, length: float) -> Array:
+    """Covariance of q with the light's slow error carried through the fit.
+
+    The error follows the direction of the cable against the light, a smooth function of s: Gaussian correlation.
+    """
+    s = fit.s[fit.weight > 0.0]
     light = std**2 * np.exp(-0.5 * ((s[:, None] - s[None, :]) / length) ** 2)
-    gain = fit.smooth.gain
-    covariance = fit.smooth.covariance + gain @ light @ gain.T
-    # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
-    covariance[0, 0] += chord.axis_std**2
-    covariance[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
-    return covariance, (std, length)
+    return np.asarray(fit.smooth.covariance + fit.smooth.gain @ light @ fit.smooth.gain.T)
+
+
+def _length_std(fit: CurveFit, s: Array, covariance: Array) -> float:
+    """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
+    row = np.trapezoid(fit.curve.curvature(s)[:, None] * fit.curve.bases(s)[0], s, axis=0)
+    return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

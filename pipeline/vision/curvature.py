@@ -204,6 +204,8 @@ class CurveFit:
     smooth : Smooth
         Covariance of q and gain on the points' normal displacements.
     points : (n, 2)
+    std : (n,)
+        As given; the errors are ``smooth.sigma`` times that.
     s : (n,)
         Feet of the points.
     residual : (n,)
@@ -215,6 +217,7 @@ class CurveFit:
     curve: PlaneCurve
     smooth: Smooth
     points: Array
+    std: Array
     s: Array
     residual: Array
     weight: Array
@@ -277,7 +280,7 @@ def fit_curve(
     smooth = _linear(curve, s, _residual(curve, points, s), std, weight, order).smooth(length)
     curve = curve.moved(smooth.estimate - np.r_[0.0, 0.0, curve.coefficients])
     s = curve.foot(points, s)
-    return CurveFit(curve, smooth, points, s, _residual(curve, points, s), weight)
+    return CurveFit(curve, smooth, points, std, s, _residual(curve, points, s), weight)
 
 
 def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int) -> PlaneCurve:

@@ -13,7 +13,15 @@ from pipeline.vision.rough import Bearing, RoughCable
 
 
 def fit_along(
-    points: Array, std: Array, *, guide: Array, s: Array, length: float, diameter: float, settings: CurveSettings
+    points: Array,
+    std: Array,
+    *,
+    guide: Array,
+    s: Array,
+    length: float,
+    diameter: float,
+    settings: CurveSettings,
+    breaks: tuple[float, ...] = (),
 ) -> CurveFit:
     """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
 
@@ -27,12 +35,14 @@ def fit_along(
         About the arc lengths of the points from the left axis.
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
+    breaks : tuple of float
+        Arc lengths at which the slope of the curvature may jump.
     """
     most = max(settings.min_intervals, round(length / (settings.knot_spacing_diameters * diameter)))
     intervals = min(most, max(settings.first_intervals, round(length / (settings.path_knot_diameters * diameter))))
 
     def fit(correlation_length: float | None, iterations: int) -> CurveFit:
-        frame = make_frame(0.0, length, intervals=intervals, order=settings.penalty_order)
+        frame = make_frame(0.0, length, intervals=intervals, order=settings.penalty_order, breaks=breaks)
         return fit_curve(
             points,
             std,
@@ -57,10 +67,8 @@ def _path_intervals(length: float, diameter: float, settings: CurveSettings) -> 
     return int(np.clip(wanted, settings.min_intervals, settings.most_path_intervals))
 
 
-def follow(
-    rough: RoughCable, *, half_width: float, known: bool, settings: CurveSettings
-) -> tuple[Sections, PlaneCurve] | Rejected:
-    """Sections of the cable and the path in px they were measured on.
+def follow(rough: RoughCable, *, half_width: float, known: bool, settings: CurveSettings) -> Sections | Rejected:
+    """Sections of the cable, laid on a path in px that follows its midline.
 
     Parameters
     ----------
@@ -107,7 +115,7 @@ def follow(
         blur=rough.blur_px,
         settings=settings,
     )
-    return _lost(rough, 0.0) if sections is None else (sections, path)
+    return _lost(rough, 0.0) if sections is None else sections
 
 
 def _cover(bearing: Bearing, blur: float) -> Cover:
