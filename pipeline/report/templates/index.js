@@ -1,22 +1,38 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent), decimal = data.decimal;
   const body = document.querySelector("#specimens tbody");
+  // Words are searched, numbers are not: who types 42 wants cable-42, not every stiffness with a 42 in it.
+  const words = (node) => [...node.cells].filter((cell) => !cell.classList.contains("num")).map((cell) => cell.textContent).join(" ").toLowerCase();
   const rows = [...body.rows].map((node, index) => ({
-    node, index, text: node.textContent.toLowerCase(), box: node.querySelector("input"), shown: true,
+    node, index, text: words(node), box: node.querySelector("input"), shown: true,
     status: node.dataset.status, verdict: node.dataset.verdict, type: node.dataset.type,
   }));
   const find = (id) => document.getElementById(id);
   const search = find("search"), filters = ["status", "verdict", "type"].map(find);
-  const filter = () => {
-    const wanted = search.value.trim().toLowerCase().split(/\s+/);
+  // Rows are laid out a hundred at a time as the reader scrolls: two thousand at once would take seconds.
+  const PAGE = 100;
+  let order = rows, limit = PAGE;
+  const show = () => {
     let count = 0;
-    for (const row of rows) {
-      row.shown = wanted.every((word) => row.text.includes(word)) && filters.every((f) => !f.value || row[f.id] === f.value);
-      row.node.hidden = !row.shown;
+    for (const row of order) {
+      row.node.hidden = !row.shown || count >= limit;
       count += row.shown;
     }
     find("shown").textContent = data.shown.replace("{shown}", count).replace("{total}", rows.length);
   };
+  const filter = () => {
+    const wanted = search.value.trim().toLowerCase().split(/\s+/);
+    for (const row of rows) {
+      row.shown = wanted.every((word) => row.text.includes(word)) && filters.every((f) => !f.value || row[f.id] === f.value);
+    }
+    limit = PAGE;
+    show();
+  };
+  const frame = find("specimens");
+  frame.addEventListener("scroll", () => {
+    if (frame.scrollTop + frame.clientHeight > frame.scrollHeight - 600 && limit < rows.length) { limit += PAGE; show(); }
+  }, { passive: true });
+  addEventListener("beforeprint", () => { limit = rows.length; show(); });
   search.addEventListener("input", filter);
   filters.forEach((f) => f.addEventListener("change", filter));
   // Sorting: empty cells stay last in both directions; ties keep the order of the batch.
@@ -28,13 +44,17 @@
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
       const sign = down ? -1 : 1, number = button.dataset.kind === "number";
       const keys = rows.map((row) => { const cell = row.node.cells[column]; return number ? cell.dataset.v : cell.textContent; });
-      const order = rows.map((row, i) => ({ row, key: keys[i] }));
-      order.sort((a, b) => {
+      const sorted = rows.map((row, i) => ({ row, key: keys[i] }));
+      sorted.sort((a, b) => {
         const none = (a.key === undefined || a.key === "") - (b.key === undefined || b.key === "");
         if (none) return none;
         return sign * (number ? a.key - b.key : natural.compare(a.key, b.key)) || a.row.index - b.row.index;
       });
-      body.append(...order.map((entry) => entry.row.node));
+      order = sorted.map((entry) => entry.row);
+      for (const row of order) row.node.hidden = true;
+      body.append(...order.map((row) => row.node));
+      limit = PAGE; frame.scrollTop = 0;
+      show();
     });
   }
   // Overlay: colours of Okabe and Ito, then the same with dashes.

@@ -5,21 +5,23 @@ document.documentElement.classList.add("js");
   const box = document.createElement("div");
   box.id = "tip"; box.role = "tooltip"; box.hidden = true;
   document.body.append(box);
+  let shownFor = null;
   const show = (term) => {
+    shownFor = term;
     box.textContent = term.dataset.tip; box.hidden = false;
     term.setAttribute("aria-describedby", "tip");
     const at = term.getBoundingClientRect(), size = box.getBoundingClientRect(), edge = 8;
     box.style.left = Math.max(edge, Math.min(at.left, document.documentElement.clientWidth - size.width - edge)) + "px";
     box.style.top = (at.bottom + size.height + edge < innerHeight ? at.bottom + 4 : Math.max(edge, at.top - size.height - 4)) + "px";
   };
-  const hide = () => { box.hidden = true; };
+  const hide = () => { box.hidden = true; shownFor = null; };
   for (const term of document.querySelectorAll("[data-tip]")) {
     term.addEventListener("pointerenter", () => show(term));
     term.addEventListener("focus", () => show(term));
     term.addEventListener("pointerleave", hide);
     term.addEventListener("blur", hide);
   }
-  addEventListener("scroll", hide, { passive: true });
+  addEventListener("scroll", () => { if (shownFor) show(shownFor); }, { passive: true });
   addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
 })();
 // Number with so many significant digits, decimal sign of the page, true minus.

@@ -1,0 +1,308 @@
+"""Report and index in a real Chromium: what a reader sees, presses and types.
+
+No network, no errors on the console, no sideways scrolling. Chromium and its driver are Debian's packages ``chromium``
+and ``chromium-driver``; without them these tests fail and say so.
+"""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select, WebDriverWait
+
+from pipeline.report.document import write_report
+from pipeline.report.index import write_index
+from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_diagnosis import diagnosis_of
+from tests.pipeline.report.virtual_result import measured_result
+
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--force-prefers-reduced-motion",  # else a click may meet a page that still scrolls
+)
+PHONE, DESK = 380, 1280
+ROWS = 2000
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
+    missing = [name for name, path in programs.items() if path is None]
+    assert not missing, f"{' and '.join(missing)} missing: apt-get install chromium chromium-driver"
+    options = Options()
+    options.binary_location = programs["chromium"]
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
+        options.add_argument(flag)
+    driver = webdriver.Chrome(options=options, service=Service(programs["chromedriver"]))
+    yield driver
+    driver.quit()
+
+
+def batch(result, count):
+    """Repeat specimens whose stiffness rises with their number; every tenth failed."""
+    whole = result.inverse.curve
+    for number in range(count):
+        curve = whole.model_copy(update={"tangent_Nm2": [(1 + number / count) * v for v in whole.tangent_Nm2]})
+        specimen = result.specimen.model_copy(
+            update={"id": f"cable-{number}", "description": {"type": f"HV {number % 3}"}}
+        )
+        failed = {"status": "failed", "inverse": None, "balance": None, "agreement": None, "diagnosis": None}
+        measured = {"inverse": result.inverse.model_copy(update={"curve": curve}), "diagnosis": None}
+        changes = failed if number % 10 == 9 else measured
+        yield result.model_copy(update={"specimen": specimen, "photos": result.photos[3:4], **changes})
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory):
+    """Address of a batch: reports in both languages, a small index and one of 2,000 rows."""
+    folder = tmp_path_factory.mktemp("site")
+    result = measured_result()
+    result = result.model_copy(update={"diagnosis": diagnosis_of("class", result.photos)})
+    write_report(result, folder / "cable-0")
+    write_report(result, folder / "de", ReportSettings(language="de"))
+    write_index(batch(result, 20), folder)
+    write_index(batch(result, ROWS), folder / "large")
+    return folder.as_uri()
+
+
+@pytest.fixture
+def show(browser):
+    """Open a page at a width; afterwards nothing may have been fetched from a network and nothing complained."""
+    opened = []
+
+    def go(address, width=DESK):
+        for log in ("browser", "performance"):
+            browser.get_log(log)
+        metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.get(address)
+        opened.append(address)
+        return browser
+
+    yield go
+    assert opened
+    assert browser.get_log("browser") == []
+    sent = [
+        entry["message"] for entry in browser.get_log("performance") if "Network.requestWillBeSent" in entry["message"]
+    ]
+    assert sent
+    assert not [message for message in sent if '"url":"http' in message or '"url":"ws' in message]
+
+
+def one(driver, selector):
+    return driver.find_element(By.CSS_SELECTOR, selector)
+
+
+def shown(driver, selector):
+    return [element for element in driver.find_elements(By.CSS_SELECTOR, selector) if element.is_displayed()]
+
+
+@pytest.mark.parametrize("page", ["cable-0/report.html", "de/report.html", "index.html"])
+@pytest.mark.parametrize("width", [PHONE, 768, DESK])
+def test_no_sideways_scrolling(show, site, page, width):
+    driver = show(f"{site}/{page}", width)
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+
+
+def test_answer_fills_the_first_screen(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    for selector in ("h1", "#characteristic", ".side .card:last-child"):
+        box = one(driver, selector).rect
+        assert box["y"] + box["height"] <= 900, selector
+
+
+def test_photos_are_stepped_through_by_button_list_and_key(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    head = "article.photo:not([hidden]) h3"
+    assert len(shown(driver, "article.photo")) == 1
+    one(driver, "#photo-next").click()
+    assert "step 1" in one(driver, head).text
+    Select(one(driver, "#photo-choose")).select_by_index(5)
+    assert "step 5" in one(driver, head).text
+    one(driver, "#photo-next").send_keys(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+    assert "step 0" in one(driver, head).text
+    one(driver, "#photo-previous").click()
+    assert "step 6" in one(driver, head).text
+
+
+def test_centerline_is_toggled(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    line = "article.photo:not([hidden]) .picture svg"
+    assert shown(driver, line)
+    one(driver, "#photo-toggle").click()
+    assert not shown(driver, line)
+    one(driver, "#photo-next").send_keys("c")
+    assert shown(driver, line)
+
+
+def test_centerline_covers_the_whole_picture(show, site):
+    driver = show(f"{site}/cable-0/report.html", PHONE)
+    picture, line = (one(driver, f"article.photo:not([hidden]) .picture {tag}").rect for tag in ("img", "svg"))
+    assert line == pytest.approx(picture, abs=1)
+
+
+def test_pointing_at_the_characteristic_tells_value_band_and_photos(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    ActionChains(driver).move_to_element(one(driver, "#characteristic")).perform()
+    text = one(driver, "#readout").text
+    assert "κ = " in text
+    assert "simulation fitted: " in text
+    assert " ± " in text
+    assert "(band " in text
+    assert "photos: " in text
+    assert len(shown(driver, "#point circle")) == 3
+
+
+def test_characteristic_is_read_by_keyboard_alone(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    stage = one(driver, "#characteristic-stage")
+    stage.send_keys(Keys.HOME)
+    assert "κ = 2 1/m. simulation fitted: 20.00 ± 0.13 mN m² (band 19.74 … 20.26)" in one(driver, "#readout").text
+    stage.send_keys(Keys.ARROW_RIGHT)
+    assert "κ = 2.13 1/m" in one(driver, "#readout").text
+    stage.send_keys(Keys.ESCAPE)
+    assert "arrow keys" in one(driver, "#readout").text
+
+
+def test_equivalent_stiffness_of_a_chosen_range(show, site):
+    driver = show(f"{site}/de/report.html")
+    assert "mN m²" in one(driver, "#range-result").text
+    before = one(driver, "#range-result").text
+    field = one(driver, "#range-from")
+    field.clear()
+    field.send_keys("5")
+    after = one(driver, "#range-result").text
+    assert after != before
+    assert "κ 5 … 8,7 1/m" in after
+
+
+def test_terms_explain_themselves_to_pointer_and_keyboard(show, site):
+    driver = show(f"{site}/cable-0/report.html", PHONE)
+    driver.execute_script("document.querySelector('.k0 .term').focus()")
+    tip = one(driver, "#tip")
+    assert tip.is_displayed()
+    assert "pre-curvature" in tip.text
+    assert tip.rect["x"] >= 0
+    assert tip.rect["x"] + tip.rect["width"] <= PHONE
+
+
+def test_every_control_is_reached_by_tab(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    reached = set()
+    for _ in range(40):
+        ActionChains(driver).send_keys(Keys.TAB).perform()
+        reached.add(driver.execute_script("return document.activeElement.id || document.activeElement.className"))
+    assert {"skip", "characteristic-stage", "photo-previous", "photo-choose", "photo-next", "photo-toggle"} <= reached
+
+
+def test_dark_mode_changes_page_and_figures(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    colours = "return ['body', '#characteristic text'].map(q => getComputedStyle(document.querySelector(q))"
+    colours += "[q === 'body' ? 'backgroundColor' : 'fill'])"
+    light = driver.execute_script(colours)
+    dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
+    try:
+        assert all(a != b for a, b in zip(light, driver.execute_script(colours), strict=True))
+    finally:
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_paper_shows_all_photos_and_no_controls(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        assert len(shown(driver, "article.photo")) == 7
+        assert not shown(driver, "nav, .stepper, #readout")
+    finally:
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+def visible_names(driver):
+    return driver.execute_script(
+        "return [...document.querySelectorAll('#specimens tbody tr:not([hidden])')].map(r => r.cells[1].textContent)"
+    )
+
+
+def test_index_sorts_by_number_and_by_name(show, site):
+    driver = show(f"{site}/index.html")
+    heads = {
+        button.text.split("\n")[0]: button for button in driver.find_elements(By.CSS_SELECTOR, "#specimens th button")
+    }
+    stiffness = next(button for text, button in heads.items() if text.startswith("f_EI, low"))
+    stiffness.click()
+    assert visible_names(driver)[:3] == ["cable-0", "cable-1", "cable-2"]
+    assert stiffness.find_element(By.XPATH, "..").get_attribute("aria-sort") == "ascending"
+    stiffness.click()
+    assert visible_names(driver)[:2] == ["cable-18", "cable-17"]
+    assert visible_names(driver)[-2:] == ["cable-9", "cable-19"]  # failed ones have no value and stay last
+    heads["specimen"].click()
+    assert visible_names(driver)[:3] == ["cable-0", "cable-1", "cable-2"]
+    assert visible_names(driver)[-1] == "cable-19"
+
+
+def test_index_searches_and_filters(show, site):
+    driver = show(f"{site}/index.html")
+    one(driver, "#search").send_keys("cable-1")
+    assert visible_names(driver) == ["cable-1", *(f"cable-{i}" for i in range(10, 20))]
+    Select(one(driver, "#status")).select_by_value("failed")
+    assert visible_names(driver) == ["cable-19"]
+    assert one(driver, "#shown").text == "1 of 20 shown"
+    one(driver, "#search").clear()
+    one(driver, "#search").send_keys(" ")
+    Select(one(driver, "#status")).select_by_value("")
+    Select(one(driver, "#type")).select_by_value("HV 1")
+    assert visible_names(driver) == [f"cable-{i}" for i in range(1, 20, 3)]
+
+
+def test_index_lays_selected_characteristics_over_each_other(show, site):
+    driver = show(f"{site}/index.html")
+    boxes = driver.find_elements(By.CSS_SELECTOR, "#specimens tbody input")
+    assert len(boxes) == 18  # failed specimens have nothing to compare
+    for box in (boxes[0], boxes[4]):
+        box.click()
+    assert len(shown(driver, "#overlay-plot path.curve")) == 2
+    assert one(driver, "#overlay .key").text.split() == ["cable-0", "cable-4"]
+    one(driver, "#clear").click()
+    assert not shown(driver, "#overlay-plot path.curve")
+    one(driver, "#select-all").click()
+    assert len(shown(driver, "#overlay-plot path.curve")) == 18
+
+
+def test_index_leads_to_the_report(show, site):
+    driver = show(f"{site}/index.html")
+    driver.find_element(By.LINK_TEXT, "cable-0").click()
+    assert "Bending stiffness of cable-07" in driver.title
+
+
+def test_two_thousand_rows_are_laid_out_a_hundred_at_a_time(show, site):
+    driver = show(f"{site}/large/index.html")
+    assert len(visible_names(driver)) == 100
+    one(driver, "#search").send_keys("99")
+    assert visible_names(driver) == [f"cable-{i}" for i in range(ROWS) if "99" in str(i)]
+    heads = driver.find_elements(By.CSS_SELECTOR, "#specimens th button")
+    heads[0].click()
+    heads[0].click()
+    assert visible_names(driver)[0] == "cable-1999"
+
+
+def test_rows_follow_as_the_reader_scrolls(show, site):
+    driver = show(f"{site}/large/index.html")
+    driver.execute_script("const f = document.getElementById('specimens'); f.scrollTop = f.scrollHeight")
+    WebDriverWait(driver, 5).until(lambda d: len(visible_names(d)) == 200)
+    assert one(driver, "#shown").text == f"{ROWS} of {ROWS} shown"
