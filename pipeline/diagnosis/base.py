@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.camera import scaled
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
 from rod.measurement import MeasuredTest
@@ -91,7 +91,17 @@ class Base:
             self.pre_curvature(vector),
             elements=self.elements,
         )
-        return Model(bending).observed(scaled(float(vector[-2])))
+        return Model(bending).observed(self.observer(vector))
+
+    def observer(self, vector: Array) -> Observer:
+        """First observer of every model: the camera with its scale."""
+        return scaled(float(vector[len(self.names) - 2]))
+
+    def ordinate_shares(self, knots: Array) -> Array:
+        """Value (k, p) of the cardinal splines of the base's control points at ``knots`` (k,)."""
+        return np.column_stack(
+            [Characteristic.from_ordinates(self.knots, unit).f(knots) for unit in np.eye(len(self.knots))]
+        )
 
     def admissible(self, vector: Array) -> bool:
         """Whether the stiffness is positive at every control point and nothing is absurd."""

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.base import Base
 from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observation import Observation, residual
-from pipeline.diagnosis.prediction import Facts, Model, Run, run
+from pipeline.diagnosis.prediction import Facts, Model, Prediction, end_for_end
+from pipeline.diagnosis.simulation import Run, base_derivatives, moved, observed, run
+from rod.sensitivity import Derivatives
 
 Array = NDArray[np.float64]
 
@@ -31,11 +33,12 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """Base model and the terms added to it."""
+    """Base model and the terms added to it; ``turned``: with the cable turned end for end."""
 
     base: Base
     facts: Facts
     terms: tuple[Term, ...] = ()
+    turned: bool = False
 
     @property
     def owners(self) -> tuple[int, ...]:
@@ -72,17 +75,21 @@ class Extension:
             parts.append(np.r_[amount, [getattr(term.variant, name) for name in term.variant.tuned]])
         return np.concatenate(parts)
 
+    def base_model(self, vector: Array) -> Model:
+        """The base model at a vector, without the terms."""
+        return self.base.model(vector[: len(self.base.names)])
+
     def model(self, vector: Array, *, of: Model | None = None) -> Model:
         """The model at a vector; ``of`` is the base model there, where it is known already."""
-        model = self.base.model(vector) if of is None else of
+        model = self.base_model(vector) if of is None else of
         for at, term in zip(self.owners, self.terms, strict=True):
             tuned = {name: float(vector[at + 1 + j]) for j, name in enumerate(term.variant.tuned)}
             model = term.cause.apply(model, float(vector[at]), replace(term.variant, **tuned), self.facts)
-        return model
+        return end_for_end(model) if self.turned else model
 
     def admissible(self, vector: Array) -> bool:
         """Whether the vector describes a possible cable; signs of amounts are judged after the fit, not here."""
-        if not self.base.admissible(vector):
+        if not self.base.admissible(vector[: len(self.base.names)]):
             return False
         for at, term in zip(self.owners, self.terms, strict=True):
             if term.cause.sign * vector[at] < 0.0:
@@ -146,35 +153,80 @@ def prior_rows(vector: Array, std: Array) -> Array:
     return -vector[known] / std[known]
 
 
-def whole_residual(observation: Observation, run_: Run, vector: Array, std: Array) -> Array | None:
+def whole_residual(observation: Observation, prediction: Prediction | None, vector: Array, std: Array) -> Array | None:
     """Residual with prior rows; None where the model has no equilibrium."""
-    if run_.prediction is None:
+    if prediction is None:
         return None
-    return np.r_[residual(observation, run_.prediction), prior_rows(vector, std)]
+    return np.r_[residual(observation, prediction), prior_rows(vector, std)]
 
 
-def sensitivities(observation: Observation, extension: Extension, vector: Array, here: Run) -> Array:
-    """Jacobian (N, p) of the model by difference quotients with warm starts, prior rows included.
+def sensitivities(observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run) -> Array:
+    """Jacobian (N, p) of the model, prior rows included.
 
-    A quotient that runs into a model without equilibrium is taken to the other side.
+    Control points, K0 and length by the implicit function theorem, scale by the observers alone, amounts and forms of
+    causes by difference quotients with warm starts; a quotient that runs into a model without equilibrium is taken to
+    the other side.
     """
     std = extension.prior_std
-    at_here = whole_residual(observation, here, vector, std)
-    assert at_here is not None
-    base_model = extension.base.model(vector)
-    columns = []
-    for j, step in enumerate(extension.steps):
+    at_here = whole_residual(observation, here.prediction, vector, std)
+    assert at_here is not None and here.bare is not None
+    columns = _base_columns(observation, extension, vector, here, at_here)
+    first = len(columns)
+    for j, step in enumerate(extension.steps[first:], start=first):
         column = np.zeros_like(at_here)
         for signed in (step, -step):
-            moved = vector.copy()
-            moved[j] += signed
-            model = extension.model(moved, of=base_model if j >= len(extension.base.names) else None)
-            there = whole_residual(observation, run(model, extension.facts, near=here), moved, std)
-            if there is not None and extension.admissible(moved):
-                column = (at_here - there) / signed
+            trial = vector.copy()
+            trial[j] += signed
+            if not extension.admissible(trial):
+                continue
+            there = run(extension.model(trial, of=base_model), extension.facts, near=here)
+            value = whole_residual(observation, there.prediction, trial, std)
+            if value is not None:
+                column = (at_here - value) / signed
                 break
         columns.append(column)
     return np.column_stack(columns)
+
+
+def _base_columns(
+    observation: Observation, extension: Extension, vector: Array, here: Run, at_here: Array
+) -> list[Array]:
+    """Columns of the base parameters, in their order."""
+    base, facts, model, bare = extension.base, extension.facts, here.model, here.bare
+    assert bare is not None
+    names = ("ordinates", *(() if base.straight else ("pre_curvature",)), "length")
+    by = base_derivatives(here, facts, names)
+    law = model.bending.characteristic
+    # where a cause has put further control points into the law, a base ordinate moves them along the base spline
+    share = base.stiffness * base.ordinate_shares(law.knots)
+    count = share.shape[0]
+    change = np.zeros((count + (0 if base.straight else 1) + 1, len(base.names) - 1))
+    change[:count, : share.shape[1]] = share
+    if (bend := base.pre_curvature_index) is not None:
+        change[count, bend] = 1.0
+    change[-1, -1] = -model.bending.length / (1.0 + vector[len(base.names) - 1])
+    by = tuple(_combined(d, change) for d in by)
+    columns = []
+    std, steps = extension.prior_std, extension.steps
+    for j in range(len(base.names)):
+        trial = vector.copy()
+        trial[j] += steps[j]
+        if base.names[j] == "scale":
+            shown = observed(bare, replace(model, observers=(base.observer(trial), *model.observers[1:])), facts)
+        else:
+            shown = observed(moved(bare, by, j if base.names[j] != "length" else -1, float(steps[j])), model, facts)
+        value = whole_residual(observation, shown, trial, std)
+        assert value is not None
+        columns.append((at_here - value) / steps[j])
+    return columns
+
+
+def _combined(d: Derivatives, change: Array) -> Derivatives:
+    """Derivatives with respect to combinations (columns of ``change``) of the parameters."""
+    return Derivatives(
+        tuple(str(i) for i in range(change.shape[1])),
+        *(getattr(d, name) @ change for name in ("s", "x", "y", "theta", "kappa", "moment", "force", "chord")),
+    )
 
 
 def fit(
@@ -185,6 +237,7 @@ def fit(
     iterations: int,
     tolerance: float,
     near: Run | None = None,
+    cutoff: float = 1e-7,
 ) -> Fit:
     """Gauss-Newton with shortened steps from ``start``.
 
@@ -199,6 +252,8 @@ def fit(
         Fall of chi-square at which the fit is done.
     near : Run or None
         Run of a similar model, for warm starts.
+    cutoff : float
+        Combinations of parameters that show less than this share of the clearest one stay where they are.
 
     Returns
     -------
@@ -207,45 +262,47 @@ def fit(
     """
     std = extension.prior_std
     vector = np.asarray(start, dtype=float)
-    here = run(extension.model(vector), extension.facts, near=near)
-    value = whole_residual(observation, here, vector, std)
+    base_model = extension.base_model(vector)
+    here = run(extension.model(vector, of=base_model), extension.facts, near=near)
+    value = whole_residual(observation, here.prediction, vector, std)
     if value is None:
         empty = np.zeros((0, extension.size))
         return Fit(extension, vector, here, np.zeros(0), empty, False, here.advice)
-    jacobian = sensitivities(observation, extension, vector, here)
+    jacobian = sensitivities(observation, extension, vector, base_model, here)
     converged = False
     for _ in range(iterations):
-        step, expected = _step(jacobian, value)
+        step, expected = _step(jacobian, value, cutoff)
         if expected < tolerance:
             converged = True
             break
         accepted = None
         for _ in range(8):
             trial = _inside(extension, vector, vector + step)
-            there = run(extension.model(trial), extension.facts, near=here)
-            found = whole_residual(observation, there, trial, std)
+            trial_base = extension.base_model(trial)
+            there = run(extension.model(trial, of=trial_base), extension.facts, near=here)
+            found = whole_residual(observation, there.prediction, trial, std)
             if found is not None and found @ found < value @ value:
-                accepted = (trial, there, found)
+                accepted = (trial, there, found, trial_base)
                 break
             step = 0.4 * step
         if accepted is None:
             converged = expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
         fall = float(value @ value - accepted[2] @ accepted[2])
-        vector, here, value = accepted
-        jacobian = sensitivities(observation, extension, vector, here)
+        vector, here, value, base_model = accepted
+        jacobian = sensitivities(observation, extension, vector, base_model, here)
         if fall < tolerance:
             converged = True
             break
     return Fit(extension, vector, here, value, jacobian, converged, "" if converged else "the fit did not settle")
 
 
-def _step(jacobian: Array, value: Array) -> tuple[Array, float]:
+def _step(jacobian: Array, value: Array, cutoff: float) -> tuple[Array, float]:
     """Gauss-Newton step and the fall of chi-square the linear model expects of it."""
     size = np.linalg.norm(jacobian, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     left, weight, right = np.linalg.svd(jacobian / size, full_matrices=False)
-    kept = weight > 1e-7 * weight[0]
+    kept = weight > cutoff * weight[0]
     along = left.T[kept] @ value
     step = right.T[:, kept] @ (along / weight[kept])
     return step / size, float(along @ along)

@@ -58,7 +58,7 @@ class PhotoData:
     step : int
         Index of the step.
     sections : Sections
-    chord : m
+    chord, chord_std : m
     basis : (k, q)
         Smooth functions of the shape misfit.
     whiten : (1 + q, 1 + k)
@@ -68,6 +68,7 @@ class PhotoData:
     step: int
     sections: Sections
     chord: float
+    chord_std: float
     basis: Array
     whiten: Array
 
@@ -145,14 +146,14 @@ def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noi
     sections = block_means(step.shape, blocks=settings.section_blocks)
     functions = min(settings.shape_functions, len(sections.s) // 2)
     basis = smooth_basis(sections.s, float(step.shape.s[-1]), functions=functions)
-    return PhotoData(
-        index, sections, step.chord, basis, _whitening(step.chord, step.chord_std, sections, basis, settings, noise)
-    )
+    stated = step.chord_std if step.chord_std is not None else settings.chord_std * step.chord
+    whiten = _whitening(step.chord, stated, sections, basis, settings, noise)
+    return PhotoData(index, sections, step.chord, float(np.hypot(stated, settings.displacement_std)), basis, whiten)
 
 
 def _whitening(
     chord: float,
-    chord_std: float | None,
+    chord_std: float,
     sections: Sections,
     basis: Array,
     settings: DiagnosisSettings,
@@ -163,7 +164,7 @@ def _whitening(
     With joint covariance C of (chord, sections) and design B = diag(1, basis): information B^T C^-1 B = R R^T, and
     ``R^-1 B^T C^-1`` takes residuals to components of unit variance.
     """
-    axis = (chord_std if chord_std is not None else settings.chord_std * chord) / np.sqrt(2.0)
+    axis = chord_std / np.sqrt(2.0)
     # columns: left axis along x, left and right axis across; right axis along x moves the chord alone
     normal_x, normal_y = -np.sin(sections.theta), np.cos(sections.theta)
     share = sections.x / chord

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.bending_test import BendingTest, simulate
-from rod.equilibrium import Branch, Equilibrium
+from rod.bending_test import BendingTest
 from rod.measurement import MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
@@ -171,71 +170,9 @@ class Model:
         return replace(self, observers=(*self.observers, observer))
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A model that was run: equilibria by step, and what would be measured; or why there is none.
-
-    Attributes
-    ----------
-    model : Model
-    steps : tuple of Equilibrium
-    prediction : Prediction or None
-        None if a step has no equilibrium.
-    advice : str
-        Of the first step that failed; empty if none.
-    """
-
-    model: Model
-    steps: tuple[Equilibrium, ...]
-    prediction: Prediction | None
-    advice: str = ""
-
-
-def run(model: Model, facts: Facts, *, near: Run | None = None) -> Run:
-    """Simulate all steps and observe them.
-
-    The mounted cable lies as it was made; every other step is bowed to the side the photos show (``up``), also where a
-    fit tries a pre-curvature of the other sign.
-
-    Parameters
-    ----------
-    model : Model
-    facts : Facts
-    near : Run or None
-        A run of a similar model: warm start, and no new simulation at all where only the observers differ.
-    """
-    if near is not None and near.model.bending is model.bending and near.model.shift is model.shift:
-        steps = near.steps
-    else:
-        steps = _simulated(model, facts, near)
-    failed = next((step for step in steps if not step.good), None)
-    if failed is not None:
-        return Run(model, steps, None, failed.outcome.advice)
-    force = np.array([step.force for step in steps])
-    prediction = Prediction(
-        force=force,
-        samples=tuple(np.full(len(times), P) for times, P in zip(facts.hold_times, force, strict=True)),
-        chord=np.array([step.chord for step in steps]),
-        s=steps[0].s,
-        x=np.array([step.x for step in steps]),
-        y=np.array([step.y for step in steps]),
-        theta=np.array([step.theta for step in steps]),
-    )
-    for observer in model.observers:
-        prediction = observer(prediction, facts)
-    return Run(model, steps, prediction)
-
-
-def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
-    displacement = facts.displacement + model.shift
-    mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
-    pushed = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
-    found: dict[int, Equilibrium] = {}
-    for index, side in ((mounted, "natural"), (pushed, "up")):
-        if index:
-            usable = near is not None and len(near.steps[0].angles) == model.bending.rod.edges.size
-            starts = [near.steps[i] if near.steps[i].good else None for i in index] if near and usable else None
-            branch: Branch = "natural" if side == "natural" else "up"
-            done = simulate(model.bending, displacement[index], branch=branch, starts=starts)
-            found.update(zip(index, done, strict=True))
-    return tuple(found[i] for i in range(len(facts.branch)))
+def end_for_end(model: Model) -> Model:
+    """The model with its cable turned end for end: what belongs to rig, load cell and camera stays."""
+    section = model.bending.rod.section
+    profile = None if section.profile is None else section.profile[::-1].copy()
+    bending = replace(model.bending, pre_curvature=section.pre_curvature[::-1].copy(), stiffness_profile=profile)
+    return replace(model, bending=bending)

@@ -142,7 +142,8 @@ def adjusted_p(statistic: Array, maxima: Array) -> Array:
     """
     at = float(np.quantile(maxima, 0.9))
     tests = np.log(0.9) / np.log1p(-2.0 * stats.norm.sf(at))
-    tail = -np.expm1(tests * np.log1p(-2.0 * stats.norm.sf(np.asarray(statistic))))
+    single = 2.0 * stats.norm.sf(np.maximum(statistic, 1e-12))
+    tail = -np.expm1(tests * np.log1p(-np.minimum(single, 1.0 - 1e-12)))
     rank = np.searchsorted(maxima, statistic, side="left")
     simulated = (maxima.size - rank + 1.0) / (maxima.size + 1.0)
     return np.where(maxima.size - rank >= 50, simulated, np.minimum(tail, simulated))

@@ -1,7 +1,8 @@
 """All directions of suspicion about a fitted model: one whitened column for every form of every cause.
 
-A column is the change of the residual when the cause is put into the fitted model at a thousandth of its plausible size,
-per unit of amount. Where only the observation changes, nothing is simulated anew.
+A column is the change of the residual when the cause is put into the fitted model at a share of its plausible size, per
+unit of amount: large enough that a cause whose trace grows with the square of its amount (stiff ends) is seen, small
+enough for the linear model. Where only the observation changes, nothing is simulated anew.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fit import Fit, Term, whole_residual
 from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.prediction import run
 from pipeline.diagnosis.score import Scores, admissible, score
+from pipeline.diagnosis.simulation import run
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,9 @@ class Suspicion:
         return int(own[np.argmax(statistic)])
 
 
-def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, visible: float) -> Suspicion:
+def suspect(
+    observation: Observation, fitted: Fit, causes: Sequence[Cause], *, visible: float, trace: float
+) -> Suspicion:
     """Score every form of every cause about a fitted model.
 
     Causes that are in the model already are scored with forms of theirs only if forms may be combined.
@@ -79,6 +82,8 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, v
     causes : sequence of Cause
     visible : float
         Surviving fraction below which a direction counts as invisible.
+    trace : float
+        Share of the plausible size.
     """
     present = {term.cause.name for term in fitted.extension.terms}
     facts = fitted.extension.facts
@@ -88,7 +93,7 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, v
             continue
         for variant in cause.variants(facts):
             term = Term(cause, variant)
-            columns.append(direction(observation, fitted, term))
+            columns.append(direction(observation, fitted, term, amount=trace * cause.plausible(facts)))
             terms.append(term)
             owner.append(index)
     table = np.column_stack(columns) if columns else np.zeros((len(fitted.residual), 0))
@@ -97,15 +102,18 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, v
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
 
-def direction(observation: Observation, fitted: Fit, term: Term) -> Array:
-    """Whitened column (N,) of one form of a cause at amount zero; zero where not even a trace can be simulated."""
+def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
+    """Whitened column (N,) of one form of a cause, from zero to ``amount``.
+
+    Where that amount leaves no equilibrium, a tenth of it is tried, then the other sign; a column of zeros says that not
+    even a trace can be simulated.
+    """
     facts = fitted.extension.facts
-    trace = 1e-3 * term.cause.plausible(facts)
-    for step in (trace, -trace) if term.cause.sign == 0 else (trace,):
+    trials = (amount, 0.1 * amount) if term.cause.sign else (amount, 0.1 * amount, -0.1 * amount)
+    for step in trials:
         model = term.cause.apply(fitted.run.model, step, term.variant, facts)
-        there = whole_residual(
-            observation, run(model, facts, near=fitted.run), fitted.vector, fitted.extension.prior_std
-        )
+        shown = run(model, facts, near=fitted.run).prediction
+        there = whole_residual(observation, shown, fitted.vector, fitted.extension.prior_std)
         if there is not None:
             return (fitted.residual - there) / step
     return np.zeros_like(fitted.residual)

@@ -48,6 +48,9 @@ class DiagnosisSettings(BaseModel):
     null_draws: int = Field(20000, description="draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma")
     power: float = Field(0.9, description="probability at which the minimal detectable effect is stated")
     visible: float = Field(1e-3, description="surviving fraction below which a cause counts as invisible here")
+    trace: float = Field(
+        0.2, description="share of its plausible size at which a cause's trace is computed; see diagnosis/search.py"
+    )
     seed: int = Field(20240229, description="of every simulated distribution, so that a report repeats to the digit")
     bootstrap: int = Field(
         40, description="refits of simulated data that confirm a score near its threshold; each costs one base fit"
@@ -83,7 +86,17 @@ class DiagnosisSettings(BaseModel):
         4.0, description="multiples of the plausible size from which a cause loses probability, by the inverse square"
     )
 
+    same_level: float = Field(
+        0.01, description="share of the travel; loading and unloading steps closer than this are left out together"
+    )
+    gain_draws: int = Field(2000, description="draws behind the interval of the gain; its ends are then known to 2 %")
+    powerless: float = Field(
+        0.34, description="share of the causes; `underpowered` if fewer would have shown at a plausible size"
+    )
+    separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart, diagnosis.md")
+
     # base model
+    knots: int = Field(5, description="control points of the base characteristic where no identification chose them")
     knots_most: int = Field(7, description="control points of the base characteristic at most; more would eat causes")
     knot_gain: float = Field(
         16.0,
@@ -99,12 +112,19 @@ class DiagnosisSettings(BaseModel):
         0.15,
         description="share of the travel; mean mismatch of chord and displacement from which order or unit is doubted",
     )
-    doubled_sigma: float = Field(
-        4.0, description="sigma; two photos closer than this in every coordinate are one photo"
+    doubled_share: float = Field(
+        0.3, description="share of the noise of a section; two photos that differ by less share their noise and are one"
+    )
+    stiffness_range: tuple[float, float] = Field(
+        (1e-7, 100.0), description="N m^2; EI of cables spans 1e-5 to 1, two decades beyond that is a wrong unit"
     )
     length_mismatch: float = Field(
         0.01, description="relative; traced against stated length from which length_mm is doubted"
     )
+
+    # presentation
+    curve_points: int = Field(61, description="points of the extended characteristic; smooth at any figure's width")
+    twins_shown: int = Field(8, description="causes in the table of cosines; more cannot be read")
 
     # blind spots
     harm: float = Field(0.005, description="relative change of f_EI from which an invisible cause is worth a warning")

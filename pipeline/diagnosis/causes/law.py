@@ -38,10 +38,10 @@ class NonlinearStiffness:
         return 0.05 * facts.moment_scale / facts.curvature_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """A change around one of five places of the range of curvatures."""
+        """A change around one of six places of the range of curvatures, off the usual control points."""
         return tuple(
             Variant("at a part of the range of curvatures", at=place, tuned=("at",), at_range=(0.02, 0.98))
-            for place in (0.1, 0.3, 0.5, 0.7, 0.9)
+            for place in (0.07, 0.22, 0.4, 0.6, 0.8, 0.93)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:

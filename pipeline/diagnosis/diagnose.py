@@ -1,0 +1,173 @@
+"""One specimen: from a measured test to what the simulation gets wrong, named as far as the data allow.
+
+faults of the data -> base model and scores -> (if anything exceeds noise) refits of all suspects -> probabilities and the
+set of names -> a second cause -> what is left -> gain on held-out steps -> the part of the result that says all that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.diagnosis.explanation import Explanation, candidates, refit_one, refit_pairs
+from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
+from pipeline.diagnosis.presentation import present
+from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.diagnosis.verdict import credible_set, probabilities
+from pipeline.diagnosis.workbench import Workbench, prepare, scored
+from pipeline.records import Finding
+from pipeline.result import DiagnosisPart
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredTest
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """What was concluded, before it is put into words.
+
+    Attributes
+    ----------
+    singles : list of Explanation
+        Refitted single causes, most probable first.
+    probability : list of float
+        Of each.
+    members : int
+        How many of them form the set of names.
+    accepted : Explanation or None
+        What the model is extended by: the most probable single cause, or a pair.
+    left : Leftover
+        Test of what the accepted model (or the base model) leaves.
+    alien : bool
+        Whether that exceeds noise and is no small share.
+    """
+
+    singles: list[Explanation]
+    probability: list[float]
+    members: int
+    accepted: Explanation | None
+    left: Leftover
+    alien: bool
+
+
+def diagnose(
+    test: MeasuredTest, identification: Any, settings: DiagnosisSettings | None = None
+) -> tuple[DiagnosisPart, tuple[Finding, ...]]:
+    """Diagnose a measured test.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    identification : pipeline.identify.Identification or None
+        Its estimate chose the number of control points.
+    settings : DiagnosisSettings or None
+
+    Returns
+    -------
+    DiagnosisPart
+    tuple of Finding
+        Faults of the data.
+    """
+    settings = settings or DiagnosisSettings()
+    if not any(step.shape is not None and step.branch != "mounted" for step in test.steps):
+        return _nothing_to_compare("no photo under load was measured"), ()
+    faults = faults_of_input(test, settings)
+    bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
+    if isinstance(bench, str):
+        return _nothing_to_compare(bench), faults.findings
+    conclusion = conclude(bench, settings)
+    fault = _item_at_fault(bench, conclusion, settings)
+    if fault is not None:
+        faults = faults.joined(fault)
+        again = prepare(faults, settings, knots=len(bench.base.extension.base.knots))
+        if not isinstance(again, str):
+            bench, conclusion = again, conclude(again, settings)
+    return present(bench, conclusion, settings), faults.findings
+
+
+def chosen_knots(identification: Any, settings: DiagnosisSettings) -> int:
+    """Number of control points the identification chose, or the default."""
+    law = getattr(getattr(identification, "estimate", None), "characteristic", None)
+    count = settings.knots if law is None else len(law.knots)
+    return int(np.clip(count, 3, settings.knots_most))
+
+
+def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
+    """Refit suspects, weigh them, look for a second cause and for what is left."""
+    if bench.largest <= bench.limit:
+        left = _left_over(bench, bench.base, settings)
+        return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
+    refitted = [
+        refit_one(bench.observation, bench.base, bench.suspicion, cause, settings)
+        for cause in candidates(bench.suspicion, settings)
+    ]
+    singles = sorted((e for e in refitted if e is not None and e.gain > 0.0), key=lambda e: -e.gain)
+    if not singles:
+        return Conclusion([], [], 0, None, _left_over(bench, bench.base, settings), True)
+    freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
+    weight = probabilities(
+        [e.weighed for e in singles],
+        reduced_chi2=singles[0].fitted.chi2 / freedom,
+        implausible=settings.implausible,
+    )
+    members = credible_set(weight, level=settings.set_level)
+    order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
+    singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
+    accepted = _second_cause(bench, singles, settings) or singles[0]
+    left = _left_over(bench, accepted.fitted, settings)
+    alien = left.p_value < settings.alien_false_alarm and left.excess > settings.explained_share * accepted.gain
+    return Conclusion(singles, chance, len(members), accepted, left, alien)
+
+
+def _second_cause(bench: Workbench, singles: list[Explanation], settings: DiagnosisSettings) -> Explanation | None:
+    """A pair that is accepted: significant beyond the best single cause, and neither of the two can be dropped."""
+    best = max(singles, key=lambda e: e.gain)
+    second = suspect(
+        bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
+    )
+    if second.statistic.size == 0:
+        return None
+    limit = scored(bench.test, bench.observation, best.fitted, second, settings).limit
+    least = max(limit**2, settings.pair_share * best.gain)
+    if float(second.statistic.max()) ** 2 <= least:
+        return None
+    pairs = refit_pairs(bench.observation, bench.base, bench.suspicion, best, second, settings)
+    alone = {e.causes[0]: e.gain for e in singles}
+    for pair in pairs:
+        others = [alone.get(cause, _linear_gain(bench.suspicion, cause)) for cause in pair.causes]
+        if pair.gain - max(best.gain, *others) > least:
+            return pair
+    return None
+
+
+def _linear_gain(suspicion: Suspicion, cause: int) -> float:
+    own = suspicion.of(cause)
+    return float(np.max(suspicion.statistic[own]) ** 2) if own.size else 0.0
+
+
+def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Leftover:
+    fields = smooth_fields(bench.observation, bench.facts, rows=len(fitted.residual))
+    rng = np.random.default_rng(settings.seed)
+    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng)
+
+
+def _item_at_fault(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> Faults | None:
+    """One photo or force whose absence removes the misfit, where no cause does."""
+    item = worst_item(bench.observation, bench.base)
+    if item is None or item.gain - item.rows < settings.fault_sigma**2:
+        return None
+    by_cause = max((e.gain for e in conclusion.singles), default=0.0)
+    if conclusion.accepted is not None:
+        by_cause = max(by_cause, conclusion.accepted.gain)
+    freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
+    fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + settings.explained_share * item.gain
+    better = item.gain - item.rows > by_cause + settings.fault_sigma**2
+    return outlier_fault(bench.test, item) if fits and better else None
+
+
+def _nothing_to_compare(reason: str) -> DiagnosisPart:
+    return DiagnosisPart(
+        verdict="underpowered", headline=f"The simulation could not be held against the data: {reason}."
+    )

@@ -1,0 +1,198 @@
+"""Explanations: causes put into the model and fitted in full, alone and in pairs.
+
+Score tests are local; what is suspected is refitted from the linear estimate, with the form tuned where it has a free
+place or time, and with further forms of the same cause where several may add up (a profile along the cable).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.diagnosis.fit import Extension, Fit, Term, fit
+from pipeline.diagnosis.observation import Observation
+from pipeline.diagnosis.pairs import Pair, best_pairs, pair_gains
+from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.diagnosis.twins import cosines
+from pipeline.diagnosis.verdict import Weighed, scan_share
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """One or two causes in the model, fitted.
+
+    Attributes
+    ----------
+    causes : tuple of int
+        Indices into the catalogue, the stronger first.
+    fitted : Fit
+    gain : float
+        Chi-square removed from the base model.
+    weighed : Weighed
+    """
+
+    causes: tuple[int, ...]
+    fitted: Fit
+    gain: float
+    weighed: Weighed
+
+    def amount(self, cause: int) -> tuple[float, float]:
+        """Amount of a cause (its strongest form) and its standard deviation."""
+        owners = [self.causes[0]] * len(self.fitted.extension.terms)
+        if len(self.causes) == 2:
+            owners[-1] = self.causes[1]
+        terms = [i for i, owner in enumerate(owners) if owner == cause]
+        values = [self.fitted.amount(i) for i in terms]
+        return max(values, key=lambda pair: abs(pair[0]))
+
+
+def candidates(suspicion: Suspicion, settings: DiagnosisSettings) -> list[int]:
+    """Causes worth a refit: by linear chi-square gain, within a margin of the best."""
+    gains = np.zeros(len(suspicion.causes))
+    np.maximum.at(gains, suspicion.owner, suspicion.statistic**2)
+    order = np.argsort(-gains, kind="stable")
+    needed = gains[order[0]] - max(settings.refit_least, settings.refit_margin * gains[order[0]])
+    return [int(k) for k in order[: settings.refit_most] if gains[k] > max(needed, 0.0)]
+
+
+def refit_one(
+    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, settings: DiagnosisSettings
+) -> Explanation | None:
+    """Fit the model with one cause in it; None where it cannot be simulated or has no admissible amount."""
+    own = suspicion.of(cause)
+    ranked = own[np.argsort(-suspicion.statistic[own], kind="stable")]
+    best: Fit | None = None
+    for direction in ranked[:2]:
+        if best is not None and suspicion.statistic[direction] < 0.8 * suspicion.statistic[ranked[0]]:
+            break
+        found = _fit_terms(observation, base, suspicion, (int(direction),), settings)
+        if found is not None and (best is None or found.chi2 < best.chi2):
+            best = found
+    if best is None:
+        return None
+    if suspicion.causes[cause].combines:
+        best = _with_more_forms(observation, best, suspicion.causes[cause].name, suspicion, settings)
+    return _explanation((cause,), base, best, suspicion)
+
+
+def refit_pairs(
+    observation: Observation,
+    base: Fit,
+    suspicion: Suspicion,
+    single: Explanation,
+    second: Suspicion,
+    settings: DiagnosisSettings,
+) -> list[Explanation]:
+    """Best pairs of the exhaustive linear search about the base model, and the best second causes given the first."""
+    cosine = cosines(suspicion.scores.unit)
+    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner, collinear=settings.pair_collinear)
+    found: list[Explanation] = []
+    pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
+    least = pairs[0].gain - max(settings.refit_least, settings.refit_margin * pairs[0].gain) if pairs else 0.0
+    for pair in pairs:
+        refitted = _refit_pair(observation, base, suspicion, pair, settings) if pair.gain > least else None
+        if refitted is not None:
+            found.append(refitted)
+    for cause in candidates(second, settings)[:2]:
+        if cause != single.causes[0]:
+            added = _add_cause(observation, single.fitted, second, cause, settings)
+            if added is not None:
+                found.append(_explanation((single.causes[0], cause), base, added, suspicion))
+    return sorted(found, key=lambda explanation: -explanation.gain)
+
+
+def _refit_pair(
+    observation: Observation, base: Fit, suspicion: Suspicion, pair: Pair, settings: DiagnosisSettings
+) -> Explanation | None:
+    z, c = suspicion.scores.z, float(suspicion.scores.unit[:, pair.first] @ suspicion.scores.unit[:, pair.second])
+    norm = suspicion.scores.norm
+    amounts = (
+        float((z[pair.first] - c * z[pair.second]) / (1.0 - c * c) / norm[pair.first]),
+        float((z[pair.second] - c * z[pair.first]) / (1.0 - c * c) / norm[pair.second]),
+    )
+    found = _fit_terms(observation, base, suspicion, (pair.first, pair.second), settings, amounts=amounts)
+    if found is None:
+        return None
+    causes = (int(suspicion.owner[pair.first]), int(suspicion.owner[pair.second]))
+    return _explanation(causes, base, found, suspicion)
+
+
+def _fit_terms(
+    observation: Observation,
+    base: Fit,
+    suspicion: Suspicion,
+    directions: tuple[int, ...],
+    settings: DiagnosisSettings,
+    *,
+    amounts: tuple[float, ...] | None = None,
+) -> Fit | None:
+    """Fit with the given directions as terms, from the linear estimate, or from less of it where that fails."""
+    terms = tuple(suspicion.terms[k] for k in directions)
+    extension = Extension(base.extension.base, base.extension.facts, (*base.extension.terms, *terms))
+    if amounts is None:
+        amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
+    for share in (1.0, 0.3, 0.05):
+        tried = []
+        for term, amount in zip(terms, amounts, strict=True):
+            limit = 5.0 * term.cause.plausible(base.extension.facts)
+            value = float(np.clip(share * amount, -limit, limit))
+            tried.append(max(value, 0.0) if term.cause.sign > 0 else value)
+        found = fit(
+            observation,
+            extension,
+            _extended_start(base, extension, tuple(tried)),
+            iterations=settings.iterations,
+            tolerance=settings.tolerance,
+            near=base.run,
+        )
+        if found.run.prediction is not None:
+            return found
+    return None
+
+
+def _extended_start(base: Fit, extension: Extension, amounts: tuple[float, ...]) -> np.ndarray:
+    """Vector of ``extension``, which adds terms to the fitted model ``base``."""
+    parts = [base.vector]
+    for term, amount in zip(extension.terms[len(base.extension.terms) :], amounts, strict=True):
+        parts.append(np.r_[amount, [getattr(term.variant, name) for name in term.variant.tuned]])
+    return np.concatenate(parts)
+
+
+def _with_more_forms(
+    observation: Observation, best: Fit, name: str, suspicion: Suspicion, settings: DiagnosisSettings
+) -> Fit:
+    """Add further forms of the same cause while each removes ``shape_gain``."""
+    own = [cause for cause in suspicion.causes if cause.name == name]
+    while len(best.extension.terms) < settings.shapes_most:
+        more = suspect(observation, best, own, visible=settings.visible, trace=settings.trace)
+        if more.statistic.size == 0 or more.statistic.max() ** 2 < settings.shape_gain:
+            break
+        added = _fit_terms(observation, best, more, (int(np.argmax(more.statistic)),), settings)
+        if added is None or best.chi2 - added.chi2 < settings.shape_gain:
+            break
+        best = added
+    return best
+
+
+def _add_cause(
+    observation: Observation, fitted: Fit, second: Suspicion, cause: int, settings: DiagnosisSettings
+) -> Fit | None:
+    direction = second.best(cause)
+    return None if direction is None else _fit_terms(observation, fitted, second, (direction,), settings)
+
+
+def _explanation(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: Suspicion) -> Explanation:
+    terms = fitted.extension.terms
+    first = suspicion.causes[causes[0]]
+    amount = max((fitted.amount(i)[0] for i, term in enumerate(terms) if term.cause is first), key=abs)
+    gain = base.chi2 - fitted.chi2
+    weighed = Weighed(
+        gain=gain,
+        tuned=sum(len(term.variant.tuned) for term in terms) + len(terms) - 1,
+        scan=sum(scan_share(suspicion.statistic[suspicion.of(cause)]) for cause in causes),
+        signs=1 if first.sign else 2,
+        excess=amount / first.plausible(fitted.extension.facts),
+    )
+    return Explanation(causes, fitted, gain, weighed)

@@ -1,0 +1,87 @@
+"""The characteristic of a fitted model as a curve with its band, and how far one model's f_EI lies from another's.
+
+All curves are over the curvature K = K0 + D on the visited range, tangent reading first; bands are 1 sigma from the
+covariance of the fit, correlations between control points and K0 included:
+
+    df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fit import Fit
+from pipeline.result import Curve
+
+Array = NDArray[np.float64]
+
+
+def visited(fitted: Fit) -> tuple[float, float]:
+    """Smallest and largest curvature of the fitted cable over all steps, 1/m."""
+    kappa = np.concatenate([step.kappa[2:-2] for step in fitted.run.steps])
+    return float(kappa.min()), float(kappa.max())
+
+
+def curve(fitted: Fit, *, points: int) -> Curve:
+    """f_EI and m of a fitted model on its visited range."""
+    base = fitted.extension.base
+    law, K0 = base.characteristic(fitted.vector), base.pre_curvature(fitted.vector)
+    low, high = visited(fitted)
+    K = np.linspace(max(low, K0), high, points)
+    count = len(law.knots)
+    by_tangent = base.stiffness * law.tangent_by_ordinates(K, K0)
+    by_moment = base.stiffness * law.moment_by_ordinates(K, K0)
+    used = list(range(count))
+    if (bend := base.pre_curvature_index) is not None:
+        step = 1e-5 * (high - K0)
+        slope = (law.tangent(K + step, K0) - law.tangent(K - step, K0)) / (2.0 * step)
+        by_tangent = np.column_stack([by_tangent, -slope])
+        by_moment = np.column_stack([by_moment, law.moment_by_pre_curvature(K, K0)])
+        used.append(bend)
+    covariance = fitted.covariance[np.ix_(used, used)]
+    moment_std = _std(by_moment, covariance)
+    excess = K - K0
+    # at K = K0 the secant is the tangent, and so is its band
+    far = excess > 1e-3 * (high - K0)
+    secant_std = np.where(far, moment_std / np.where(far, excess, 1.0), _std(by_tangent, covariance))
+    return Curve(
+        kappa_per_m=K.tolist(),
+        moment_Nm=law.moment(K, K0).tolist(),
+        moment_std_Nm=moment_std.tolist(),
+        tangent_Nm2=law.tangent(K, K0).tolist(),
+        tangent_std_Nm2=_std(by_tangent, covariance).tolist(),
+        secant_Nm2=law.secant(K, K0).tolist(),
+        secant_std_Nm2=secant_std.tolist(),
+        supported=[True] * points,
+    )
+
+
+def _std(columns: Array, covariance: Array) -> Array:
+    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, covariance, columns), 0.0))
+
+
+def stiffness_change(before: Fit, after: Fit) -> float:
+    """Root mean square of the relative difference of f_EI at equal curvature, on the range of the model before."""
+    low, high = visited(before)
+    K = np.linspace(low, high, 60)
+    return _rms_change(before, before.vector, after.vector[: len(before.vector)], K)
+
+
+def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Array:
+    """The same (k,), to first order, for effects that are in the data but not in the model.
+
+    ``columns`` (N, k) are whitened traces per unit of ``amounts`` (k,); the fit then moves by ``J^+ S a``.
+    """
+    size = np.linalg.norm(fitted.jacobian, axis=0)
+    moves = np.linalg.pinv(fitted.jacobian / size, rcond=1e-7) @ (columns * amounts) / size[:, None]
+    low, high = visited(fitted)
+    K = np.linspace(low, high, 60)
+    trial = 1e-3  # first order: a thousandth of the move, scaled up again
+    return np.array([_rms_change(fitted, fitted.vector, fitted.vector + trial * m, K) / trial for m in moves.T])
+
+
+def _rms_change(fitted: Fit, before: Array, after: Array, K: Array) -> float:
+    base = fitted.extension.base
+    f = [base.characteristic(v).tangent(K, base.pre_curvature(v)) for v in (before, after)]
+    return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))

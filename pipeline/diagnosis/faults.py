@@ -1,0 +1,278 @@
+"""Faults of the data, told apart from causes: a mixed-up photo is not physics.
+
+Before anything is fitted, photographed chords are held against the displacement log (order of photos, unit), photos
+against each other (doubled), traced against stated length, and forces against what a cable can do (unit, sign). After the
+base fit, each photo and each hold is left out in turn, to first order: where the rest then agrees with the model and no
+cause explains as much, that one item is at fault, not the model.
+
+Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/unit``,
+``log/unit``, ``length/traced``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fit import Fit
+from pipeline.diagnosis.observation import Observation
+from pipeline.records import Finding
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredShape, MeasuredTest
+
+Array = NDArray[np.float64]
+
+UNITS = {
+    1e3: "m instead of mm",
+    1e-3: "micrometres instead of mm",
+    10.0: "cm instead of mm",
+    25.4: "inches instead of mm",
+}
+"""What the displacement column may hold if the chord changes this many times as much as the log says."""
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What is wrong with the data.
+
+    Attributes
+    ----------
+    test : MeasuredTest
+        With displacements replaced by chords where their unit is wrong.
+    findings : tuple of Finding
+    photos, forces : frozenset of int
+        Indices of steps whose photo, or force, is not to be used.
+    """
+
+    test: MeasuredTest
+    findings: tuple[Finding, ...] = ()
+    photos: frozenset[int] = frozenset()
+    forces: frozenset[int] = frozenset()
+
+    def joined(self, other: Faults) -> Faults:
+        """Both."""
+        return Faults(
+            other.test, (*self.findings, *other.findings), self.photos | other.photos, self.forces | other.forces
+        )
+
+
+def faults_of_input(test: MeasuredTest, settings: DiagnosisSettings) -> Faults:
+    """Faults that show without any fit."""
+    found = Faults(test)
+    for check in (_unit_of_displacement, _doubled_photos, _order_of_photos, _traced_length, _forces):
+        found = found.joined(check(found, settings))
+    return found
+
+
+def _with_both(found: Faults) -> list[int]:
+    steps = found.test.steps
+    return [
+        i
+        for i, step in enumerate(steps)
+        if step.chord is not None and step.displacement is not None and i not in found.photos
+    ]
+
+
+def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """The chord changes by another factor than one per displacement: a unit."""
+    test, used = found.test, _with_both(found)
+    if len(used) < 2:
+        return Faults(test)
+    chord = np.array([test.steps[i].chord for i in used], dtype=float)
+    displacement = np.array([test.steps[i].displacement for i in used], dtype=float)
+    if np.ptp(displacement) <= 0.0 or np.ptp(chord) <= 0.0:
+        return Faults(test)
+    slope, at_zero = np.polyfit(displacement, chord, 1)
+    left = float(np.sqrt(np.mean((chord - at_zero - slope * displacement) ** 2)))
+    factor = min(UNITS, key=lambda unit: abs(np.log(abs(slope) / unit)))
+    near = abs(np.log(abs(slope) / factor)) < settings.chord_mismatch
+    if slope >= 0.0 or not near or left > settings.chord_mismatch * np.ptp(chord):
+        return Faults(test)
+    steps = tuple(
+        replace(step, displacement=None if step.displacement is None else -slope * step.displacement)
+        for step in test.steps
+    )
+    return Faults(
+        replace(test, steps=steps),
+        (
+            Finding(
+                "log/unit",
+                "warning",
+                f"the photographed chord changes {-slope:.4g} times as much as the displacement of the log says: the log "
+                f"seems to hold {UNITS[factor]}; displacements were scaled to the photos",
+            ),
+        ),
+    )
+
+
+def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """Two photos whose noise is the same are one photo."""
+    steps = found.test.steps
+    pictures = [(i, step.shape) for i, step in enumerate(steps) if step.shape is not None]
+    findings, dropped = [], set()
+    for (i, one), (j, other) in combinations(pictures, 2):
+        assert one is not None and other is not None
+        if not _same_noise(one, other, settings.doubled_share):
+            continue
+        gap = {k: abs(_mismatch(found.test, k)) for k in (i, j)}
+        wrong = j if gap[j] >= gap[i] else i
+        dropped.add(wrong)
+        findings.append(
+            Finding(
+                "photo/doubled",
+                "warning",
+                f"the photos of steps {steps[i].step} and {steps[j].step} are the same picture; the one of step "
+                f"{steps[wrong].step}, which fits its displacement less well, is left out of the diagnosis",
+            )
+        )
+    return Faults(found.test, tuple(findings), frozenset(dropped))
+
+
+def _same_noise(one: MeasuredShape, other: MeasuredShape, share: float) -> bool:
+    if abs(len(one.section_s) - len(other.section_s)) > 2:
+        return False
+    x = np.interp(one.section_s, other.section_s, other.section_x)
+    y = np.interp(one.section_s, other.section_s, other.section_y)
+    apart = float(np.sqrt(np.mean((one.section_x - x) ** 2 + (one.section_y - y) ** 2)))
+    return apart < share * float(np.median(one.section_std))
+
+
+def _mismatch(test: MeasuredTest, index: int) -> float:
+    """Chord plus displacement of a step, against the median of all."""
+    sums = {
+        i: step.chord + step.displacement
+        for i, step in enumerate(test.steps)
+        if step.chord is not None and step.displacement is not None
+    }
+    return sums[index] - float(np.median(list(sums.values()))) if index in sums else 0.0
+
+
+def _order_of_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """Chords fit the displacements in another order than the one given."""
+    test, used = found.test, _with_both(found)
+    if len(used) < 2:
+        return Faults(test)
+    chord = np.array([test.steps[i].chord for i in used], dtype=float)
+    displacement = np.array([test.steps[i].displacement for i in used], dtype=float)
+    travel = float(np.ptp(displacement))
+    if travel <= 0.0:
+        return Faults(test)
+    by_log = np.argsort(displacement, kind="stable")
+    by_photo = np.argsort(-chord, kind="stable")
+    sorted_sum = chord[by_photo] + displacement[by_log]
+    natural = float(np.median(sorted_sum))
+    given = chord + displacement - natural
+    limit = settings.chord_mismatch * travel
+    wrong = np.abs(given) > limit
+    if wrong.sum() < 2 or np.any(np.abs(sorted_sum - natural) > limit):
+        return Faults(test)
+    names = ", ".join(str(test.steps[used[k]].step) for k in np.flatnonzero(wrong))
+    return Faults(
+        test,
+        (
+            Finding(
+                "photo/order",
+                "warning",
+                f"the photos of steps {names} fit the displacements of each other: they are out of order and left out "
+                "of the diagnosis; correct the column `image` of the force log",
+            ),
+        ),
+        frozenset(int(used[k]) for k in np.flatnonzero(wrong)),
+    )
+
+
+def _traced_length(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """All photos show another length than the one stated."""
+    test = found.test
+    traced = [float(step.shape.s[-1]) for i, step in enumerate(test.steps) if step.shape and i not in found.photos]
+    if not traced:
+        return Faults(test)
+    off = float(np.median(traced)) / test.length - 1.0
+    if abs(off) < settings.length_mismatch or np.ptp(traced) / test.length > abs(off):
+        return Faults(test)
+    return Faults(
+        test,
+        (
+            Finding(
+                "length/traced",
+                "warning",
+                f"the photos show a cable of {1e3 * float(np.median(traced)):.1f} mm where length_mm says "
+                f"{1e3 * test.length:.1f} mm: length or scale is wrong",
+            ),
+        ),
+    )
+
+
+def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """Forces of the wrong sign, or of a size no cable has."""
+    test = found.test
+    pushed = [step for step in test.steps if step.branch != "mounted"]
+    forces = np.array([step.force for step in pushed])
+    if forces.size and np.mean(forces < 0.0) > 0.5:
+        message = (
+            "most forces are tension although the bearings approach: the sign of the log seems reversed; set "
+            'force_sign = "tension" in specimen.toml'
+        )
+        return Faults(test, (Finding("force/sign", "warning", message),))
+    stiffness = float(np.max(np.abs(forces), initial=0.0)) * test.length**2 / np.pi**2
+    low, high = settings.stiffness_range
+    if 0.0 < stiffness < low or stiffness > high:
+        message = (
+            f"the forces mean a bending stiffness of about {stiffness:.2g} N m^2, outside {low:g} to {high:g} for any "
+            "cable: check the unit of the force column"
+        )
+        return Faults(test, (Finding("force/unit", "warning", message),))
+    return Faults(test)
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """One item whose absence lets the model fit: step index, kind (``photo`` or ``force``), and what is then gained."""
+
+    index: int
+    kind: str
+    gain: float
+    rows: int
+    rest: float
+
+
+def worst_item(observation: Observation, fitted: Fit) -> Outlier | None:
+    """The photo or hold whose absence lowers chi-square most, refitted to first order; None with too few steps."""
+    kind, step = observation.rows.kind, observation.rows.step
+    extra = np.zeros(len(fitted.residual) - len(kind), dtype=bool)
+    best: Outlier | None = None
+    steps = sorted(set(step.tolist()))
+    if len(steps) < 3:
+        return None
+    for index in steps:
+        for name, own in (("photo", kind > 0), ("force", kind == 0)):
+            rows = np.r_[own & (step == index), extra]
+            if not rows.any() or (own & (step != index)).sum() == 0:
+                continue
+            kept = ~rows
+            moved = np.linalg.lstsq(fitted.jacobian[kept], fitted.residual[kept], rcond=1e-9)[0]
+            rest = float(np.sum((fitted.residual[kept] - fitted.jacobian[kept] @ moved) ** 2))
+            found = Outlier(index, name, fitted.chi2 - rest, int(rows.sum()), rest)
+            if best is None or found.gain - found.rows > best.gain - best.rows:
+                best = found
+    return best
+
+
+def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
+    """Finding and exclusion of an item at fault."""
+    name = test.steps[outlier.index].step
+    sigma = np.sqrt(max(outlier.gain - outlier.rows, 0.0))
+    what = "photo" if outlier.kind == "photo" else "force"
+    finding = Finding(
+        f"{what}/outlier",
+        "warning",
+        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is left "
+        "out of the diagnosis",
+    )
+    index = frozenset({outlier.index})
+    return Faults(
+        test, (finding,), index if what == "photo" else frozenset(), index if what == "force" else frozenset()
+    )

@@ -1,0 +1,134 @@
+"""Residuals for people: a map over arc length and step, in sigma and in m; forces in N; chords in m.
+
+The shape residual of a photo is measured minus simulated position along the normal. On the map it is averaged over a
+few points along the cable, and its sigma is that of the average, correlation along s included; so an honest model shows
+values within about 2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from pipeline.diagnosis.fit import Fit
+from pipeline.diagnosis.noise import section_covariance
+from pipeline.diagnosis.observation import KINDS, Observation, normal_distance
+from rod.measurement import MeasuredTest
+
+Array = NDArray[np.float64]
+
+COLUMNS = 24
+"""Cells of the map along the cable: each averages four section blocks."""
+
+
+def residual_map(test: MeasuredTest, observation: Observation, fitted: Fit) -> dict[str, Any]:
+    """Map over s and step, both branches, in sigma and in m and N.
+
+    Returns
+    -------
+    dict
+        A `pipeline.result.ResidualMap`: ``s_m`` (c,), and by step: ``steps``, ``branches``, ``displacement_m``, ``force_N``, ``force_sigma``, ``chord_m``,
+        ``chord_sigma``, ``shape_m`` (steps, c), ``shape_sigma`` (steps, c); null where nothing was measured. Beside
+        them ``chi2`` and ``data`` by kind.
+    """
+    prediction = fitted.run.prediction
+    if prediction is None:
+        return {}
+    edges = np.linspace(0.0, float(prediction.s[-1]), COLUMNS + 1)
+    photos = {photo.step: photo for photo in observation.photos}
+    table: dict[str, Any] = {
+        "s_m": (0.5 * (edges[1:] + edges[:-1])).tolist(),
+        **{key: [] for key in ("steps", "branches", "displacement_m", "force_N", "force_sigma")},
+        **{key: [] for key in ("chord_m", "chord_sigma", "shape_m", "shape_sigma")},
+    }
+    for i, step in enumerate(test.steps):
+        table["steps"].append(step.step)
+        table["branches"].append(step.branch)
+        table["displacement_m"].append(step.displacement)
+        samples = observation.forces[i]
+        mean = float(np.mean(samples - prediction.samples[i][: len(samples)])) if len(samples) else None
+        table["force_N"].append(mean)
+        std = float(observation.force_std[i]) / np.sqrt(max(len(samples), 1))
+        table["force_sigma"].append(None if mean is None else mean / std)
+        photo = photos.get(i)
+        if photo is None:
+            for key in ("chord_m", "chord_sigma"):
+                table[key].append(None)
+            for key in ("shape_m", "shape_sigma"):
+                table[key].append([None] * COLUMNS)
+            continue
+        chord = photo.chord - float(prediction.chord[i])
+        table["chord_m"].append(chord)
+        table["chord_sigma"].append(chord / photo.chord_std)
+        across = normal_distance(photo.sections, prediction, i)
+        covariance = section_covariance(
+            photo.sections, factor=observation.photo_noise.factor, stretch=observation.photo_noise.stretch
+        )
+        cells, sigma = _cells(photo.sections.s, across, covariance, edges)
+        table["shape_m"].append(cells)
+        table["shape_sigma"].append(sigma)
+    table["chi2"], table["data"] = chi2_by_kind(observation, fitted)
+    return table
+
+
+def _cells(s: Array, across: Array, covariance: Array, edges: Array) -> tuple[list[float | None], list[float | None]]:
+    means: list[float | None] = []
+    sigmas: list[float | None] = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        inside = np.flatnonzero((s >= low) & (s < high))
+        if inside.size == 0:
+            means.append(None)
+            sigmas.append(None)
+            continue
+        mean = float(np.mean(across[inside]))
+        means.append(mean)
+        sigmas.append(mean / float(np.sqrt(np.mean(covariance[np.ix_(inside, inside)]))))
+    return means, sigmas
+
+
+def chi2_by_kind(observation: Observation, fitted: Fit) -> tuple[dict[str, float], dict[str, int]]:
+    """Chi-square and number of data of forces, chords and shapes."""
+    rows = len(observation.rows.kind)
+    square = fitted.residual[:rows] ** 2
+    kinds = range(len(KINDS) - 1)
+    return (
+        {KINDS[k]: float(square[observation.rows.kind == k].sum()) for k in kinds},
+        {KINDS[k]: int(np.sum(observation.rows.kind == k)) for k in kinds},
+    )
+
+
+def rms_errors(observation: Observation, fitted: Fit, steps: list[int]) -> tuple[Array, Array]:
+    """Force errors (N, mean of each hold) and shape errors (m, every block) of the named steps, for an rms."""
+    prediction = fitted.run.prediction
+    if prediction is None:
+        return np.zeros(0), np.zeros(0)
+    force = [
+        float(np.mean(observation.forces[i] - prediction.samples[i][: len(observation.forces[i])]))
+        for i in steps
+        if len(observation.forces[i])
+    ]
+    shape = [normal_distance(p.sections, prediction, p.step) for p in observation.photos if p.step in steps]
+    return np.array(force), np.concatenate(shape) if shape else np.zeros(0)
+
+
+def smooth_share(observation: Observation, field: Array) -> dict[str, Any]:
+    """Where a whitened field (N,) sits: share of its square by kind, strongest step and, on photos, its place."""
+    rows = len(observation.rows.kind)
+    square = field[:rows] ** 2
+    total = max(float(square.sum()), 1e-300)
+    share = {KINDS[k]: float(square[observation.rows.kind == k].sum()) / total for k in range(len(KINDS) - 1)}
+    by_step = np.bincount(observation.rows.step, weights=square)
+    strongest = int(np.argmax(by_step))
+    found: dict[str, Any] = {"share": share, "step_index": strongest, "place": None}
+    for photo in observation.photos:
+        if photo.step == strongest:
+            own = np.flatnonzero((observation.rows.step == strongest) & (observation.rows.kind > 0))
+            components = linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, field[own])[0]
+            across = photo.basis @ components
+            found["place"] = float(photo.sections.s[int(np.argmax(np.abs(across)))])
+            found["shape_m"] = across.tolist()
+            found["s_m"] = photo.sections.s.tolist()
+    return found

@@ -1,0 +1,101 @@
+"""The cheapest further measurement that separates what these data confuse.
+
+For each protocol that was not made yet the most probable explanation is simulated without noise, each rival is fitted to
+that to first order, and what remains of the rival's misfit (in sigma) says how far the protocol takes the two apart:
+unload in the same steps; photograph the force-free cable; turn the cable end for end and repeat. Where none does, one of
+the rivals is settled by itself (a spirit level, dead weights).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.diagnosis.explanation import Explanation
+from pipeline.diagnosis.fit import Fit, sensitivities, whole_residual
+from pipeline.diagnosis.observation import observe
+from pipeline.diagnosis.plan import more_steps, planned_test, precision_of
+from pipeline.diagnosis.prediction import Facts
+from pipeline.diagnosis.simulation import run
+from pipeline.diagnosis.workbench import Workbench
+from pipeline.result import NextExperiment
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Protocol:
+    """A further measurement: in words, its circumstances, and whether the cable is turned end for end in it."""
+
+    what: str
+    facts: Facts
+    turned: bool = False
+
+
+def protocols(facts: Facts) -> list[Protocol]:
+    """What was not made yet, the cheapest first."""
+    found = []
+    if "mounted" not in facts.branch:
+        found.append(
+            Protocol(
+                "photograph the mounted, force-free cable and log its force", more_steps(facts, [0.0], ["mounted"])
+            )
+        )
+    if not facts.returns:
+        back = sorted({float(d) for d in facts.displacement if d > 0.0}, reverse=True)[1:] or [
+            0.5 * float(facts.displacement.max())
+        ]
+        found.append(
+            Protocol("unload in the same steps, with photos", more_steps(facts, back, ["unloading"] * len(back)))
+        )
+    found.append(Protocol("turn the cable end for end and repeat the test", facts, turned=True))
+    return found
+
+
+def next_experiment(
+    bench: Workbench, probable: Explanation, rivals: Sequence[Explanation], settings: DiagnosisSettings
+) -> NextExperiment | None:
+    """The cheapest protocol that takes the most probable explanation apart from all rivals; None without rivals."""
+    if not rivals:
+        return None
+    causes = bench.suspicion.causes
+    names = [causes[probable.causes[0]].name, *(causes[rival.causes[0]].name for rival in rivals)]
+    best: tuple[float, Protocol] | None = None
+    for protocol in protocols(bench.facts):
+        apart = min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
+        if apart >= settings.separated:
+            return NextExperiment(what=protocol.what, separates=names)
+        if best is None or apart > best[0]:
+            best = (apart, protocol)
+    outside = [causes[e.causes[0]] for e in (probable, *rivals) if causes[e.causes[0]].seat != "cable"]
+    if outside:
+        return NextExperiment(what=f"{outside[0].settled_by} ({outside[0].name})", separates=names)
+    assert best is not None
+    return NextExperiment(what=best[1].what, separates=names)
+
+
+def _separation(bench: Workbench, probable: Fit, rival: Fit, protocol: Protocol, settings: DiagnosisSettings) -> float:
+    """Sigma between two explanations if the protocol were made and the rival refitted, to first order."""
+    precision = precision_of(bench.test, bench.observation.force_std)
+    blocks = [(bench.facts, False), (protocol.facts, True)] if protocol.turned else [(protocol.facts, False)]
+    values, columns = [], []
+    for facts, turned in blocks:
+        truth = replace(probable.extension, facts=facts, turned=turned)
+        made = run(truth.model(probable.vector), facts)
+        if made.prediction is None:
+            return 0.0
+        observation = observe(planned_test(made, facts, precision), settings)
+        other = replace(rival.extension, facts=facts, turned=turned)
+        base_model = other.base_model(rival.vector)
+        shown = run(other.model(rival.vector, of=base_model), facts)
+        value = whole_residual(observation, shown.prediction, rival.vector, other.prior_std)
+        if value is None:
+            return 0.0
+        values.append(value)
+        columns.append(sensitivities(observation, other, rival.vector, base_model, shown))
+    value, jacobian = np.concatenate(values), np.vstack(columns)
+    size = np.linalg.norm(jacobian, axis=0)
+    scaled = jacobian / np.where(size > 0.0, size, 1.0)
+    left = value - scaled @ np.linalg.lstsq(scaled, value, rcond=1e-8)[0]
+    return float(np.linalg.norm(left))

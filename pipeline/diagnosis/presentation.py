@@ -1,0 +1,241 @@
+"""From a conclusion to the part of the result: table, causes, gain, blind spots, next experiment, maps, headline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.explanation import Explanation
+from pipeline.diagnosis.extended import curve, stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.heldout import measured_gain
+from pipeline.diagnosis.maps import residual_map, smooth_share
+from pipeline.diagnosis.next_experiment import next_experiment
+from pipeline.diagnosis.score import adjusted_p, detectable
+from pipeline.diagnosis.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.verdict import decide
+from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
+from pipeline.diagnosis.workbench import Workbench
+from pipeline.result import BlindSpot, CausePart, CauseRow, DiagnosisPart, GainPart, NextExperiment
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+if TYPE_CHECKING:
+    from pipeline.diagnosis.diagnose import Conclusion
+
+Array = NDArray[np.float64]
+
+
+def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> DiagnosisPart:
+    """Fill the part of the result."""
+    accepted = conclusion.accepted
+    gain, held = measured_gain(bench, accepted.fitted, settings) if accepted else (None, None)
+    rows = table(bench, conclusion, settings, heldout=held.removed if held else None)
+    seen = [(row.name, row.minimal_detectable, row.unit) for row in _seen_at_plausible_size(bench, rows)]
+    causes = named_causes(bench, conclusion)
+    verdict = decide(
+        detected=accepted is not None,
+        alien=conclusion.alien,
+        two=len(causes) == 2,
+        names=conclusion.members,
+        powerless=len(seen) < settings.powerless * len(rows),
+    )
+    leftover = describe_leftover(bench, conclusion)
+    sentence = headline(
+        verdict,
+        names=[cause.class_ for cause in causes],
+        amounts=[(cause.estimate, cause.std, cause.unit) for cause in causes],
+        explained=None if gain is None else gain.heldout_excess_removed,
+        change=stiffness_change(bench.base, accepted.fitted) if accepted else None,
+        weakest=could_have_been_seen([s for s in seen if s[1] is not None], len(rows)),
+        leftover=leftover["message"],
+    )
+    return DiagnosisPart(
+        verdict=verdict,
+        headline=sentence,
+        causes=causes,
+        table=rows,
+        gain=_valid(gain),
+        blind_spots=blind_spots(bench, rows, settings),
+        next_experiment=_next(bench, conclusion, settings, verdict),
+        extended=curve(accepted.fitted, points=settings.curve_points) if accepted else None,
+        leftover=leftover,
+        residuals_before=residual_map(bench.test, bench.observation, bench.base),
+        residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
+        twins=confusable(bench, conclusion, settings),
+    )
+
+
+def named_causes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
+    """One entry for each cause that was found, with its class of names."""
+    if conclusion.accepted is None:
+        return []
+    catalogue = bench.suspicion.causes
+    accepted = conclusion.accepted
+    if len(accepted.causes) == 1:
+        names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
+        return [_part(bench, accepted, accepted.causes[0], names, conclusion.probability[0])]
+    # a law with one more control point is no second cause, only a finer base
+    found = [cause for cause in accepted.causes if catalogue[cause].name != "nonlinear_stiffness"]
+    if len(found) == 1:
+        names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
+        name = catalogue[found[0]].name
+        return [_part(bench, accepted, found[0], [name, *(n for n in names if n != name)], conclusion.probability[0])]
+    return [_part(bench, accepted, cause, [catalogue[cause].name], 1.0) for cause in accepted.causes]
+
+
+def _part(bench: Workbench, found: Explanation, cause: int, names: list[str], probability: float) -> CausePart:
+    amount, std = found.amount(cause)
+    kind = bench.suspicion.causes[cause]
+    return CausePart(
+        name=kind.name,
+        **{"class": names},
+        probability=min(max(probability, 0.0), 1.0),
+        estimate=amount,
+        std=std,
+        unit=kind.unit,
+    )
+
+
+def table(
+    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, heldout: float | None
+) -> list[CauseRow]:
+    """One row for every cause, the loudest first; ``stiffness_shift`` says what each would do to f_EI."""
+    suspicion, scores = bench.suspicion, bench.suspicion.scores
+    statistic = suspicion.statistic
+    p_values = adjusted_p(statistic, bench.maxima) if statistic.size else statistic
+    smallest = detectable(scores.norm, bench.limit, power=settings.power)
+    twin, closeness = nearest(between_causes(cosines(scores.unit), suspicion.owner, len(suspicion.causes)))
+    refitted = {e.causes[0]: e for e in conclusion.singles}
+    accepted = conclusion.accepted
+    rows = []
+    for index, cause in enumerate(suspicion.causes):
+        best = suspicion.best(index)
+        if best is None:
+            rows.append(_unseen_row(cause.name, cause.unit))
+            continue
+        found = refitted.get(index)
+        estimate, std = found.amount(index) if found else (float(scores.estimate[best]), float(scores.std[best]))
+        if found:
+            shift = stiffness_change(bench.base, found.fitted)
+        else:
+            column = suspicion.columns[:, best : best + 1]
+            shift = float(stiffness_change_linear(bench.base, column, scores.estimate[best : best + 1])[0])
+        rows.append(
+            CauseRow(
+                name=cause.name,
+                z=float(scores.z[best]),
+                p_adjusted=float(p_values[best]),
+                estimate=_finite(estimate),
+                std=_finite(std),
+                unit=cause.unit,
+                minimal_detectable=_finite_or_none(float(smallest[best])),
+                surviving_fraction=float(scores.surviving[best]),
+                nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
+                twin_cosine=float(closeness[index]),
+                delta_chi2=found.gain if found else None,
+                heldout_excess_removed=heldout if accepted and accepted.causes == (index,) else None,
+                stiffness_shift=_finite(shift),
+            )
+        )
+    return sorted(rows, key=lambda row: -abs(row.z))
+
+
+def _unseen_row(name: str, unit: str) -> CauseRow:
+    return CauseRow(name=name, z=0.0, p_adjusted=1.0, estimate=0.0, std=0.0, unit=unit, surviving_fraction=0.0)
+
+
+def _seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
+    """Rows of causes that a plausible size would have shown, the clearest first."""
+    plausible = {cause.name: cause.plausible(bench.facts) for cause in bench.suspicion.causes}
+    seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible[r.name]]
+    return sorted(seen, key=lambda row: (row.minimal_detectable or 0.0) / plausible[row.name])
+
+
+def blind_spots(bench: Workbench, rows: list[CauseRow], settings: DiagnosisSettings) -> list[BlindSpot]:
+    """Causes that cannot be seen at a plausible size but would move f_EI, the most harmful first."""
+    suspicion = bench.suspicion
+    seen = {row.name for row in _seen_at_plausible_size(bench, rows)}
+    spots = []
+    for index, cause in enumerate(suspicion.causes):
+        own = suspicion.of(index)
+        if cause.name in seen or own.size == 0 or cause.name == "nonlinear_stiffness":
+            continue
+        sizes = np.full(own.size, cause.plausible(bench.facts))
+        bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], sizes)
+        if bias.max() >= settings.harm:
+            spots.append(
+                BlindSpot(
+                    name=cause.name, stiffness_bias_at_plausible_size=float(bias.max()), settled_by=cause.settled_by
+                )
+            )
+    return sorted(spots, key=lambda spot: -spot.stiffness_bias_at_plausible_size)
+
+
+def _next(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, verdict: str) -> NextExperiment | None:
+    """What separates the set of names; without one, what settles the worst blind spot."""
+    if conclusion.accepted is not None and conclusion.members > 1:
+        rivals = conclusion.singles[1 : conclusion.members]
+        return next_experiment(bench, conclusion.singles[0], rivals, settings)
+    if verdict == "unexplained":
+        return NextExperiment(what="repeat the test with the cable turned end for end, and unload", separates=[])
+    if not bench.facts.returns:
+        return NextExperiment(
+            what="unload in the same steps, with photos", separates=["bearing_friction", "hysteresis", "plastic_set"]
+        )
+    return NextExperiment(what="hang dead weights on the load cell", separates=["force_gain"])
+
+
+def confusable(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> dict[str, dict[str, float]]:
+    """Cosines among the loudest causes and whatever is in the set of names."""
+    suspicion = bench.suspicion
+    closeness = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
+    loud = np.zeros(len(suspicion.causes))
+    np.maximum.at(loud, suspicion.owner, suspicion.statistic)
+    chosen = [e.causes[0] for e in conclusion.singles[: conclusion.members]]
+    chosen += [int(k) for k in np.argsort(-loud) if int(k) not in chosen and closeness[k, k] > 0.0]
+    chosen = chosen[: settings.twins_shown]
+    names = [suspicion.causes[k].name for k in chosen]
+    return {
+        name: {other: float(closeness[k, j]) for other, j in zip(names, chosen, strict=True) if j != k}
+        for name, k in zip(names, chosen, strict=True)
+    }
+
+
+def describe_leftover(bench: Workbench, conclusion: Conclusion) -> dict[str, Any]:
+    """Where what is left sits, in words and numbers."""
+    left = conclusion.left
+    field = left.field[: len(bench.observation.rows.kind)]
+    found = smooth_share(bench.observation, field)
+    step = bench.test.steps[found["step_index"]]
+    kind = max(found["share"], key=found["share"].get)
+    place = "" if found["place"] is None else f", most at s = {1e3 * found['place']:.0f} mm"
+    where = {"force": "in the forces", "chord": "in the chords", "shape": "in the shapes"}[kind]
+    message = (
+        f"what is left sits {where}, strongest at step {step.step} ({step.branch}){place if kind == 'shape' else ''}"
+    )
+    return {
+        "message": message,
+        "p_value": left.p_value,
+        "chi2": left.chi2,
+        "fields": left.size,
+        "excess": left.excess,
+        "noise": "as stated"
+        if bench.observation.photo_noise.factor == 1.0
+        else f"sections scatter {bench.observation.photo_noise.factor:.2f} times as much as stated",
+        **{key: value for key, value in found.items() if key != "step_index"},
+        "step": step.step,
+        "spoken": spoken(kind),
+    }
+
+
+def _valid(gain: GainPart | None) -> GainPart | None:
+    return gain if gain is not None and np.isfinite(gain.heldout_excess_removed) else None
+
+
+def _finite(value: float) -> float:
+    return value if np.isfinite(value) else 0.0
+
+
+def _finite_or_none(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,127 @@
+"""Running a model: from cable, rig and observers to a prediction, and to how it moves with the base parameters.
+
+The mounted cable lies as it was made; every other step is bowed to the side the photos show (``up``), also where a fit
+tries a pre-curvature of the other sign. Derivatives with respect to control points, K0 and length come from
+`rod.sensitivity`; they are carried through the observers by a short difference, which costs no simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.prediction import Facts, Model, Prediction
+from rod.bending_test import simulate
+from rod.equilibrium import Branch, Equilibrium
+from rod.sensitivity import Derivatives, derivatives
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A model that was run.
+
+    Attributes
+    ----------
+    model : Model
+    steps : tuple of Equilibrium
+    bare : Prediction or None
+        Before any observer; None if a step has no equilibrium.
+    prediction : Prediction or None
+        As observed.
+    advice : str
+        Of the first step that failed; empty if none.
+    """
+
+    model: Model
+    steps: tuple[Equilibrium, ...]
+    bare: Prediction | None
+    prediction: Prediction | None
+    advice: str = ""
+
+
+def run(model: Model, facts: Facts, *, near: Run | None = None) -> Run:
+    """Simulate all steps and observe them.
+
+    Parameters
+    ----------
+    model : Model
+    facts : Facts
+    near : Run or None
+        A run of a similar model: warm start, and no new simulation at all where only the observers differ.
+    """
+    if near is not None and near.model.bending is model.bending and near.model.shift is model.shift:
+        steps, bare = near.steps, near.bare
+    else:
+        steps, bare = _simulated(model, facts, near), None
+    failed = next((step for step in steps if not step.good), None)
+    if failed is not None:
+        return Run(model, steps, None, None, failed.outcome.advice)
+    bare = bare or _bare(steps, facts)
+    return Run(model, steps, bare, observed(bare, model, facts))
+
+
+def observed(bare: Prediction, model: Model, facts: Facts) -> Prediction:
+    """The prediction as load cell and camera show it."""
+    for observer in model.observers:
+        bare = observer(bare, facts)
+    return bare
+
+
+def _bare(steps: tuple[Equilibrium, ...], facts: Facts) -> Prediction:
+    force = np.array([step.force for step in steps])
+    return Prediction(
+        force=force,
+        samples=tuple(np.full(len(times), P) for times, P in zip(facts.hold_times, force, strict=True)),
+        chord=np.array([step.chord for step in steps]),
+        s=steps[0].s,
+        x=np.array([step.x for step in steps]),
+        y=np.array([step.y for step in steps]),
+        theta=np.array([step.theta for step in steps]),
+    )
+
+
+def _groups(facts: Facts) -> list[tuple[list[int], Branch]]:
+    """Indices of the mounted steps and of the pushed ones, and the side to which each group is bowed."""
+    mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
+    pushed = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
+    groups: list[tuple[list[int], Branch]] = [(mounted, "natural"), (pushed, "up")]
+    return [group for group in groups if group[0]]
+
+
+def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
+    displacement = facts.displacement + model.shift
+    usable = near is not None and len(near.steps[0].angles) == model.bending.rod.edges.size
+    found: dict[int, Equilibrium] = {}
+    for index, side in _groups(facts):
+        starts = [near.steps[i] if near.steps[i].good else None for i in index] if near and usable else None
+        done = simulate(model.bending, displacement[index], branch=side, starts=starts)
+        found.update(zip(index, done, strict=True))
+    return tuple(found[i] for i in range(len(facts.branch)))
+
+
+def base_derivatives(here: Run, facts: Facts, names: tuple[str, ...]) -> tuple[Derivatives, ...]:
+    """Derivatives of every step of a run with respect to parameters of `rod.parameters`."""
+    found: dict[int, Derivatives] = {}
+    for index, _ in _groups(facts):
+        steps = tuple(here.steps[i] for i in index)
+        found.update(zip(index, derivatives(here.model.bending, steps, names), strict=True))
+    return tuple(found[i] for i in range(len(facts.branch)))
+
+
+def moved(bare: Prediction, by: tuple[Derivatives, ...], column: int, amount: float) -> Prediction:
+    """The bare prediction moved along a column of the derivatives; vertices may move along the cable."""
+    change = np.array([d.force[column] for d in by]) * amount
+    return replace(
+        bare,
+        force=bare.force + change,
+        samples=tuple(samples + change[i] for i, samples in enumerate(bare.samples)),
+        chord=bare.chord + amount * np.array([d.chord[column] for d in by]),
+        s=bare.s + amount * by[0].s[:, column],
+        x=bare.x + amount * np.array([d.x[:, column] for d in by]),
+        y=bare.y + amount * np.array([d.y[:, column] for d in by]),
+        theta=bare.theta + amount * np.array([d.theta[:, column] for d in by]),
+    )

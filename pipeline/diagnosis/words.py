@@ -1,0 +1,112 @@
+"""The diagnosis in plain words: headline, name of a cause, and the page of `cablebend explain`."""
+
+from __future__ import annotations
+
+from pipeline.diagnosis.causes import CATALOGUE, Cause
+from pipeline.diagnosis.verdict import Verdict
+from pipeline.rounding import plain, rounded
+
+
+def spoken(name: str) -> str:
+    """Name of a cause as one says it."""
+    return name.replace("_", " ")
+
+
+def listed(names: list[str], *, last: str = "or") -> str:
+    """Names in a sentence."""
+    said = [spoken(name) for name in names]
+    return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} {last} {said[-1]}"
+
+
+def headline(
+    verdict: Verdict,
+    *,
+    names: list[list[str]],
+    amounts: list[tuple[float, float, str]],
+    explained: float | None,
+    change: float | None,
+    weakest: str,
+    leftover: str,
+) -> str:
+    """One sentence.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    names : list of classes
+        One class of names for each cause found.
+    amounts : list of (estimate, std, unit)
+    explained : share or None
+        Of the held-out excess misfit.
+    change : relative or None
+        Root mean square change of f_EI.
+    weakest : str
+        What could have been seen, for ``adequate`` and ``underpowered``.
+    leftover : str
+        Where the unexplained misfit sits.
+    """
+    if verdict == "adequate":
+        return f"Nothing beyond noise: the simulation explains forces and photos; {weakest}."
+    if verdict == "underpowered":
+        return f"Nothing was found, but these data could hardly have shown it; {weakest}."
+    if verdict == "unexplained":
+        return f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}."
+    sizes = [f"{rounded(value, std)} {unit}".rstrip(" -") for value, std, unit in amounts]
+    gain = "" if explained is None else f"; on steps it had not seen it removes {100.0 * explained:.0f} % of the misfit"
+    shift = "" if change is None else f", and f_EI changes by {100.0 * change:.2g} % rms"
+    if verdict == "two_causes":
+        both = " and ".join(f"{listed(group)} ({size})" for group, size in zip(names, sizes, strict=True))
+        return f"Two causes act together: {both}{gain}{shift}."
+    if verdict == "class":
+        return (
+            f"One cause that these data cannot name for certain: {listed(names[0])} (as {spoken(names[0][0])}: "
+            f"{sizes[0]}){gain}{shift}."
+        )
+    return f"The simulation lacks {listed(names[0])} ({sizes[0]}){gain}{shift}."
+
+
+def could_have_been_seen(seen: list[tuple[str, float, str]], total: int) -> str:
+    """What the data could have shown: the clearest three of the causes detectable at a plausible size."""
+    if not seen:
+        return f"none of {total} causes would have shown at a plausible size"
+    clearest = ", ".join(f"{spoken(name)} from {plain(size, 2)} {unit}".rstrip(" -") for name, size, unit in seen[:3])
+    return f"{len(seen)} of {total} causes would have shown at a plausible size, such as {clearest}"
+
+
+def cause_by_name(name: str) -> Cause:
+    """The class of a cause.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name; the message lists the known ones.
+    """
+    for cause in CATALOGUE:
+        if cause.name == name:
+            return cause
+    raise ValueError(f"unknown cause {name!r}; known are {', '.join(cause.name for cause in CATALOGUE)}")
+
+
+def explain(name: str) -> str:
+    """Page on one cause: what it is, what shows it, what it is confused with, what to do at the rig."""
+    if name == "pre_curvature":
+        return (
+            "pre_curvature (K0, 1/m)\n\nThe cable is uniformly bent at rest. K0 is part of the base model and fitted on every "
+            "specimen;\nonly `rediscover`, which starts from a straight cable of constant stiffness, has to find it.\n"
+        )
+    cause = cause_by_name(name)
+    sign = "not negative" if cause.sign else "either sign"
+    lines = [
+        f"{cause.name} ({cause.unit}, {sign})",
+        "",
+        cause.summary,
+        "",
+        f"Amount:        {cause.sign_means}",
+        f"Sits in:       the {cause.seat}",
+        f"Shows with:    {cause.needs}",
+        f"Told apart by: {cause.apart}",
+        f"At the rig:    {cause.remedy}",
+        f"Settled by:    {cause.settled_by}",
+        "",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,189 @@
+"""From a measured test to a fitted base model with all suspects scored: what every later step works on.
+
+Strategy: fit the base model to the data as stated; calibrate the noise of the photos by what is faster along the cable
+than any misfit; fit again; if another control point of the characteristic removes more than any cause does, take it
+(a law the spline cannot follow is no cause); then score the whole catalogue and simulate the family of scores.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.base import Base, start
+from pipeline.diagnosis.causes import CATALOGUE, Cause
+from pipeline.diagnosis.faults import Faults
+from pipeline.diagnosis.fit import Extension, Fit, fit
+from pipeline.diagnosis.noise import calibrate_photo_noise
+from pipeline.diagnosis.observation import Observation, normal_distance, observe
+from pipeline.diagnosis.prediction import Facts, facts_of
+from pipeline.diagnosis.score import null_maxima, threshold
+from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredTest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Workbench:
+    """Base model fitted and all causes scored.
+
+    Attributes
+    ----------
+    test : MeasuredTest
+    facts : Facts
+    observation : Observation
+    base : Fit
+    suspicion : Suspicion
+    maxima : (draws,)
+        Sorted null distribution of the largest statistic.
+    limit : float
+        Family-wise threshold.
+    """
+
+    test: MeasuredTest
+    facts: Facts
+    observation: Observation
+    base: Fit
+    suspicion: Suspicion
+    maxima: Array
+    limit: float
+
+    @property
+    def largest(self) -> float:
+        """Largest admissible statistic."""
+        return float(self.suspicion.statistic.max(initial=0.0))
+
+
+def prepare(
+    faults: Faults,
+    settings: DiagnosisSettings,
+    *,
+    knots: int,
+    causes: Sequence[Cause] = CATALOGUE,
+    straight: bool = False,
+    refine: bool = True,
+) -> Workbench | str:
+    """Fit the base model and score all causes.
+
+    Parameters
+    ----------
+    faults : Faults
+        The test and what of it is not to be used.
+    settings : DiagnosisSettings
+    knots : int
+        Control points of the base characteristic.
+    causes : sequence of Cause
+    straight : bool
+        Hold K0 at zero.
+    refine : bool
+        Whether control points may be added.
+
+    Returns
+    -------
+    Workbench or str
+        The advice of the equilibrium that failed, where no base model can be simulated.
+    """
+    test = faults.test
+    facts = facts_of(test)
+    observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
+    base, vector = start(test, facts, knots=knots, elements=settings.grid, straight=straight)
+    fitted = _robust_fit(observation, base, facts, vector, settings)
+    if fitted.run.prediction is None:
+        return fitted.advice
+    if observation.photos:
+        noise = calibrate_photo_noise(
+            [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in observation.photos],
+            [photo.sections for photo in observation.photos],
+            [photo.basis for photo in observation.photos],
+            stretches=settings.noise_stretches,
+            prior_weight=settings.noise_prior_weight,
+        )
+        observation = observe(
+            test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
+        )
+        fitted = _fit(observation, fitted.extension, fitted.vector, settings, near=fitted)
+    suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
+    while refine and len(base.knots) < settings.knots_most and _law_is_too_coarse(suspicion, settings):
+        base, vector = _refined(fitted)
+        fitted = _fit(observation, Extension(base, facts), vector, settings, near=fitted)
+        suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
+    return scored(test, observation, fitted, suspicion, settings)
+
+
+def scored(
+    test: MeasuredTest, observation: Observation, fitted: Fit, suspicion: Suspicion, settings: DiagnosisSettings
+) -> Workbench:
+    """The workbench of a fitted model: null distribution and threshold of its family of scores."""
+    maxima = null_maxima(
+        suspicion.scores.unit,
+        suspicion.sign,
+        draws=settings.null_draws,
+        rng=np.random.default_rng(settings.seed),
+        estimated=np.r_[
+            observation.rows.kind == 0, np.zeros(len(fitted.residual) - len(observation.rows.kind), dtype=bool)
+        ],
+        freedom=observation.force_freedom,
+    )
+    limit = threshold(maxima, settings.false_alarm)
+    return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
+
+
+def _fit(
+    observation: Observation, extension: Extension, vector: Array, settings: DiagnosisSettings, *, near: Fit
+) -> Fit:
+    return fit(
+        observation,
+        extension,
+        vector,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=near.run,
+    )
+
+
+def _robust_fit(observation: Observation, base: Base, facts: Facts, vector: Array, settings: DiagnosisSettings) -> Fit:
+    """The best of several starts: a base model that is wrong has false minima, and one start may have no equilibrium."""
+    best: Fit | None = None
+    count = len(base.knots)
+    for stiffness, bend in ((1.0, 0.0), (1.0, 0.3), (0.5, 0.0), (2.0, -0.3)):
+        trial = vector.copy()
+        trial[:count] *= stiffness
+        if (index := base.pre_curvature_index) is not None:
+            trial[index] += bend * facts.curvature_scale
+        found = fit(
+            observation,
+            Extension(base, facts),
+            trial,
+            iterations=2 * settings.iterations,
+            tolerance=settings.tolerance,
+        )
+        good = found.run.prediction is not None
+        if best is None or (good and (best.run.prediction is None or found.chi2 < best.chi2)):
+            best = found
+        if good and found.converged and stiffness == 1.0:
+            break
+    assert best is not None
+    return best
+
+
+def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> bool:
+    own = [k for k, term in enumerate(suspicion.terms) if term.cause.name == "nonlinear_stiffness"]
+    if not own:
+        return False
+    gain = float(suspicion.statistic[own].max()) ** 2
+    return gain > settings.knot_gain and gain >= float(suspicion.statistic.max()) ** 2
+
+
+def _refined(fitted: Fit) -> tuple[Base, Array]:
+    """The base model with one more control point, equally spaced, and its vector along the spline so far."""
+    base = fitted.extension.base
+    law = base.characteristic(fitted.vector)
+    knots = np.linspace(0.0, float(base.knots[-1]), len(base.knots) + 1)
+    ordinates = np.maximum(law.f(knots), 0.05 * float(np.max(law.ordinates))) / base.stiffness
+    finer = Base(knots, base.stiffness, base.length, base.scale_std, base.length_std, base.elements, base.straight)
+    return finer, np.r_[ordinates, fitted.vector[len(base.knots) :]]
