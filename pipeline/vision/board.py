@@ -160,6 +160,8 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | Non
         if ids is not None and (best is None or len(ids) > len(best[0])):
             points = pattern.getChessboardCorners()[np.ravel(ids), :2]
             best = np.asarray(points, np.float64), np.asarray(corners, np.float64).reshape(-1, 2)
+        if best is not None and len(best[0]) > 0.5 * board.columns * board.rows:
+            break
     return best
 
 

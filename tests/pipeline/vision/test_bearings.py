@@ -1,0 +1,151 @@
+"""Bearing axes: covers of every look, free ends, pixels of the user. Truth: the rendered scene's own axes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.bearings import BearingHints, find_bearings, left_first
+from pipeline.vision.covers import find_cover
+from pipeline.vision.ends import CableEnd
+from pipeline.vision.photo import Photo
+from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
+from pipeline.vision.sheath import Sheath
+from pipeline.vision.strand import Curve
+
+STAGE = BearingSettings()
+SCALE = 9_000.0
+CURVE = Curve.from_curvature(9.0, 0.035)
+CAMERA = Camera(540, 300, SCALE, look_at_m=(0.017, 0.0))
+
+
+def scene(**changes: object) -> Scene:
+    cover = Cover(diameter_m=0.012)
+    base = Scene(
+        Strand(CURVE, 0.0046), CAMERA, (cover, cover), ground=Ground(colour=(0.75,) * 3), sensor=Sensor(noise=0.01)
+    )
+    return replace(base, **changes)
+
+
+def photo_of(picture: Picture, bits: int = 8) -> Photo:
+    pixels = picture.pixels
+    return Photo("a", pixels if pixels.ndim == 2 else np.ascontiguousarray(pixels[..., 2::-1]), bits)
+
+
+def rough_end(picture: Picture, side: int, radius: float, off: float = 0.0) -> CableEnd:
+    """Where the cable meets the rim, ``off`` radii farther out; its direction half a radius before."""
+    path = np.column_stack([picture.u_px, picture.v_px])[:: -1 if side == 0 else 1]
+    distance = np.hypot(*(path - path[-1]).T)
+    rim, before = path[np.argmin(np.abs(distance - radius))], path[np.argmin(np.abs(distance - 1.5 * radius))]
+    outward = (rim - before) / np.hypot(*(rim - before))
+    return CableEnd(rim + off * radius * outward, outward)
+
+
+def centre_errors(scene: Scene, *, off: float = 0.0, radius_error: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (px) of both centres and their standard deviations."""
+    picture = render(scene)
+    errors, stds = [], []
+    for side, true in enumerate((picture.left_px, picture.right_px)):
+        cover = scene.covers[side]
+        assert cover is not None
+        radius = 0.5 * cover.diameter_m * SCALE
+        circle = find_cover(
+            photo_of(picture, scene.sensor.bit_depth),
+            rough_end(picture, side, radius, off),
+            radius * (1 + radius_error),
+            scene.cable.diameter_m * SCALE,
+            STAGE,
+        )
+        assert circle is not None
+        assert circle.radius == pytest.approx(radius, rel=0.02)
+        errors.append(np.subtract(circle.center, true))
+        stds.append(circle.std)
+    return np.array(errors), np.array(stds)
+
+
+GREY = (0.75,) * 3
+LOOKS = {
+    "bench": {},
+    "brighter than ground": {"covers": (Cover(colour=(0.95,) * 3),) * 2},
+    "black, no dot": {"covers": (Cover(colour=(0.08,) * 3, dot_m=0.0),) * 2},
+    "colour of the cable": {"covers": (Cover(colour=(0.17,) * 3, dot_m=0.0),) * 2},
+    "hardly off the ground": {"covers": (Cover(colour=(0.71,) * 3, dot_m=0.0, sheen=0.0),) * 2},
+    "sheen into the ground's grey": {"covers": (Cover(colour=(0.66,) * 3, sheen=0.4),) * 2},
+    "dark rim and slot": {"covers": (Cover(rim=0.4, slot=True),) * 2},
+    "hardly wider than the cable": {"covers": (Cover(diameter_m=0.007),) * 2},
+    "brushed ground": {"ground": Ground("brushed", GREY, 0.04)},
+    "wood": {"ground": Ground("wood", GREY, 0.05)},
+    "squared paper": {"ground": Ground("squared", GREY, 0.2)},
+    "shadow on one side": {"light": Light(elevation_rad=0.95, ambient=0.45, shadow=0.35)},
+    "noise of 5 %": {"sensor": Sensor(noise=0.05)},
+    "colour, same luminance": {
+        "covers": (Cover(colour=(0.95, 0.66, 0.75)),) * 2,
+        "sensor": Sensor(mode="colour", noise=0.01),
+    },
+    "12 bits in 16": {"sensor": Sensor(bit_depth=12, noise=0.01)},
+    "white cable on black": {"cable": Strand(CURVE, 0.0046, Sheath((0.9,) * 3)), "ground": Ground(colour=(0.1,) * 3)},
+}
+
+
+@pytest.mark.parametrize("look", LOOKS, ids=str)
+def test_centre_of_any_cover_is_found_within_its_uncertainty(look: str) -> None:
+    errors, stds = centre_errors(scene(**LOOKS[look]))
+    assert np.all(np.abs(errors) < 5.0 * stds[:, None])
+    # A tenth of a pixel is 0.01 mm; where a shadow melts into the rim or little of it shows, the std says so.
+    assert np.all(stds < (0.3 if look in ("hardly off the ground", "noise of 5 %", "wood", "squared paper") else 0.1))
+
+
+@pytest.mark.parametrize(("off", "radius_error"), [(-0.6, 0.0), (0.7, 0.0), (1.8, 0.0), (0.0, 0.05), (0.0, -0.05)])
+def test_centre_does_not_depend_on_the_first_guess(off: float, radius_error: float) -> None:
+    first, stds = centre_errors(scene())
+    again, _ = centre_errors(scene(), off=off, radius_error=radius_error)
+    assert np.abs(again - first).max() < 0.5 * stds.max()
+
+
+def test_standard_deviation_of_the_centre_is_true() -> None:
+    ground = Ground("brushed", GREY, 0.03)
+    scores = []
+    for seed in range(14):
+        cover = Cover(colour=((0.35 + 0.04 * seed) % 0.7,) * 3)
+        errors, stds = centre_errors(scene(seed=seed, ground=ground, covers=(cover, cover), sensor=Sensor(noise=0.03)))
+        scores.extend((errors / stds[:, None]).ravel())
+    # 56 scores: a true one-sigma gives 0.85 to 1.15 rms (95 %); the floor for light makes it smaller here.
+    assert 0.4 < np.sqrt(np.mean(np.square(scores))) < 1.3
+
+
+def test_cover_of_the_grounds_own_look_is_found_by_its_dot() -> None:
+    cover = Cover(colour=GREY, sheen=0.0, dot_m=0.0025)
+    picture = render(scene(covers=(cover, cover)))
+    radius = 0.006 * SCALE
+    for side, true in enumerate((picture.left_px, picture.right_px)):
+        circle = find_cover(photo_of(picture), rough_end(picture, side, radius), radius, 0.0046 * SCALE, STAGE)
+        assert circle is not None
+        assert np.hypot(*np.subtract(circle.center, true)) < 5.0 * circle.std
+        assert circle.radius == radius
+
+
+def test_no_cover_is_no_circle() -> None:
+    picture = render(scene(covers=(None, None), ground=Ground("brushed", GREY, 0.05)))
+    radius = 0.006 * SCALE
+    ends = tuple(rough_end(picture, side, radius, off=1.0) for side in (0, 1))
+    assert find_bearings(photo_of(picture), ends, 41.0, BearingHints(cover_px=2 * radius), STAGE) == (None, None)
+
+
+def test_given_axes_are_assigned_to_the_nearer_ends() -> None:
+    picture = render(scene(covers=(None, None)))
+    ends = tuple(rough_end(picture, side, 5.0) for side in (0, 1))
+    for given in ((picture.left_px, picture.right_px), (picture.right_px, picture.left_px)):
+        left, right = find_bearings(photo_of(picture), ends, 41.0, BearingHints(given_px=given), STAGE)
+        assert left is not None and right is not None
+        assert (left.center_px, right.center_px) == (picture.left_px, picture.right_px)
+        assert (left.kind, left.std_px) == ("given", STAGE.given_std_px)
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "first_is_left"),
+    [(0, True), (79, True), (85, True), (95, True), (101, False), (180, False), (-85, False), (-95, False)],
+)
+def test_left_is_by_u_and_upper_where_the_chord_is_upright(angle_deg: float, first_is_left: bool) -> None:
+    angle = np.radians(angle_deg)
+    assert left_first(np.zeros(2), np.array([np.cos(angle), np.sin(angle)]), STAGE) == first_is_left
