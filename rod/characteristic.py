@@ -31,7 +31,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+
+from rod.spline import Pieces, evaluate, pieces, slope
 
 Array = NDArray[np.float64]
 Reading = Literal["tangent", "secant"]
@@ -65,24 +66,6 @@ class MomentCurve(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class _Pieces:
-    """Piecewise polynomials of f and its first two primitives, and of the cardinal splines, over all segments.
-
-    ``breaks`` are the q spline knots; segment 0 lies below the first, segment q above the last. Coefficients are in
-    ``u - origin[segment]``, rising powers: f (4,), primitive F (5,), second primitive G (6,); with F = G = 0 at the
-    first break. ``cardinal`` holds the same for the unit ordinates: shape (6, q + 1, p).
-    """
-
-    breaks: Array
-    origin: Array
-    f: Array
-    F: Array
-    G: Array
-    cardinal_f: Array
-    cardinal_primitive: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Characteristic:
     """Natural cubic spline f through control points, and the moment curve that it means.
 
@@ -106,7 +89,7 @@ class Characteristic:
     reading: Reading = "tangent"
     even: bool = False
     abscissa: Abscissa = "curvature"
-    _pieces: _Pieces = field(init=False, repr=False)
+    _pieces: Pieces = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         knots, ordinates = np.atleast_1d(self.knots).astype(float), np.atleast_1d(self.ordinates).astype(float)
@@ -122,7 +105,7 @@ class Characteristic:
             raise ValueError(f"unknown reading {self.reading!r} or abscissa {self.abscissa!r}")
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "ordinates", ordinates)
-        object.__setattr__(self, "_pieces", _pieces(knots, ordinates, self.even))
+        object.__setattr__(self, "_pieces", pieces(knots, ordinates, self.even))
 
     # Constructors -----------------------------------------------------------------------------------------------------
 
@@ -222,7 +205,7 @@ class Characteristic:
 
     def f(self, u: ArrayLike) -> Array:
         """The spline itself at the abscissa ``u`` (n,) 1/m, N m^2, in its own reading."""
-        return _evaluate(self._pieces.f, self._pieces, np.asarray(u, float))
+        return evaluate(self._pieces.f, self._pieces, np.asarray(u, float))
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m, shape of ``K`` broadcast with ``K0``."""
@@ -230,14 +213,14 @@ class Characteristic:
         if self.reading == "secant":
             return np.asarray(self.f(u) * D)
         F = self._pieces.F
-        return np.asarray(_evaluate(F, self._pieces, u) - _evaluate(F, self._pieces, u0))
+        return np.asarray(evaluate(F, self._pieces, u) - evaluate(F, self._pieces, u0))
 
     def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Tangent reading dm/dK, N m^2."""
         u, _, D = self._arguments(K, K0)
         if self.reading == "tangent":
             return self.f(u) + np.zeros_like(D)
-        return np.asarray(self.f(u) + _slope(self._pieces, u) * D)
+        return np.asarray(self.f(u) + slope(self._pieces, u) * D)
 
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
@@ -255,10 +238,10 @@ class Characteristic:
         """Energy per length int_{K0}^{K} m dk, N: Eq. (5) with the factor 1/2 taken out."""
         u, u0, D = self._arguments(K, K0)
         p = self._pieces
-        rise = _evaluate(p.G, p, u) - _evaluate(p.G, p, u0)
+        rise = evaluate(p.G, p, u) - evaluate(p.G, p, u0)
         if self.reading == "secant":
-            return np.asarray(_evaluate(p.F, p, u) * D - rise)
-        return np.asarray(rise - _evaluate(p.F, p, u0) * D)
+            return np.asarray(evaluate(p.F, p, u) * D - rise)
+        return np.asarray(rise - evaluate(p.F, p, u0) * D)
 
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """`moment` and `tangent` as one function of K (n,) for fixed pre-curvature (n,) or (1,): Newton's inner call.
@@ -267,7 +250,7 @@ class Characteristic:
         """
         p, excess, secant = self._pieces, self.abscissa == "excess", self.reading == "secant"
         table = np.vstack([p.f, p.F])
-        rest = _evaluate(p.F, p, np.zeros(1) if excess else K0)
+        rest = evaluate(p.F, p, np.zeros(1) if excess else K0)
 
         def moment_and_tangent(K: Array) -> tuple[Array, Array]:
             D = K - K0
@@ -287,18 +270,18 @@ class Characteristic:
         u, u0, D = self._arguments(K, K0)
         p = self._pieces
         if self.reading == "secant":
-            return np.asarray(_evaluate(p.cardinal_f, p, u) * np.broadcast_to(D, np.shape(D))[..., None])
-        rise = _evaluate(p.cardinal_primitive, p, u) - _evaluate(p.cardinal_primitive, p, u0)
+            return np.asarray(evaluate(p.cardinal_f, p, u) * np.broadcast_to(D, np.shape(D))[..., None])
+        rise = evaluate(p.cardinal_primitive, p, u) - evaluate(p.cardinal_primitive, p, u0)
         return np.asarray(np.broadcast_to(rise, (*np.shape(D), self.knots.size)))
 
     def tangent_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the tangent dm/dK with respect to the control points, (n, p), dimensionless."""
         u, _, D = self._arguments(K, K0)
         p = self._pieces
-        value = np.broadcast_to(_evaluate(p.cardinal_f, p, u), (*np.shape(D), self.knots.size))
+        value = np.broadcast_to(evaluate(p.cardinal_f, p, u), (*np.shape(D), self.knots.size))
         if self.reading == "tangent":
             return value.copy()
-        return np.asarray(value + _slope(p, u, cardinal=True) * D[..., None])
+        return np.asarray(value + slope(p, u, cardinal=True) * D[..., None])
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2 (negative for positive stiffness)."""
@@ -314,66 +297,3 @@ class Characteristic:
         if self.abscissa == "excess":
             return D, np.zeros(()), D
         return K_, K0_, D
-
-
-def _pieces(knots: Array, ordinates: Array, even: bool) -> _Pieces:
-    """Coefficients of f, F, G and of the cardinal splines on every segment, the linear ends included."""
-    p = knots.size
-    at, pick = knots, np.eye(p)
-    if even:
-        inner = knots > 0.0
-        at = np.concatenate([-knots[inner][::-1], knots])
-        pick = np.vstack([pick[inner][::-1], pick])
-    q = at.size
-    f = np.zeros((4, q + 1, p))
-    if q == 1:
-        f[0] = pick
-    elif q == 2:
-        slope = (pick[1] - pick[0]) / (at[1] - at[0])
-        f[0], f[1] = pick[[0, 0, 1]], slope
-    else:
-        spline = CubicSpline(at, pick, bc_type="natural")
-        f[:, 1:-1] = spline.c[::-1]
-        f[0, 0], f[0, -1] = pick[0], pick[-1]
-        f[1, 0], f[1, -1] = spline(at[0], 1), spline(at[-1], 1)
-    origin = at[np.r_[0, np.arange(q)]]
-    F = np.zeros((5, q + 1, p))
-    F[1:] = f / np.arange(1, 5)[:, None, None]
-    G = np.zeros((6, q + 1, p))
-    # Constants of integration: F = G = 0 at the first break, both continuous through all breaks.
-    for j in range(2, q + 1):
-        t = origin[j] - origin[j - 1]
-        F[0, j] = _horner(F[:, j - 1], t)
-    G[1:] = F / np.arange(1, 6)[:, None, None]
-    for j in range(2, q + 1):
-        t = origin[j] - origin[j - 1]
-        G[0, j] = _horner(G[:, j - 1], t)
-    return _Pieces(at, origin, f @ ordinates, F @ ordinates, G @ ordinates, f, F)
-
-
-def _horner(coefficients: Array, t: float) -> Array:
-    value = coefficients[-1]
-    for c in coefficients[-2::-1]:
-        value = value * t + c
-    return np.asarray(value)
-
-
-def _evaluate(coefficients: Array, pieces: _Pieces, u: Array) -> Array:
-    """Piecewise polynomial at ``u``; with cardinal coefficients (k, q + 1, p) the result has a last axis p."""
-    segment = pieces.breaks.searchsorted(u)
-    t = np.asarray(u - pieces.origin.take(segment))
-    table = coefficients.take(segment, axis=1)
-    if coefficients.ndim == 3:
-        t = t[..., None]
-    value = table[-1]
-    for row in table[-2::-1]:
-        value = value * t
-        value += row
-    return np.asarray(value)
-
-
-def _slope(pieces: _Pieces, u: Array, cardinal: bool = False) -> Array:
-    """Derivative f'(u), N m^3, or that of the cardinal splines (n, p)."""
-    c = pieces.cardinal_f if cardinal else pieces.f
-    weights = np.arange(1, 4).reshape((3,) + (1,) * (c.ndim - 1))
-    return _evaluate(c[1:] * weights, pieces, u)

@@ -1,6 +1,7 @@
 """The discrete rod on ideal bearings against exact answers, its order, its symmetries and its scale law."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def test_constant_stiffness_to_1e_4_with_100_elements_and_second_order(
         step = simulate(replace(test, elements=elements), chords=[0.2 - shortening])[0]
         errors.append(step.force / force - 1.0)
     assert abs(errors[0]) < 1e-4
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in pairwise(errors):
         assert coarse / fine == pytest.approx(4.0, abs=0.02)
 
 

@@ -1,0 +1,116 @@
+"""The plan of the house, held: which way imports run, where guests live, how long a file may get."""
+
+import ast
+import itertools
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LONGEST_FILE = 400
+
+# From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
+ROD = [
+    ("measurement", "spline"),
+    ("characteristic",),
+    ("laws", "elastica", "section", "support"),
+    ("discretisation",),
+    ("energy", "reduction"),
+    ("branch",),
+    ("newton",),
+    ("equilibrium",),
+    ("iteration", "bending_test"),
+    ("parameters",),
+    ("sensitivity",),
+    ("information",),
+    ("compliance", "whitening", "knots", "options"),
+    ("moment_points", "photo_residual"),
+    ("moment_regression", "fit_model"),
+    ("evaluation",),
+    ("smoothness",),
+    ("control_points", "estimate"),
+    ("inverse", "balance", "paper_fit"),
+]
+PIPELINE = [
+    ("errors",),
+    ("rounding",),
+    ("records",),
+    ("settings",),
+    ("result",),
+    ("intake",),
+    ("vision",),
+    ("simulate",),
+    ("identify",),
+    ("diagnosis",),
+    ("report",),
+    ("run",),
+    ("batch",),
+    ("cli",),
+]
+GUESTS = {
+    "cv2": {"vision"},
+    "skimage": {"vision"},
+    "PIL": {"vision"},
+    "pandas": {"intake", "report"},
+    "matplotlib": {"report"},
+    "jinja2": {"report"},
+    "dask": {"batch"},
+    "distributed": {"batch"},
+    "click": {"cli"},
+    "rich": {"cli"},
+    "pydantic": {"settings", "result", "run", "batch", "cli"},
+}
+SOURCES = sorted(itertools.chain((ROOT / "rod").rglob("*.py"), (ROOT / "pipeline").rglob("*.py")))
+
+
+def imports(path: Path) -> set[str]:
+    """Full names of everything a file imports, wherever in the file the import stands."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports hide where they go"
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return found
+
+
+def room(path: Path) -> tuple[str, str]:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return parts[0], parts[1]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_run_from_right_to_left_only(path):
+    package, here = room(path)
+    if here in ("__init__", "__main__"):
+        return
+    order = {name: rank for rank, names in enumerate(ROD if package == "rod" else PIPELINE) for name in names}
+    assert here in order, f"{here} has no place in the plan of {package}: put it into this test and into the README"
+    for name in imports(path):
+        top, _, rest = name.partition(".")
+        target = rest.split(".")[0]
+        assert not (package == "rod" and top == "pipeline"), f"rod imports {name}"
+        if top == package and target in order and target != here:
+            assert order[target] < order[here], f"{here} imports {name}, which is not to its left"
+        if top in GUESTS:
+            assert here in GUESTS[top], f"{top} is a guest of {GUESTS[top]} alone, not of {here}"
+        assert package != "rod" or top in {"rod", "numpy", "scipy"} or top in STANDARD, f"rod imports {name}"
+
+
+STANDARD = {"__future__", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted(p for top in ("rod", "pipeline", "tests", "fixtures") for p in (ROOT / top).rglob("*.py")),
+    ids=lambda p: str(p.relative_to(ROOT)),
+)
+def test_no_file_swallows_the_library(path):
+    lines = len(path.read_text(encoding="utf-8").splitlines())
+    assert lines <= LONGEST_FILE, f"{lines} lines: split it by noun"
+
+
+def test_no_room_is_a_lumber_room():
+    lumber = {"utils", "helpers", "common", "misc", "util", "helper"}
+    assert not [p for p in SOURCES if p.stem in lumber or p.parent.name in lumber]
