@@ -24,6 +24,15 @@ Array = NDArray[np.float64]
 FIRST_TAU = 6.0
 """Smoothness of the first fits: between straight line and mid-range the law may differ by a factor e^(6/8)."""
 
+FIRST_BLUR = (10.0, 10.0)
+"""Of the first fit: with few control points the simulation cannot follow good photos, and must not try."""
+
+MISFIT = 4.0
+"""Mean square of whitened residuals above which they count as misfit of the simulation, not as luck."""
+
+SETTLING = 6
+"""Fits with many control points at most; the visited range and the blur settle in two or three."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -91,15 +100,42 @@ def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), 
     return Fit(model, best, count, result.status > 0)
 
 
-def refit(known: Fit, knots: Array, *, tau: float, evaluations: int) -> Fit:
-    """The same data with other control points, started from a fit that is known."""
-    model = replace(known.model, knots=knots, tau=tau)
+def refit(known: Fit, knots: Array, *, tau: float, evaluations: int, blur: tuple[float, float] | None = None) -> Fit:
+    """The same data with other control points, and another blur if given, started from a fit that is known."""
+    model = replace(known.model, knots=knots, tau=tau, blur=known.model.blur if blur is None else blur)
     u = known.evaluation.unknowns
     law = known.model.characteristic(u)
     # Outside its knots the old law is a straight line, which must not start a control point below zero.
     ordinates = np.maximum(law.f(knots), 0.05 * law.ordinates.min())
     start = np.concatenate([np.log(ordinates), u[known.model.knots.size :]])
     return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations)
+
+
+def blur_needed(found: Fit) -> tuple[float, float]:
+    """Factors on the noise of shapes and forces with which the residuals of a fit agree; 1 where they do already."""
+    factors = []
+    for kind, blur in zip(("shape", "force"), found.model.blur, strict=True):
+        chi2, count = found.evaluation.chi2(kind)
+        ratio = blur**2 * chi2 / count if count else 1.0
+        factors.append(float(np.sqrt(ratio)) if ratio > MISFIT else 1.0)
+    return factors[0], factors[1]
+
+
+def rich_fit(first: Fit, options: InverseOptions) -> tuple[Fit, int]:
+    """Fit with the largest number of control points over the range it visits, blurred as its residuals need."""
+    rich, used = first, 0
+    for _ in range(SETTLING):
+        knots, blur = place_knots(*rich.visited(), options.knots[1]), blur_needed(rich)
+        found = refit(rich, knots, tau=FIRST_TAU, evaluations=options.evaluations, blur=blur)
+        used += found.evaluations
+        if found.evaluation.failure is not None:
+            break
+        moved = np.abs(np.subtract(found.visited(), rich.visited())).max()
+        same = np.allclose(blur_needed(found), blur, rtol=0.2)
+        rich = found
+        if same and moved < 0.02 * np.ptp(rich.visited()):
+            break
+    return rich, used
 
 
 def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, float], int]:
@@ -118,16 +154,7 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
         Evaluations used.
     """
     least, most = options.knots
-    rich, used = first, 0
-    for _ in range(2):  # the range visited follows from the fit and settles at once
-        found = refit(rich, place_knots(*rich.visited(), most), tau=FIRST_TAU, evaluations=options.evaluations)
-        used += found.evaluations
-        if found.evaluation.failure is not None:
-            return first, {}, used
-        moved = np.abs(np.subtract(found.visited(), rich.visited())).max()
-        rich = found
-        if moved < 0.02 * np.ptp(rich.visited()):
-            break
+    rich, used = rich_fit(first, options)
     low, high = rich.visited()
     evidence = {
         count: evidence_of_knots(rich.model, rich.evaluation, place_knots(low, high, count), taus=options.tau)
@@ -137,9 +164,12 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
     count = min(best + options.spare, most)
     tau = rich.posterior(options.tau).tau
     chosen = refit(rich, place_knots(low, high, count), tau=tau, evaluations=options.evaluations)
+    used += chosen.evaluations
+    if chosen.evaluation.failure is not None:  # the start with fewer control points has no equilibrium
+        chosen = rich
     posterior = chosen.posterior(options.tau)
     mean = evaluate(replace(chosen.model, tau=posterior.tau), posterior.mean, starts=chosen.evaluation.equilibria)
-    used += chosen.evaluations + 1
+    used += 1
     if mean.failure is None:
         chosen = replace(chosen, model=replace(chosen.model, tau=posterior.tau), evaluation=mean)
     return chosen, {n: value - evidence[best] for n, value in evidence.items()}, used

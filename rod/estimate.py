@@ -5,14 +5,14 @@ Signs and axes: chord frame of `rod.measurement`; f_EI is the tangent reading dm
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rod.characteristic import Characteristic
-from rod.evaluation import Evaluation
+from rod.evaluation import Evaluation, evaluate
 from rod.fit_model import FitModel
 from rod.options import InverseOptions
 from rod.smoothness import Averaged, averaged
@@ -73,7 +73,8 @@ class Estimate:
     evidence : dict of int -> float
         Log evidence of each number of control points tried, against the best.
     model, evaluation, unknowns, covariance
-        The fit itself: unknowns (q,) with covariance (q, q), whitened residuals and jacobian.
+        The fit itself: unknowns (q,) with covariance (q, q); residuals and jacobian whitened by the noise as stated,
+        whatever ``model.blur`` the bands were made with.
     iterations : int
         Evaluations of the model, all fits together.
     """
@@ -116,6 +117,8 @@ def read_off(
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
     kappa = np.linspace(min(visited), max(visited), options.grid)
     m, f, secant = law.moment(kappa, K0), law.tangent(kappa, K0), law.secant(kappa, K0)
+    if not np.all(f > 0.0):  # positive control points, but the spline between them is not
+        return Estimate(InverseOutcome.LIMIT_POINT)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
     by_moment[:, :k] = law.moment_by_ordinates(kappa, K0) * law.ordinates
     by_moment[:, k] = law.moment_by_pre_curvature(kappa, K0) / model.length
@@ -151,7 +154,7 @@ def read_off(
         log_covariance=by_log @ covariance @ by_log.T,
         gains=_gains(model, found, by_log @ posterior.response),
         model=model,
-        evaluation=found,
+        evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
         unknowns=u,
         covariance=covariance,
     )

@@ -89,6 +89,12 @@ class Evaluation:
     equilibria: tuple[Equilibrium, ...] = ()
     failure: Outcome | None = None
 
+    def chi2(self, kind: str) -> tuple[float, int]:
+        """Sum of squares and number of the residuals of all blocks of a kind: ``shape``, ``force``, ``prior``, ..."""
+        rows = [block for name, block in self.blocks.items() if name.partition("/")[0] == kind]
+        values = [self.value[block] for block in rows]
+        return sum(float(v @ v) for v in values), sum(v.size for v in values)
+
 
 def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ()) -> Evaluation:
     """Residuals and jacobian at the unknowns `u`; `starts` are the equilibria of a neighbour."""
@@ -211,12 +217,13 @@ def _whitened(model: FitModel, u: Array, fits: tuple[StepFit, ...], equilibria: 
     for fit in fits:
         step = fit.data.step
         if fit.photo is not None and fit.data.midline is not None:
-            white = fit.data.midline.whitener
+            white = fit.data.midline.whitener / model.blur[0]
             add(f"shape/{step.step}", white @ fit.photo[0], white @ fit.photo[1])
         if fit.force is not None:
-            add(f"force/{step.step}", np.array([fit.force[0]]) / step.force_std, fit.force[1][None] / step.force_std)
+            std = step.force_std * model.blur[1]
+            add(f"force/{step.step}", np.array([fit.force[0]]) / std, fit.force[1][None] / std)
         if fit.gap is not None:
-            std = CHORD_OF_ARC * fit.data.axis_std
+            std = CHORD_OF_ARC * fit.data.axis_std * model.blur[0]
             add(f"chord/{step.step}", np.array([fit.gap[0]]) / std, fit.gap[1][None] / std)
     prior = np.zeros((len(model.nuisances), model.size))
     prior[:, model.laws :] = np.eye(len(model.nuisances))

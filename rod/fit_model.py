@@ -75,6 +75,9 @@ class FitModel:
         Distance of the axes at displacement zero by the photos; None: the natural chord.
     nuisances : dict of name -> std
         In the order of the unknowns; m, the scale relative.
+    blur : (shapes, forces)
+        Factors on the noise of the data, above 1 where the simulation cannot follow them within their noise: what it
+        gets wrong then counts as noise, and neither the law nor the nuisances are bent to hide it.
     """
 
     data: tuple[StepData, ...]
@@ -84,6 +87,7 @@ class FitModel:
     elements: int
     zero: float | None
     nuisances: dict[str, float]
+    blur: tuple[float, float] = (1.0, 1.0)
 
     @property
     def size(self) -> int:

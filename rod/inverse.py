@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.control_points import FIRST_TAU, Fit, chosen_knots, fit
+from rod.control_points import FIRST_BLUR, FIRST_TAU, Fit, chosen_knots, fit
 from rod.equilibrium import Outcome
 from rod.estimate import Estimate, InverseOutcome, read_off
 from rod.evaluation import Evaluation, evaluate
@@ -60,7 +60,11 @@ def estimate(
     if not any(d.midline is not None and not d.at_rest for d in data):
         return Estimate(InverseOutcome.NO_DATA)
     line = straight_line(data)
-    fits = [first_fit(test, data, begin, line, options) for begin in ([start] if start else []) + [line]]
+    fits: list[Fit] = []
+    for begin in [line if start is None else start, *_further_starts(line, test.length)]:
+        fits.append(first_fit(test, data, begin, line, options))
+        if fits[-1].settled and fits[-1].chi2 < fits[-1].evaluation.value.size:
+            break  # residuals of the size of the blurred noise: no other optimum can be much better
     best = min(fits, key=lambda f: f.chi2)
     if best.evaluation.failure is not None:
         return Estimate(_refusal(best.evaluation.failure), iterations=sum(f.evaluations for f in fits))
@@ -89,6 +93,12 @@ def straight_line(data: tuple[StepData, ...]) -> tuple[float, float]:
     return float(np.abs(m).max() / max(abs(slope), 1e-3 * np.ptp(K))), float(K0)
 
 
+def _further_starts(line: tuple[float, float], length: float) -> list[tuple[float, float]]:
+    """Starts for data on which the first one fails: the straight line, and K0 to both sides of it."""
+    EI, K0 = line
+    return [line, *((EI, K0 + turn / length) for turn in (-0.4, 0.4))]
+
+
 def first_fit(
     test: MeasuredTest,
     data: tuple[StepData, ...],
@@ -101,7 +111,7 @@ def first_fit(
     seen = np.concatenate([d.step.shape.kappa[d.step.shape.seen] for d in data if d.step.shape is not None])
     low, high = line[1], float(np.quantile(seen, 0.995))
     knots = place_knots(min(low, high - 0.2 * abs(high)), high, 3)
-    model = fit_model(test, data, knots, tau=FIRST_TAU, elements=options.elements)
+    model = replace(fit_model(test, data, knots, tau=FIRST_TAU, elements=options.elements), blur=FIRST_BLUR)
     u = model.start(np.full(3, EI), K0)
     trial = evaluate(model, u)
     if trial.failure is None:

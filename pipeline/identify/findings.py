@@ -138,16 +138,13 @@ def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Findi
     if evaluation is None:
         return
     for kind, what in (("shape", "shapes"), ("force", "forces")):
-        squares = [
-            float(evaluation.value[b] @ evaluation.value[b]) for n, b in evaluation.blocks.items() if n[:5] == kind
-        ]
-        count = sum(b.stop - b.start for n, b in evaluation.blocks.items() if n[:5] == kind)
-        if count and chdtrc(count, sum(squares)) < settings.misfit_level:
+        chi2, count = evaluation.chi2(kind)
+        if count and chdtrc(count, chi2) < settings.misfit_level:
             yield Finding(
                 f"identify/misfit-{kind}",
                 "warning",
                 f"the simulation leaves residuals in the {what} beyond their noise, "
-                f"{np.sqrt(sum(squares) / count):.1f} standard deviations rms; the diagnosis looks for the cause",
+                f"{np.sqrt(chi2 / count):.1f} standard deviations rms; the diagnosis looks for the cause",
             )
 
 
