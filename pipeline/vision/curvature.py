@@ -29,7 +29,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline
-from scipy.linalg import lstsq
 
 from pipeline.records import Array
 from pipeline.vision.smoothing import Problem, Smooth
@@ -234,8 +233,9 @@ def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
     penalty = np.column_stack([np.zeros(len(frame.penalty)), frame.penalty])
     # A share of 1e-6 leaves wiggles longer than about a fifth of the range: the shape, not the noise of the polyline.
     penalty *= 1e-3 * np.linalg.norm(turns * weight[:, None]) / np.linalg.norm(penalty)
-    rows = np.concatenate([turns * weight[:, None], penalty])
-    solution = lstsq(rows, np.r_[theta * weight, np.zeros(len(penalty))], lapack_driver="gelsy", check_finite=False)[0]
+    weighted = turns * weight[:, None]
+    # Normal equations lose half the digits, which a start can spare.
+    solution = np.linalg.solve(weighted.T @ weighted + penalty.T @ penalty, weighted.T @ (theta * weight))
     curve = PlaneCurve(frame, solution[1:], np.zeros(2), float(solution[0]))
     return PlaneCurve(frame, solution[1:], np.mean(points - curve.at(s)[0], axis=0), float(solution[0]))
 
@@ -276,11 +276,11 @@ def fit_curve(
         correlation_length=correlation_length,
         iterations=iterations,
     )
-    s = curve.foot(points, s)
-    smooth = _linear(curve, s, _residual(curve, points, s), std, weight, order).smooth(length)
+    s, residual = _step_to_foot(curve, points, s)
+    smooth = _linear(curve, s, residual, std, weight, order).smooth(length)
     curve = curve.moved(smooth.estimate - np.r_[0.0, 0.0, curve.coefficients])
-    s = curve.foot(points, s)
-    return CurveFit(curve, smooth, points, std, s, _residual(curve, points, s), weight)
+    s, residual = _step_to_foot(curve, points, curve.foot(points, s, steps=1))
+    return CurveFit(curve, smooth, points, std, s, residual, weight)
 
 
 def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int) -> PlaneCurve:
@@ -307,8 +307,7 @@ def _settle(
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
     length = float(np.median(np.diff(s))) if correlation_length is None else correlation_length
     for iteration in range(iterations):
-        s = curve.foot(points, s, steps=2)
-        residual = _residual(curve, points, s)
+        s, residual = _step_to_foot(curve, points, s)
         spread = max(1.4826 * float(np.median(np.abs(residual / std))), 1e-12)
         if iteration:
             weight = _biweight(residual / std, spread)
@@ -337,9 +336,16 @@ def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Ar
     )
 
 
-def _residual(curve: PlaneCurve, points: Array, s: Array) -> Array:
+def _step_to_foot(curve: PlaneCurve, points: Array, s: Array) -> tuple[Array, Array]:
+    """Feet of points near ``s``, and the distances along the normal.
+
+    One evaluation serves both: a foot missed by ds changes the distance by ``kappa ds^2 / 2``, nothing for a point near
+    the curve.
+    """
     where, angle = curve.at(s)
-    return np.asarray(-np.sin(angle) * (points[:, 0] - where[:, 0]) + np.cos(angle) * (points[:, 1] - where[:, 1]))
+    cos, sin = np.cos(angle), np.sin(angle)
+    du, dv = points[:, 0] - where[:, 0], points[:, 1] - where[:, 1]
+    return s + cos * du + sin * dv, cos * dv - sin * du
 
 
 def _biweight(residual: Array, spread: float) -> Array:

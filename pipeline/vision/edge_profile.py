@@ -32,13 +32,13 @@ _MIN_BLUR = 0.30  # px; the pixel's own box is 0.29
 
 @dataclass(frozen=True)
 class Pixels:
-    """Pixels about one edge.
+    """Pixels about both edges.
 
     Attributes
     ----------
-    offset : (n, m) px
-        From the expected edge, positive outward, on each of n sections.
-    value : (n, m) grey
+    offset : (2, n, m) px
+        From the expected edge, positive outward; side, section, pixel.
+    value : (2, n, m) grey
     across : int
         Pixels of one row; m is a multiple of it, rows follow each other.
     """
@@ -50,15 +50,17 @@ class Pixels:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Edge profiles in ``k`` windows along s.
+    """Edge profiles of both sides in ``k`` windows along s.
 
     Attributes
     ----------
-    s, place, blur, level, step, inside, outside : (k,)
-        Centre of the window; t0 and w in px; a and A in grey; b_in / A and b_out / A in 1/px.
-    shift : (k,) px
+    s : (k,)
+        Centre of the window.
+    place, blur, level, step, inside, outside : (2, k)
+        t0 and w in px; a and A in grey; b_in / A and b_out / A in 1/px.
+    shift : (2, k) px
         Place with ramps less the place by the plain error function.
-    noise : (k,) grey
+    noise : (2, k) grey
         Scatter of pixels about the profile.
     """
 
@@ -73,8 +75,8 @@ class Profiles:
     noise: Array
 
     def at(self, s: Array, name: str) -> Array:
-        """A quantity by name at ``s``, linear between windows."""
-        return np.asarray(np.interp(s, self.s, getattr(self, name)))
+        """A quantity by name at ``s``, linear between windows: ``(2, n)``."""
+        return np.stack([np.interp(s, self.s, side) for side in getattr(self, name)])
 
 
 def profile(offset: Real, place: Real, blur: Real) -> tuple[Real, Real, Real, Real]:
@@ -95,39 +97,43 @@ def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: f
     mean would take them for the sheath.
     """
     count = min(windows, max(1, len(s) // 4))
-    window = np.minimum((np.arange(len(s)) * count) // len(s), count - 1)
-    centre = np.bincount(window, s) / np.bincount(window)
-    low = np.floor(pixels.offset.min() / _BIN)
-    bins = int(pixels.offset.max() / _BIN - low) + 1
-    cell = np.floor(pixels.offset / _BIN - low).astype(np.int64) + bins * window[:, None]
-    first = np.searchsorted(window, range(1, count))
-    pooled = _medians(pixels, first)
-    start = np.column_stack([np.zeros(count), np.full(count, blur)])
+    each = len(s) // count
+    # Windows of one size make one array of all; at most one section of each window is passed over for it.
+    chosen = ((np.arange(count * each) + 0.5) * (len(s) / (count * each))).astype(np.int64)
+    offset, value = (a[:, chosen].reshape(2 * count, -1) for a in (pixels.offset, pixels.value))
+    low = np.floor(offset.min() / _BIN)
+    bins = int(offset.max() / _BIN - low) + 1
+    cell = np.floor(offset / _BIN - low).astype(np.int64) + bins * np.arange(2 * count)[:, None]
+    rows = (2 * count, -1, pixels.across)
+    medians = np.median(value.reshape(rows), axis=1).astype(np.float64)
+    pooled = _Pooled(offset.reshape(rows).mean(axis=1, dtype=np.float64), medians, np.ones_like(medians))
+    start = np.column_stack([np.zeros(2 * count), np.full(2 * count, blur)])
     for _ in range(2):
         start, linear = _variable_projection(pooled, start, ramps=True)
         # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
-        usual, blurs = _running_median(linear), _running_median(start[:, 1:])
-        cast = [a[window].astype(np.float32) for a in (start[:, :1], blurs, usual)]
-        shape = np.stack(profile(pixels.offset, cast[0], cast[1])[:3], axis=-1)
-        residual = np.abs(pixels.value - cast[2][:, :1] - (shape @ cast[2][:, 1:, None])[..., 0])
-        noise = 1.4826 * np.array([float(np.median(part)) for part in np.split(residual, first)])
-        limit = np.maximum(4.0 * np.median(noise), _PLAIN_STEP * usual[window, 1:2])
-        pooled = _pool(pixels, cell, residual < limit, (count, bins))
+        usual = _running_median(np.column_stack([start[:, 1], linear]))
+        place, blurs, *parts = (a[:, None].astype(np.float32) for a in (start[:, 0], *usual.T))
+        cumulative, ramp_in, ramp_out, _ = profile(offset, place, blurs)
+        residual = np.abs(value - parts[0] - parts[1] * cumulative - parts[2] * ramp_in - parts[3] * ramp_out)
+        noise = 1.4826 * np.median(residual, axis=1)
+        limit = np.maximum(4.0 * np.median(noise), _PLAIN_STEP * parts[1])
+        pooled = _pool(offset, value, cell, residual < limit, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
     used, linear = (full, full_linear) if ramps else (plain, plain_linear)
     step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
     shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
+    by_side = shape.T.reshape(5, 2, count)
     return Profiles(
-        s=centre,
-        place=used[:, 0],
-        blur=shape[:, 0],
-        level=shape[:, 1],
-        step=shape[:, 2],
-        inside=shape[:, 3],
-        outside=shape[:, 4],
-        shift=full[:, 0] - plain[:, 0],
-        noise=noise,
+        s=s[chosen].reshape(count, each).mean(axis=1),
+        place=used[:, 0].reshape(2, count),
+        blur=by_side[0],
+        level=by_side[1],
+        step=by_side[2],
+        inside=by_side[3],
+        outside=by_side[4],
+        shift=(full[:, 0] - plain[:, 0]).reshape(2, count),
+        noise=noise.reshape(2, count).astype(np.float64),
     )
 
 
@@ -141,26 +147,22 @@ class _Pooled:
 
 
 def _running_median(values: Array) -> Array:
-    """Median over five neighbouring windows, of each column."""
-    return np.asarray(median_filter(values, size=(min(5, len(values)), 1), mode="nearest"))
+    """Median over five neighbouring windows of one side, of each column; rows are the windows of both sides."""
+    sides = values.reshape(2, -1, values.shape[1])
+    size = (1, min(5, sides.shape[1]), 1)
+    return np.asarray(median_filter(sides, size=size, mode="nearest")).reshape(values.shape)
 
 
-def _medians(pixels: Pixels, first: NDArray[np.int64]) -> _Pooled:
-    """Medians over the rows of each window, at each step across."""
-    parts = [np.split(a, first) for a in (pixels.offset, pixels.value)]
-    offset = np.array([part.reshape(-1, pixels.across).mean(axis=0) for part in parts[0]])
-    value = np.array([np.median(part.reshape(-1, pixels.across), axis=0) for part in parts[1]])
-    return _Pooled(offset, value, np.ones_like(value))
-
-
-def _pool(pixels: Pixels, cell: NDArray[np.int64], keep: NDArray[np.bool_], shape: tuple[int, int]) -> _Pooled:
+def _pool(
+    offset: Float32, value: Float32, cell: NDArray[np.int64], keep: NDArray[np.bool_], shape: tuple[int, int]
+) -> _Pooled:
     size = shape[0] * shape[1]
-    cells = cell[keep]
-    count = np.bincount(cells, minlength=size).astype(np.float64)
+    count, by_offset, by_value = (
+        np.bincount(cell.ravel(), (keep * weight).ravel(), size).reshape(shape).astype(np.float64)
+        for weight in (1.0, offset, value)
+    )
     filled = np.maximum(count, 1.0)
-    offset = np.bincount(cells, pixels.offset[keep], size) / filled
-    value = np.bincount(cells, pixels.value[keep], size) / filled
-    return _Pooled(offset.reshape(shape), value.reshape(shape), count.reshape(shape))
+    return _Pooled(by_offset / filled, by_value / filled, count)
 
 
 def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple[Array, Array]:
@@ -197,14 +199,21 @@ def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple
         move = np.linalg.solve(normal, tangent @ residual.transpose(0, 2, 1))[..., 0]
         place = np.clip(place + np.clip(move[:, 0], -0.7 * blur, 0.7 * blur), low, high)
         blur = np.clip(blur + np.clip(move[:, 1], -0.3 * blur, 0.3 * blur), _MIN_BLUR, 0.5 * span)
-        if np.max(np.abs(move)) < 1e-4:
+        if np.max(np.abs(move)) < 1e-3:  # px; Newton's next step would be far smaller
             break
     return np.column_stack([place, blur]), linear
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Sub-pixel edges of one side: offset from the expected edge and its standard deviation, px; step, grey."""
+    """Sub-pixel edges ``(2, n)`` by side and section.
+
+    Attributes
+    ----------
+    place, std : (2, n) px
+        Offset from the expected edge, positive outward, NaN where there is no edge; its standard deviation.
+    step : (2, n) grey
+    """
 
     place: Array
     std: Array
@@ -212,24 +221,27 @@ class Edges:
 
 
 def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 5) -> Edges:
-    """Place, level and step of the edge on every section; blur and relative slopes come from the profiles."""
-    place, level, step = (profiles.at(s, name) for name in ("place", "level", "step"))
-    blur, inside, outside = (profiles.at(s, name)[:, None] for name in ("blur", "inside", "outside"))
-    inside32, outside32, blur32 = inside.astype(np.float32), outside.astype(np.float32), blur.astype(np.float32)
-    noise = float(np.median(profiles.noise))
-    softness = np.float32(1.0 / (6.0 * noise + 1e-12))
-    basis = np.ones((len(s), 3, pixels.value.shape[1]), np.float32)
-    gram, weight = np.zeros((len(s), 3, 3)), np.ones_like(pixels.value)
+    """Place, level and step of the edges on every section; blur and relative slopes come from the profiles."""
+    shape, count = pixels.value.shape[:2], pixels.value.shape[2]
+    offset, value = pixels.offset.reshape(-1, count), pixels.value.reshape(-1, count)
+    place, level, step = (profiles.at(s, name).ravel() for name in ("place", "level", "step"))
+    blur, inside, outside = (
+        profiles.at(s, name).reshape(-1, 1).astype(np.float32) for name in ("blur", "inside", "outside")
+    )
+    noise = np.repeat(np.median(profiles.noise, axis=1), shape[1])
+    softness = (1.0 / (6.0 * noise + 1e-12)).astype(np.float32)[:, None]
+    basis = np.ones((len(value), 3, count), np.float32)
+    gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
     for _ in range(iterations):
         place32, level32, step32 = (a.astype(np.float32)[:, None] for a in (place, level, step))
-        cumulative, ramp_in, ramp_out, density = profile(pixels.offset, place32, blur32)
-        basis[:, 1] = cumulative + inside32 * ramp_in + outside32 * ramp_out
-        basis[:, 2] = -step32 * (density + inside32 + (outside32 - inside32) * cumulative)
-        residual = pixels.value - level32 - step32 * basis[:, 1]
+        cumulative, ramp_in, ramp_out, density = profile(offset, place32, blur)
+        basis[:, 1] = cumulative + inside * ramp_in + outside * ramp_out
+        basis[:, 2] = -step32 * (density + inside + (outside - inside) * cumulative)
+        residual = value - level32 - step32 * basis[:, 1]
         # Biweight with the scatter of the whole side: a section full of text must not raise its own limit.
         weight = np.maximum(1.0 - (residual * softness) ** 2, np.float32(0.0)) ** 2
         # The rim of a letter is neither sheath nor ink: a pixel counts no more than its neighbours across the edge.
-        rows = weight.reshape(len(s), -1, pixels.across)
+        rows = weight.reshape(len(value), -1, pixels.across)
         rows[..., 1:-1] = np.minimum(rows[..., 1:-1], np.minimum(rows[..., 2:], rows[..., :-2]))
         weighted = basis * weight[:, None, :]
         gram = (weighted @ basis.transpose(0, 2, 1)).astype(np.float64)
@@ -241,5 +253,5 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int =
         if np.quantile(np.abs(shift), 0.98) < 2e-3:  # px; the rest are sections that will be outliers anyway
             break
     std = noise * np.sqrt(np.linalg.inv(gram)[:, 2, 2])
-    lost = (weight.sum(axis=1) < 0.5 * weight.shape[1]) | (step <= 0.0)
-    return Edges(np.where(lost, np.nan, place), std, step)
+    lost = (weight.sum(axis=1) < 0.5 * count) | (step <= 0.0)
+    return Edges(np.where(lost, np.nan, place).reshape(shape), std.reshape(shape), step.reshape(shape))

@@ -141,35 +141,30 @@ def _peak(score: Array, t: Array) -> Array:
 
 
 def edge_pixels(
-    ground: Ground,
-    curve: PlaneCurve,
-    s: Array,
-    *,
-    rows: int,
-    side: float,
-    half_width: float,
-    window: tuple[float, float],
+    ground: Ground, curve: PlaneCurve, s: Array, *, rows: int, half_width: float, window: tuple[float, float]
 ) -> Pixels:
-    """Pixels nearest to a grid about one edge: ``rows`` a section along s, one a px across; see `in_picture`.
+    """Pixels nearest to a grid about both edges: ``rows`` a section along s, one a px across; see `in_picture`.
 
     Parameters
     ----------
-    side : float
-        -1 or +1: sign of t of the edge.
     half_width : px
-        Distance of the expected edge from the path.
+        Distance of the expected edges from the path.
     window : (inside, outside) px
     """
     spacing = float(np.median(np.diff(s))) / rows
     all_s = (s[:, None] + (np.arange(rows) - 0.5 * (rows - 1)) * spacing).ravel()
     where, angle = curve.at(all_s)
-    across = side * normals(angle)
-    steps = np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0)
-    uv = where[:, None, :] + across[:, None, :] * (half_width + steps)[None, :, None]
-    index = np.rint(uv).astype(np.int64)
-    offset = np.einsum("nmk,nk->nm", index - where[:, None, :], across) - half_width
-    column, row = index[..., 0] - ground.origin_px[0], index[..., 1] - ground.origin_px[1]
+    across = normals(angle)
+    out = half_width + np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0)
+    t = np.stack([-out, out])[:, None, :]  # side, row, pixel
+    u = np.rint(where[:, :1] + across[:, :1] * t)
+    v = np.rint(where[:, 1:] + across[:, 1:] * t)
+    offset = (
+        np.array([-1.0, 1.0])[:, None, None] * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:])
+        - half_width
+    )
     height, width = ground.grey.shape
-    height, width = ground.grey.shape
-    value = ground.grey[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
-    return Pixels(offset.reshape(len(s), -1).astype(np.float32), value.reshape(len(s), -1), len(steps))
+    column = np.clip(u.astype(np.int64) - ground.origin_px[0], 0, width - 1)
+    row = np.clip(v.astype(np.int64) - ground.origin_px[1], 0, height - 1)
+    shape = (2, len(s), rows * len(out))
+    return Pixels(offset.astype(np.float32).reshape(shape), ground.grey[row, column].reshape(shape), len(out))

@@ -26,7 +26,7 @@ from scipy.ndimage import median_filter
 from pipeline.records import Array
 from pipeline.settings.vision_curve import CurveSettings
 from pipeline.vision.curvature import PlaneCurve
-from pipeline.vision.edge_profile import Edges, Profiles, fit_edges, fit_profiles
+from pipeline.vision.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.edges import Ground, edge_pixels, normals
 
 
@@ -58,7 +58,7 @@ class Sections:
     systematic_std : px
     share : float
         Of the sections asked for, those that were measured.
-    profiles : (Profiles, Profiles)
+    profiles : Profiles
     contrast, noise, blur : float
         Median step and scatter of pixels, grey; median edge blur, px.
     asymmetry : float
@@ -75,7 +75,7 @@ class Sections:
     off_path: Array
     systematic_std: float
     share: float
-    profiles: tuple[Profiles, Profiles]
+    profiles: Profiles
     contrast: float
     noise: float
     blur: float
@@ -109,14 +109,10 @@ def measure_sections(
     window = (max(inside, 2.5 * blur + 0.5), max(outside, 2.5 * blur + 0.5))
     rows = max(1, int(np.median(np.diff(s))))
     ramps = half_width >= settings.small_radius_px
-    sides: list[tuple[Profiles, Edges]] = []
-    for side in (-1.0, 1.0):
-        pixels = edge_pixels(ground, curve, s, rows=rows, side=side, half_width=half_width, window=window)
-        profiles = fit_profiles(pixels, s, windows=settings.profile_windows, ramps=ramps, blur=max(blur, 0.5))
-        sides.append((profiles, fit_edges(pixels, s, profiles)))
-    (profiles1, edges1), (profiles2, edges2) = sides
-    place = np.column_stack([edges1.place, edges2.place])
-    std = np.column_stack([edges1.std, edges2.std])
+    pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
+    profiles = fit_profiles(pixels, s, windows=settings.profile_windows, ramps=ramps, blur=max(blur, 0.5))
+    edges = fit_edges(pixels, s, profiles)
+    place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
     if np.count_nonzero(good.any(axis=1)) < 20 or good.sum(axis=0).min() < 10:
         return None
@@ -127,8 +123,7 @@ def measure_sections(
     across = normals(angle)
     off = 0.5 * (place[:, 1] - place[:, 0])
     width = place.sum(axis=1) + 2.0 * half_width
-    step = np.column_stack([edges1.step, edges2.step])[keep]
-    contrast = float(np.nanmedian(step))
+    step = edges.step[:, keep]
     smooth_width = _running_median(width)
     return Sections(
         s=s,
@@ -139,13 +134,13 @@ def measure_sections(
         width=width,
         width_smooth=smooth_width,
         off_path=off,
-        systematic_std=_systematic(profiles1, profiles2, smooth_width, std, diameter),
+        systematic_std=_systematic(profiles, smooth_width, std, diameter),
         share=float(np.mean(keep)),
-        profiles=(profiles1, profiles2),
-        contrast=contrast,
-        noise=float(np.median(np.r_[profiles1.noise, profiles2.noise])),
-        blur=float(np.median(np.r_[profiles1.blur, profiles2.blur])),
-        asymmetry=_asymmetry(step[:, 0], step[:, 1]),
+        profiles=profiles,
+        contrast=float(np.median(step)),
+        noise=float(np.median(profiles.noise)),
+        blur=float(np.median(profiles.blur)),
+        asymmetry=_asymmetry(step),
     )
 
 
@@ -172,20 +167,20 @@ def _consistent(place: Array, std: Array, good: NDArray[np.bool_]) -> tuple[Arra
     return out, spread, good
 
 
-def _systematic(first: Profiles, second: Profiles, width: Array, std: Array, diameter: float | None) -> float:
+def _systematic(profiles: Profiles, width: Array, std: Array, diameter: float | None) -> float:
     """Standard deviation, px, of the slow sideways error of the midline; see the module's text."""
-    model = 0.5 * (second.shift - first.shift)
+    model = 0.5 * np.diff(profiles.shift, axis=0)
     # Half the width of the change between two models that both have some right: its standard deviation.
     by_model = 0.5 * np.sqrt(np.mean(model**2))
     noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
     by_width = 0.5 * np.sqrt(max(np.var(width) - noise2, 0.0))
-    by_blur = 0.25 * np.sqrt(np.mean((second.blur - first.blur) ** 2))
-    unequal = _asymmetry(first.step, second.step)
+    by_blur = 0.25 * np.sqrt(np.mean(np.diff(profiles.blur, axis=0) ** 2))
+    unequal = _asymmetry(profiles.step)
     by_diameter = 0.0 if diameter is None else 0.5 * abs(float(np.median(width)) - diameter) * min(unequal, 1.0)
     return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_diameter**2))
 
 
-def _asymmetry(first: Array, second: Array) -> float:
-    """Relative difference of two edges' contrast."""
-    one, two = float(np.nanmedian(first)), float(np.nanmedian(second))
-    return abs(two - one) / (0.5 * (two + one))
+def _asymmetry(step: Array) -> float:
+    """Relative difference of the two edges' contrast, from steps ``(2, n)``."""
+    one, two = np.median(step, axis=1)
+    return float(abs(two - one) / (0.5 * (two + one)))

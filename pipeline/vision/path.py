@@ -103,7 +103,10 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     count = round((span[1] - span[0]) / (settings.section_spacing_diameters * diameter))
     count = min(max(count, settings.min_sections), settings.max_sections, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
-    s = s[free_of_covers(path, s, 0.6 * half_width, covers) & in_picture(ground, path, s, 1.5 * half_width + 4.0)]
+    s = s[
+        free_of_covers(path, s, 0.6 * half_width, covers)
+        & in_picture(ground, path, s, 1.2 * half_width + 3.0 * rough.blur_px + 4.0)
+    ]
     if len(s) < 20:
         return _lost(rough, 0.0)
     sections = measure_sections(
