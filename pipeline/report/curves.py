@@ -82,7 +82,8 @@ def visited(method: str, curve: Curve | None) -> Visited | None:
     keep = np.flatnonzero(curve.supported)
     if keep.size < 2:
         return None
-    factor = np.asarray(curve.tangent_factor_Nm2, dtype=np.float64).reshape(len(curve.tangent_factor_Nm2), -1)
+    rows = curve.tangent_factor_Nm2
+    factor = np.asarray(rows, dtype=np.float64)[keep] if rows else np.zeros((keep.size, 0))
     fields = (
         np.asarray(values, dtype=np.float64)[keep]
         for values in (
@@ -95,7 +96,7 @@ def visited(method: str, curve: Curve | None) -> Visited | None:
             curve.secant_std_Nm2,
         )
     )
-    return Visited(method, *fields, factor[keep] if factor.size else np.zeros((keep.size, 0)))
+    return Visited(method, *fields, factor)
 
 
 def curves(result: Result) -> dict[str, Visited]:

@@ -17,6 +17,8 @@ from pipeline.settings import ReportSettings
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
+# Tails of a distribution are not known beyond this, however small the formula makes p.
+SMALLEST_P = 1e-4
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> Di
         ],
         next_what=following.what if following else "",
         next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
-        leftover=_scalars(part.leftover),
+        leftover=_sentences(part.leftover),
         figures=_figures(part, words, settings),
     )
 
@@ -111,7 +113,7 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     return [
         words.cause(row.name),
         f"{words.number(row.z, 2)} ± 1",
-        words.number(row.p_adjusted, 2),
+        f"< {words.number(SMALLEST_P)}" if row.p_adjusted < SMALLEST_P else words.number(row.p_adjusted, 2),
         f"{words.measured(row.estimate, row.std)}{unit}",
         "–" if row.minimal_detectable is None else f"{words.number(row.minimal_detectable, 2)}{unit}",
         percent(row.surviving_fraction),
@@ -121,18 +123,17 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     ]
 
 
-def _scalars(leftover: dict[str, Any] | None) -> list[str]:
-    """Sentences and single numbers of the leftover; arrays stay in result.json."""
+def _sentences(leftover: dict[str, Any] | None) -> list[str]:
+    """Sentences of the leftover; its arrays are drawn."""
     if not leftover:
         return []
-    message = [str(leftover["message"])] if "message" in leftover else []
-    rest = [f"{k.replace('_', ' ')}: {v}" for k, v in leftover.items() if k != "message" and isinstance(v, str)]
-    return message + rest
+    return [str(leftover[key]) for key in ("message", "noise") if leftover.get(key)]
 
 
 def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:
     """Typed residual map of the diagnosis; None if there is none."""
-    return ResidualMap.model_validate(values) if values else None
+    known = {key: value for key, value in (values or {}).items() if key in ResidualMap.model_fields}
+    return ResidualMap.model_validate(known) if known else None
 
 
 def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
