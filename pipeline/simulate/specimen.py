@@ -1,14 +1,16 @@
 """Writes a virtual experiment as a specimen folder: images/, force.csv, specimen.toml; the truth in a file of its own.
 
-The folder holds nothing a measured one would not hold. ``truth.json``: id, effects, law, K0 (values along s), lengths,
-scale, and for each step force, chord and, at 101 equidistant arc lengths, kappa (1/m), moment (N m), position (mm) and
-the pixel path of the centerline; pixel (0, 0) is the centre of the top-left pixel.
+The folder holds nothing a measured one would not hold. ``truth.json``: id, effects, law (of K - K0), K0 (mean, and at
+101 places along the free cable), length, scale, and for each step force, chord and, at 101 equidistant arc lengths,
+kappa (1/m), moment (N m), position (mm) and the pixel path of the centerline; pixel (0, 0) is the centre of the top-left
+pixel.
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +159,9 @@ def _description(experiment: Experiment, setup: Setup, photography: Photography,
         square = 1e3 * board.square_m / (1.0 + setup.readings.scale)
         lines.append('calibration = "calibration"')
         lines.append(f"board = {{columns = {board.columns}, rows = {board.rows}, square_mm = {square:.6f}}}")
+        if isfinite(setup.camera.distance_m):
+            # to the board's plane, which lies below that of the cable's axis
+            lines.append(f"distance_mm = {1e3 * (setup.camera.distance_m - board.height_m):.3f}")
     lines += ["", "[rig]", f'moving_bearing = "{experiment.moving}"']
     covers = [cover for cover in photography.covers if cover is not None]
     if len(covers) == 2:
@@ -175,15 +180,15 @@ def _truth(
     shown: list[float],
 ) -> dict[str, Any]:
     excess = np.linspace(-5.0, 20.0, 251)
-    law = setup.test.characteristic
+    law, rest = setup.test.characteristic, setup.test.rod.section.pre_curvature
+    stick_slip = {"ei0": experiment.EI0, "ei1": experiment.EI1, "kc": experiment.kc}
     return {
         "id": experiment.id,
         "seed": experiment.seed,
         "effects": {name: np.atleast_1d(value).tolist() for name, value in experiment.effects.items()},
-        "ei0": experiment.EI0,
-        "ei1": experiment.EI1,
-        "kc": experiment.kc,
-        "K0": experiment.K0,
+        **({} if "nonlinear_stiffness" in experiment.effects else stick_slip),
+        "K0": float(np.mean(rest)),
+        "K0_along": np.interp(np.linspace(0.0, 1.0, TRUTH_POINTS), np.linspace(0.0, 1.0, rest.size), rest).tolist(),
         "law": {
             "excess_per_m": excess.tolist(),
             "moment_Nm": np.asarray(law.moment(excess, np.zeros_like(excess))).tolist(),

@@ -248,6 +248,17 @@ def test_sixteen_bit_colour_turned_and_mirrored(tmp_path: Path) -> None:
     assert dark < 0.6 * np.median(picture)
 
 
+def test_truth_knows_the_pre_curvature_and_law_that_were_used(tmp_path: Path) -> None:
+    truth = small(tmp_path / "a", {"pre_curvature": 1.0, "pre_curvature_varying": 0.5}).truth
+    assert truth["K0"] == pytest.approx(1.0)
+    assert np.array(truth["K0_along"]) == pytest.approx(np.linspace(0.5, 1.5, 101))
+    D = np.array(truth["law"]["excess_per_m"])
+    law = 0.0075 * D + 0.0105 * 4.5 * np.tanh(D / 4.5)
+    assert np.array(truth["law"]["moment_Nm"]) == pytest.approx(law, abs=1e-12)
+    assert np.gradient(law, D)[5:-5] == pytest.approx(truth["law"]["tangent_Nm2"][5:-5], rel=2e-3)
+    assert "ei0" not in small(tmp_path / "b", {"nonlinear_stiffness": 0.01}).truth
+
+
 def test_states_of_another_solver_are_photographed(tmp_path: Path) -> None:
     bent = continuum.bend(CABLE, [0.008])
     states = tuple(State(b.F, b.chord, b.s, b.x, b.y, b.theta, b.kappa, b.m) for b in bent)
