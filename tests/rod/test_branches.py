@@ -1,0 +1,191 @@
+"""Where a cable bows to, and what is said when it cannot: never a silent wrong branch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rod.bending_test import BendingTest, simulate, table_1
+from rod.characteristic import Characteristic
+from rod.elastica import natural_chord, uniform_equilibrium
+from rod.energy import Potential
+from rod.equilibrium import Outcome
+from rod.laws import StickSlip
+from rod.support import Support
+
+LINEAR = Characteristic.constant(5e-3)
+LAW = StickSlip(6e-3, 2.5e-3, 4.0)
+
+
+def test_natural_and_opposite_branch_of_the_printed_case() -> None:
+    test = BendingTest(0.2, LINEAR, 2.0, elements=400)
+    natural = simulate(test, chords=[0.195])[0]
+    opposite = simulate(test, chords=[0.195], branch="opposite")[0]
+    assert natural.good
+    assert opposite.good
+    assert natural.force == pytest.approx(0.610252789, rel=1e-5)
+    assert opposite.force == pytest.approx(1.889, abs=1e-3)
+    assert natural.y.max() > 0.0 > opposite.y.min()
+    for step in (natural, opposite):
+        V = Potential(test.rod, step.before)
+        assert V.is_minimum(V.unknowns(step.angles, step.x, step.y), V.free())
+
+
+@pytest.mark.parametrize("K0", [2.0, -2.0])
+def test_absolute_sides_do_not_depend_on_the_sign_of_pre_curvature(K0: float) -> None:
+    test = BendingTest(0.2, LAW, K0)
+    up, down = (simulate(test, chords=[0.17], branch=side)[0] for side in ("up", "down"))
+    assert up.good
+    assert down.good
+    assert up.y[50] > 0.0 > down.y[50]
+    natural = simulate(test, chords=[0.17])[0]
+    assert natural.force == pytest.approx((up if K0 > 0.0 else down).force, rel=1e-9)
+
+
+@pytest.mark.parametrize("K0", [0.0, 1e-6, 1e-3, 0.1])
+def test_vanishing_pre_curvature_goes_through_the_bifurcation(K0: float) -> None:
+    previous = np.inf
+    for chord in (0.1999, 0.19, 0.1):
+        step = simulate(BendingTest(0.2, LAW, K0), chords=[chord])[0]
+        assert step.good
+        assert step.y[50] > 0.0
+        exact = uniform_equilibrium(LAW, length=0.2, chord=chord, pre_curvature=K0)
+        assert step.force == pytest.approx(exact.force, rel=3e-4)
+        assert step.y[50] > 0.2 / previous
+        previous = 0.2 / step.y[50]
+
+
+@pytest.mark.parametrize("chord", [0.1999, 0.19, 0.15, 0.1, 0.05, 0.01, 1e-4])
+@pytest.mark.parametrize("K0", [0.0, 0.5, 2.0, 5.0])
+def test_from_tension_to_touching_ends(K0: float, chord: float) -> None:
+    step = simulate(BendingTest(0.2, LAW, K0, elements=200), chords=[chord])[0]
+    exact = uniform_equilibrium(LAW, length=0.2, chord=chord, pre_curvature=K0)
+    assert step.outcome is Outcome.CONVERGED
+    assert step.force == pytest.approx(exact.force, rel=5e-4)
+    assert np.abs(step.theta).max() == pytest.approx(exact.theta[0], rel=1e-3)
+
+
+def test_random_cables_never_end_on_another_shape_silently() -> None:
+    rng = np.random.default_rng(20)
+    for _ in range(150):
+        EI0 = 10.0 ** rng.uniform(-5.0, 0.0)
+        law = StickSlip(EI0, EI0 / rng.uniform(1.0, 6.0), rng.uniform(1.0, 8.0))
+        K0 = float(rng.choice([0.0, 0.05, 0.5, 2.0, 5.0]))
+        # Below 0.999 of the natural chord: nearer to straight, elongation decides and the quadrature has none.
+        chord = natural_chord(0.2, K0) * rng.uniform(0.02, 0.999)
+        step = simulate(BendingTest(0.2, law, K0), chords=[chord])[0]
+        exact = uniform_equilibrium(law, length=0.2, chord=chord, pre_curvature=K0)
+        assert step.good
+        assert np.abs(step.kappa - exact.kappa).max() < 3e-3 * np.abs(exact.kappa).max()
+
+
+def arch(load: float) -> BendingTest:
+    """A shallow two-hinged arch between fixed bearings, pressed down by a distributed load, N/m."""
+    return BendingTest(0.2, LINEAR, 2.0, load=(0.0, -load))
+
+
+def test_loaded_arch_buckles_sideways_at_the_textbook_thrust() -> None:
+    # A shallow arch goes over into the second mode of the straight bar, at four times its Euler load.
+    steps = [simulate(arch(q), chords=[arch(q).zero_chord])[0] for q in (5.0, 9.0, 9.8, 10.3, 20.0)]
+    assert [step.good for step in steps] == [True, True, True, False, False]
+    assert steps[2].force < 4.0 * np.pi**2 * 5e-3 / 0.2**2 * 1.01
+    for lost in steps[3:]:
+        assert lost.outcome is Outcome.UNSTABLE
+        assert lost.force == pytest.approx(4.0 * np.pi**2 * 5e-3 / 0.2**2, rel=0.03)  # how far the path got
+        assert lost.y[50] > 0.009
+
+
+def test_shape_after_the_snap_is_found_when_asked_for() -> None:
+    down = simulate(arch(20.0), chords=[arch(20.0).zero_chord], branch="down")[0]
+    assert down.good
+    assert down.y[50] < 0.0
+
+
+@pytest.mark.parametrize("K0", [5.0, 8.0])
+def test_other_side_of_a_taut_cable_does_not_exist(K0: float) -> None:
+    step = simulate(BendingTest(0.2, LINEAR, K0), chords=[0.1999], branch="down")[0]
+    assert step.outcome is Outcome.WRONG_BRANCH
+    assert step.force < 0.0
+
+
+@pytest.mark.parametrize("displacement", [0.03, 0.06])
+def test_limit_point_of_the_secant_reading_is_named(displacement: float) -> None:
+    test = table_1("secant")
+    beyond = simulate(test, np.array([0.005, 0.010, displacement]))
+    assert [step.outcome for step in beyond] == [Outcome.CONVERGED, Outcome.CONVERGED, Outcome.LIMIT_POINT]
+    assert "m" in Outcome.LIMIT_POINT.advice
+
+
+def test_limit_point_lies_where_the_tangent_vanishes() -> None:
+    # K0 = 2: 12.67 1/m. Just below it is still an equilibrium, beyond it is none.
+    test = table_1("secant")
+    steps = simulate(test, np.r_[0.005, 0.015, np.arange(0.0196, 0.0206, 0.0001)])
+    good = [step.kappa.max() for step in steps if step.good]
+    assert 12.3 < max(good) < 12.67
+    assert steps[-1].outcome is Outcome.LIMIT_POINT
+    assert all(step.outcome in (Outcome.CONVERGED, Outcome.LIMIT_POINT) for step in steps)
+
+
+def test_negative_stiffness_inside_the_range_is_a_limit_point_too() -> None:
+    law = Characteristic.from_ordinates([0.0, 4.0, 6.0, 8.0, 12.0], [5e-3, 2e-3, -1e-3, 2e-3, 5e-3])
+    step = simulate(BendingTest(0.2, law, 2.0), [0.02])[0]
+    assert step.outcome is Outcome.LIMIT_POINT
+
+
+def test_impossible_chords_are_unreachable() -> None:
+    test = table_1("tangent")
+    for chord in (0.2, 0.25, 0.0, -0.01):
+        step = simulate(test, chords=[chord])[0]
+        assert step.outcome is Outcome.UNREACHABLE
+        assert not step.good
+        assert step.outcome.advice
+
+
+def test_each_outcome_gives_advice() -> None:
+    for outcome in Outcome:
+        assert len(outcome.advice) > 20
+
+
+def test_clamped_ends_hide_a_constant_pre_curvature() -> None:
+    # Physics notes: with clamped ends a constant K0 does not change the shape, hence pinned ends in the test.
+    def clamped(K0: float) -> BendingTest:
+        return BendingTest(0.2, LINEAR, K0, left=Support("clamp", angle=0.0), right=Support("clamp", angle=0.0))
+
+    straight = simulate(clamped(0.0), chords=[0.19], branch="up")[0]
+    for K0 in (1.0, 2.0):
+        bent = simulate(clamped(K0), chords=[0.19], branch="up")[0]
+        assert np.allclose(bent.y, straight.y, atol=1e-9)
+        assert bent.force == pytest.approx(straight.force, rel=1e-7)
+    pinned = {K0: simulate(BendingTest(0.2, LINEAR, K0), chords=[0.19])[0].force for K0 in (0.0, 2.0)}
+    assert 1.0 - pinned[2.0] / pinned[0.0] == pytest.approx(0.36, abs=5.1e-3)
+
+
+def test_clamped_rod_buckles_at_four_times_the_pinned_load() -> None:
+    clamp = Support("clamp", angle=0.0)
+    for left, right, factor in [
+        (Support(), Support(), 1.0),
+        (clamp, Support(), 2.0457),
+        (Support(), clamp, 2.0457),
+        (clamp, clamp, 4.0),
+    ]:
+        test = BendingTest(0.2, LINEAR, 0.0, left=left, right=right, elements=200)
+        step = simulate(test, chords=[0.2 * (1.0 - 1e-4)])[0]
+        assert step.good
+        assert step.force == pytest.approx(factor * np.pi**2 * 5e-3 / 0.2**2, rel=3e-4)
+
+
+def test_warm_start_on_the_other_side_is_not_kept() -> None:
+    test = BendingTest(0.2, LAW, 2.0)
+    other = simulate(test, chords=[0.17], branch="down")[0]
+    step = simulate(test, chords=[0.17], starts=[other])[0]
+    assert step.good
+    assert step.y[50] > 0.0
+
+
+def test_unloaded_between_good_steps_continues_after_a_bad_one() -> None:
+    test = table_1("secant")
+    steps = simulate(test, [0.005, 0.06, 0.005])
+    assert not steps[1].good
+    assert steps[2].good
+    assert steps[2].force == pytest.approx(steps[0].force, rel=1e-9)
+    assert replace(test, zero="length").zero_chord == 0.2
