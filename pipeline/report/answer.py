@@ -98,7 +98,9 @@ def _sentence(result: Result, words: Words) -> str:
         high=words.curvature(curve.kappa[-1]),
     )
     known = pre_curvatures(result)
-    way = next((way for way in ("inverse", "balance", "photo") if way in known), None)
+    # an extended model takes the place of the fit that was found wanting; what the photo shows stands in any case
+    ways = ("photo",) if curve.method == "extended" else ("inverse", "balance", "photo")
+    way = next((way for way in ways if way in known), None)
     return text if way is None else f"{text} {words('answer_pre_curvature', value=words.measured(*known[way]))}"
 
 
@@ -115,7 +117,9 @@ def _agreement(result: Result, words: Words) -> str:
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
     key = {True: "agree_yes", False: "agree_no", None: "agree_open"}[part.compatible]
     text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
-    return text if part.p_value is None else f"{text} {words('agree_p', p=words.number(part.p_value, 2))}."
+    if part.p_value is not None:
+        text = f"{text} {words.probability(part.p_value, name='p')}."
+    return f"{words('before_extension')} {text}" if "extended" in found else text
 
 
 def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
@@ -137,7 +141,8 @@ def _advice(result: Result, words: Words) -> str:
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)
-        return words("next_what", what=experiment.what, causes=names) if names else experiment.what
+        what = experiment.what[:1].upper() + experiment.what[1:]
+        return words("next_what", what=what, causes=names) if names else what
     if any(finding.level != "info" for finding in result.findings):
         return words("next_findings")
     return words("next_none")

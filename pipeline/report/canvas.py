@@ -6,7 +6,7 @@ stay letters, and identifiers get the figure's name in front, because many figur
 
 Units: 1 unit of the SVG is 1 px at the width in which the figure was designed (matplotlib at 72 dots per inch).
 Colours: Okabe and Ito (2008), "Color Universal Design", told apart by readers with any of the three colour blindnesses;
-lines differ in their dashes as well. Steps of a test are ordered, so they run along the map cividis.
+lines differ in their dashes or their width as well. Steps of a test are ordered, so they run along the map cividis.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from html import escape
 from typing import Any
 
@@ -41,7 +42,7 @@ PALETTE = {
     "unvisited": ("#8a949f", "#77818c"),
 }
 LIGHT = {role: colours[0] for role, colours in PALETTE.items()}
-DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": (0, (6, 2, 1.5, 2))}
+DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": "-"}
 # cividis ends in a blue and a yellow that vanish on dark and white paper: these parts of it can be seen on either
 STEP_RANGE_LIGHT, STEP_RANGE_DARK = (0.0, 0.82), (0.22, 1.0)
 STEP_LEVELS = 24  # neighbours of a longer test share a colour; no eye tells more of them apart
@@ -78,7 +79,7 @@ STYLE: dict[str, Any] = {
     "grid.color": LIGHT["grid"],
     "grid.linewidth": 0.8,
     "axes.linewidth": 0.8,
-    "lines.linewidth": 1.8,
+    "lines.linewidth": 2.0,
     "hatch.linewidth": 0.6,
     "figure.facecolor": "none",
     "axes.facecolor": "none",
@@ -161,6 +162,7 @@ def step_colours(count: int) -> list[str]:
     return [_along(STEP_RANGE_LIGHT, level) for level in levels]
 
 
+@cache
 def page_colours() -> dict[str, tuple[str, str]]:
     """All CSS variables of colours: name without the dashes, and (light, dark) colour."""
     steps = {f"step{i}": (_along(STEP_RANGE_LIGHT, i), _along(STEP_RANGE_DARK, i)) for i in range(STEP_LEVELS)}

@@ -17,8 +17,6 @@ from pipeline.settings import ReportSettings
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
-# Tails of a distribution are not known beyond this, however small the formula makes p.
-SMALLEST_P = 1e-4
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def _named(part: DiagnosisPart, words: Words) -> list[str]:
             if size
             else f"{words.measured(cause.estimate, cause.std)} {cause.unit if cause.unit != '-' else ''}".rstrip()
         )
-        share = f"{words('col_probability')} {words.number(100.0 * cause.probability, SHARE_DIGITS)}"
+        share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
         lines.append(f"{words.cause(cause.name)}: {estimate} ({share}){tail}")
@@ -89,7 +87,7 @@ def _gain(part: DiagnosisPart, result: Result, words: Words) -> list[str]:
     def pair(values: tuple[float, float], factor: float) -> str:
         return " → ".join(words.number(factor * v) for v in values)
 
-    percent = [words.number(100.0 * v, 3) for v in (gain.heldout_excess_removed, *gain.ci95)]
+    percent = [words.number(100.0 * v, 4) for v in (gain.heldout_excess_removed, *gain.ci95)]
     return [
         words("gain_text", share=percent[0], low=percent[1], high=percent[2]),
         words(
@@ -108,12 +106,12 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     def percent(value: float | None) -> str:
         return "–" if value is None else words.number(100.0 * value, SHARE_DIGITS)
 
-    unit = "" if row.unit == "-" else f" {row.unit}"
+    unit = "" if row.unit == "-" else f" {row.unit.replace('^2', '²')}"
     twin = f"{words.cause(row.nearest_twin)} ({words.number(abs(row.twin_cosine), 3)})" if row.nearest_twin else "–"
     return [
         words.cause(row.name),
         f"{words.number(row.z, 2)} ± 1",
-        f"< {words.number(SMALLEST_P)}" if row.p_adjusted < SMALLEST_P else words.number(row.p_adjusted, 2),
+        words.probability(row.p_adjusted),
         f"{words.measured(row.estimate, row.std)}{unit}",
         "–" if row.minimal_detectable is None else f"{words.number(row.minimal_detectable, 2)}{unit}",
         percent(row.surviving_fraction),
@@ -165,7 +163,34 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
                 title=words(f"fig_map_{key}"),
                 description=words("fig_map_alt", rms=map_rms(residuals, words)),
             )
+    before, after = residual_map(part.residuals_before), residual_map(part.residuals_after)
+    if before is not None and any(value is not None for value in before.force_sigma):
+        drawn["force_rest"] = drawing(
+            "force-rest",
+            lambda f: maps.draw_force_rest(f, before, after, words, settings),
+            size=(400.0, 240.0),
+            title=words("fig_force_rest"),
+            description=words("fig_force_rest_alt", values=_force_texts(before, after, words)),
+        )
+    pattern = part.leftover or {}
+    if pattern.get("shape_m") and pattern.get("s_m"):
+        drawn["leftover"] = drawing(
+            "leftover",
+            lambda f: maps.draw_leftover(f, pattern["s_m"], pattern["shape_m"], words),
+            size=(400.0, 180.0),
+            title=words("leftover"),
+            description=words("fig_leftover_alt"),
+        )
     return drawn
+
+
+def _force_texts(before: ResidualMap, after: ResidualMap | None, words: Words) -> str:
+    """Forces left over by step, before and after, as text."""
+    parts = []
+    for residuals in (before, after):
+        values = residuals.force_sigma if residuals else []
+        parts.append(", ".join("–" if value is None else words.number(value, 2) for value in values))
+    return " → ".join(part for part in parts if part)
 
 
 def _closest(twins: dict[str, dict[str, float]], words: Words) -> str:

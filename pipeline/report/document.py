@@ -29,7 +29,7 @@ from pipeline.report.evidence import (
 )
 from pipeline.report.figures import force_unit, stiffness_unit
 from pipeline.report.files import write_atomic
-from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
+from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
@@ -105,6 +105,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             use=simulation_texts(result, words, settings),
             specimen_rows=specimen_rows(result, words),
             fit_rows=fit_rows(result, words),
+            nuisance_rows=nuisance_rows(result, words),
             provenance=provenance_rows(result),
             palette=palette_css(),
             css=asset("page.css") + asset("report.css"),

@@ -120,6 +120,13 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
             title=words("fig_curvatures"),
             description=words("fig_curvatures_alt", top=words.curvature(max(tops))),
         )
+    if result.inverse and len(result.inverse.branches) > 1:
+        drawn["branches"] = drawing(
+            "branches",
+            lambda f: figures.draw_branches(f, result, words, settings),
+            title=words("fig_branches"),
+            description=words("fig_branches_alt"),
+        )
     if result.balance and result.balance.pointwise and result.balance.curve:
         drawn["pointwise"] = drawing(
             "pointwise",

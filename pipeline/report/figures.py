@@ -15,7 +15,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, finish, plot_area, step_colours
-from pipeline.report.curves import Visited, curves
+from pipeline.report.curves import Visited, curves, visited
 from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
@@ -24,6 +24,8 @@ from pipeline.settings import ReportSettings
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.
 POINTWISE_HEADROOM = 2.0
+# A base model that lacks its cause wiggles; the answer must stay readable beside it.
+WANTING_HEADROOM = 1.8
 
 
 def band_width(settings: ReportSettings) -> float:
@@ -58,7 +60,7 @@ def draw_characteristic(figure: FigureBase, result: Result, words: Words, settin
     axes.axvspan(high, high + margin, **shade)
     for method, curve in parts.items():
         _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
-    if result.inverse and "inverse" in parts:
+    if result.inverse and "inverse" in parts and "extended" not in parts:
         knots = [k for k in result.inverse.knots if low <= k.kappa_per_m <= high]
         axes.plot(
             [k.kappa_per_m for k in knots],
@@ -69,15 +71,22 @@ def draw_characteristic(figure: FigureBase, result: Result, words: Words, settin
             mfc=LIGHT["paper"],
             mec=LIGHT["inverse"],
         )
-    top = max(
-        float(np.max(c.tangent + np.minimum(band_width(settings) * c.tangent_std, c.tangent))) for c in parts.values()
-    )
-    bottom = min(0.0, *(float(np.min(c.tangent)) for c in parts.values()))
     axes.set_xlim(left, high + margin)
-    axes.set_ylim(1.1 * unit.factor * bottom, 1.08 * unit.factor * top)
+    bottom, top = _limits(parts, band_width(settings))
+    axes.set_ylim(unit.factor * bottom, unit.factor * top)
     return finish(
         axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )
+
+
+def _limits(parts: dict[str, Visited], half: float) -> tuple[float, float]:
+    """Limits of f_EI: all curves fit; once the model was extended, curves found wanting may leave the picture."""
+    tops = {m: float(np.max(c.tangent + np.minimum(half * c.tangent_std, np.abs(c.tangent)))) for m, c in parts.items()}
+    top = max(tops.values())
+    if "extended" in tops:
+        top = min(top, WANTING_HEADROOM * tops["extended"])
+    lowest = min(0.0, *(float(np.min(curve.tangent)) for curve in parts.values()))
+    return max(1.1 * lowest, -0.25 * top), 1.08 * top
 
 
 def _banded(
@@ -92,10 +101,10 @@ def _banded(
 ) -> None:
     """A curve of one way with its band, in its colour and dash."""
     half = band_width(settings) * std
-    axes.fill_between(
-        kappa, unit.factor * (value - half), unit.factor * (value + half), color=LIGHT[method], alpha=0.2, lw=0.0
-    )
-    axes.plot(kappa, unit.factor * value, color=LIGHT[method], ls=DASHES[method], lw=2.2, label=words(f"way_{method}"))
+    low, high = unit.factor * (value - half), unit.factor * (value + half)
+    axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0)
+    width = {"lw": 3.0} if method == "extended" else {}
+    axes.plot(kappa, unit.factor * value, color=LIGHT[method], ls=DASHES[method], label=words(f"way_{method}"), **width)
 
 
 def draw_moment(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
@@ -128,7 +137,7 @@ def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: R
     pointwise = result.balance.pointwise if result.balance else []
     for colour, part in zip(step_colours(len(pointwise)), pointwise, strict=True):
         values = [unit.factor * v for v in part.tangent_Nm2]
-        label = f"{words('step')} {part.step}" if len(pointwise) <= 6 else None
+        label = f"{words('step')} {part.step}" if len(pointwise) <= 3 else None
         axes.plot(part.kappa_per_m, values, ls="none", marker=".", ms=3.5, color=colour, label=label)
     parts: dict[str, Visited] = {m: c for m, c in curves(result).items() if m == "balance"}
     for method, curve in parts.items():
@@ -136,6 +145,23 @@ def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: R
         axes.set_ylim(
             min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max())
         )
+    return finish(
+        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
+    )
+
+
+def draw_branches(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw f_EI fitted to loading and to unloading apart."""
+    axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
+    fitted = result.inverse.branches if result.inverse else {}
+    parts = {name: part for name in fitted if (part := visited("inverse", fitted[name])) is not None}
+    for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
+        low, high = (unit.factor * (curve.tangent + sign * half * curve.tangent_std) for sign in (-1.0, 1.0))
+        axes.fill_between(curve.kappa, low, high, color=LIGHT[colour], alpha=0.2, lw=0.0)
+        label = words(f"branch_{name}") if name in MARKERS else name
+        axes.plot(curve.kappa, unit.factor * curve.tangent, color=LIGHT[colour], ls=DASHES[colour], label=label)
+    bottom, top = _limits(parts, half)
+    axes.set_ylim(unit.factor * bottom, unit.factor * top)
     return finish(
         axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )

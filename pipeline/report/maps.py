@@ -13,7 +13,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import FigureBase
 from numpy.typing import NDArray
 
-from pipeline.report.canvas import LIGHT, finish, number_ticks, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, finish, number_ticks, plot_area
+from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import ResidualMap, Result
 from pipeline.settings import ReportSettings
@@ -48,10 +49,14 @@ def draw_map(
     figure: FigureBase, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = ""
 ) -> Axes:
     """Draw shape residuals in sigma over s and step."""
-    axes = plot_area(figure, left=92.0, right=64.0, top=20.0 if title else 8.0)
-    s, limit = 1e3 * np.asarray(residuals.s_m), settings.map_limit_sigma
+    axes = plot_area(figure, left=92.0, right=70.0, top=20.0 if title else 8.0)
+    s = 1e3 * np.asarray(residuals.s_m)
     columns = np.linspace(s[0], s[-1], settings.map_columns)
     table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
+    # noise alone stays pale; a large misfit sets its own scale, else all of it would be one colour
+    limit = (
+        max(settings.map_limit_sigma, float(np.nanpercentile(np.abs(table), 98.0))) if np.isfinite(table).any() else 1.0
+    )
     image = axes.imshow(
         np.ma.masked_invalid(table),
         cmap="PuOr_r",
@@ -75,6 +80,30 @@ def draw_map(
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)
     return axes
+
+
+def draw_force_rest(
+    figure: FigureBase, before: ResidualMap, after: ResidualMap | None, words: Words, settings: ReportSettings
+) -> Axes:
+    """Draw forces left over by step in sigma, before and after the extension."""
+    axes, noise = plot_area(figure, top=ONE_ROW), settings.residual_noise_sigma
+    axes.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    for residuals, role, marker, label in ((before, "alarm", "x", "before"), (after, "extended", "o", "after")):
+        if residuals is not None and residuals.force_sigma:
+            values = _numbers(residuals.force_sigma)
+            axes.plot(range(values.size), values, color=LIGHT[role], marker=marker, lw=0.8, label=words(label))
+    finish(axes, x=words("step"), y=words("axis_sigma"), decimal=words.decimal, legend=2)
+    axes.set_xticks(range(len(before.steps)), [str(step) for step in before.steps])
+    return axes
+
+
+def draw_leftover(figure: FigureBase, s_m: list[float], shape_m: list[float], words: Words) -> Axes:
+    """Draw the pattern of what no cause explains, along the cable."""
+    axes, unit = plot_area(figure, top=8.0), suited(shape_m, "m", decimal=words.decimal)
+    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    axes.plot(1e3 * np.asarray(s_m), unit.factor * np.asarray(shape_m), color=LIGHT["alarm"])
+    return finish(axes, x=words("axis_s"), y=words("axis_residual", unit=unit.symbol), decimal=words.decimal)
 
 
 def _numbers(row: list[float | None]) -> Array:
@@ -105,7 +134,7 @@ def draw_cosines(figure: FigureBase, cosines: dict[str, dict[str, float]], words
     if len(names) <= ANNOTATED_NAMES:
         for (row, column), value in np.ndenumerate(table):
             if np.isfinite(value):
-                text = words.number(value, 2)
+                text = f"{value:.2f}".replace(".", words.decimal)
                 axes.text(
                     column, row, text, ha="center", va="center", color="#000000" if value > 0.5 else "#fdfdfd", size=9
                 )

@@ -93,7 +93,7 @@ def draw_photo_curvature(figure: FigureBase, photo: PhotoPart, words: Words, set
 def _residual(figure: FigureBase, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> Axes:
     """Measured minus simulated position along the normal, with the noise of the photo as a band around zero."""
     axes = plot_area(figure, top=0.66 * figure.bbox.height)
-    unit = suited([float(np.max(np.abs(photo.shape_residual_m)))], "m", decimal=words.decimal)
+    unit = suited([*photo.shape_residual_m, *photo.shape_residual_std_m], "m", decimal=words.decimal)
     if photo.shape_residual_std_m:
         half = unit.factor * band_width(settings) * np.asarray(photo.shape_residual_std_m)
         axes.fill_between(s, -half, half, color=LIGHT["unvisited"], alpha=0.2, lw=0.0)

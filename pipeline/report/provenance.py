@@ -12,7 +12,7 @@ from pipeline.report.words import Words
 from pipeline.result import Result
 
 # Shown in their own places, not in the list of plain facts.
-APART = ("command", "inputs", "settings")
+APART = ("command", "inputs", "inputs_sha256", "settings")
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def provenance_rows(result: Result) -> Provenance:
             facts += [(f"{key}: {name}", _text(entry)) for name, entry in value.items()]
         else:
             facts.append((key, _text(value)))
-    inputs = source.get("inputs")
+    inputs = source.get("inputs_sha256", source.get("inputs"))
     return Provenance(
         command=_text(source.get("command", "")),
         facts=facts,
@@ -89,6 +89,10 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
             ),
             (words("fit_rmse"), f"{force.plain(misfit.force_rmse_N)}, {length.plain(misfit.shape_rmse_m)}"),
         ]
-    for name, (value, std) in part.nuisance.items():
-        rows.append((words("fit_nuisance", name=name.replace("_", " ")), words.measured(value, std)))
     return rows
+
+
+def nuisance_rows(result: Result, words: Words) -> list[tuple[str, str]]:
+    """What was fitted besides stiffness and pre-curvature, in SI units: scale, length, place of the bearing axes."""
+    nuisance = result.inverse.nuisance if result.inverse else {}
+    return [(name.replace("_", " "), words.measured(value, std)) for name, (value, std) in nuisance.items()]

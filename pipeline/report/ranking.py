@@ -50,7 +50,7 @@ def draw_ranking(figure: FigureBase, diagnosis: DiagnosisPart, words: Words, set
     finish(pull, x=words("axis_pull"), y="", decimal=words.decimal)
     finish(impact, x=words("axis_impact"), y="", decimal=words.decimal)
     for axes in (pull, impact):
-        axes.locator_params(axis="x", nbins=5)
+        axes.locator_params(axis="x", nbins=4)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(axis="y", visible=False)
         axes.axvline(0.0, color=LIGHT["muted"], lw=0.8)

@@ -62,7 +62,7 @@ def _pooled_text(pooled: Pooled, count: int, unit: Unit, words: Words, settings:
         mean=unit.text(pooled.stiffness, pooled.stiffness_std),
         scatter=words.number(100.0 * pooled.scatter_relative, 2),
         own=words.number(100.0 * pooled.error_relative, 2),
-        verdict=words("pooled_differ" if differ else "pooled_same", p=words.number(pooled.p_value, 2)),
+        verdict=words("pooled_differ" if differ else "pooled_same", p=words.probability(pooled.p_value, name="p")),
     )
 
 

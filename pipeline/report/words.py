@@ -14,6 +14,7 @@ from pathlib import Path
 from pipeline.rounding import plain, rounded
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
+SMALLEST_P = 1e-4
 LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 
 
@@ -69,6 +70,12 @@ class Words:
     def curvature(self, value: float) -> str:
         """A curvature as the end of a range, in 1/m: three digits, zeros kept."""
         return plain(value, 3, decimal=self.decimal, zeros=True)
+
+    def probability(self, value: float, *, name: str = "") -> str:
+        """A p value, with ``name`` as an equation; tails beyond `SMALLEST_P` are not known to any formula."""
+        if value < SMALLEST_P:
+            return f"{name} < {self.number(SMALLEST_P)}".strip()
+        return f"{name} = {self.number(value, 2)}" if name else self.number(value, 2)
 
     def measured(self, value: float | None, std: float | None) -> str:
         """A measured number with its standard deviation."""
