@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,9 +143,8 @@ def _stiffness(setup: Setup, values: Values) -> Setup:
 
 
 def _varying_pre_curvature(setup: Setup, values: Values) -> Setup:
-    base, deviation = setup.test.pre_curvature, _along(values)
-    mean = base if callable(base) else lambda u: np.full_like(u, float(np.mean(base)))
-    return replace(setup, test=replace(setup.test, pre_curvature=lambda u: mean(u) + deviation(u)))
+    mean, deviation = float(np.mean(setup.test.rod.section.pre_curvature)), _along(values)
+    return replace(setup, test=replace(setup.test, pre_curvature=lambda u: mean + deviation(u)))
 
 
 def _varying_stiffness(setup: Setup, values: Values) -> Setup:
@@ -171,13 +171,17 @@ def _tilt(setup: Setup, values: Values) -> Setup:
     return replace(setup, camera=replace(setup.camera, perspective_per_m=terms))
 
 
+def _one(field: str, values: Values) -> dict[str, Any]:
+    return {field: values[0]}
+
+
 def _on_test(field: str) -> Callable[[Setup, Values], Setup]:
-    return lambda setup, values: replace(setup, test=replace(setup.test, **{field: values[0]}))
+    return lambda setup, values: replace(setup, test=replace(setup.test, **_one(field, values)))
 
 
 def _on_supports(field: str) -> Callable[[Setup, Values], Setup]:
     def apply(setup: Setup, values: Values) -> Setup:
-        left, right = (replace(end, **{field: values[0]}) for end in (setup.test.left, setup.test.right))
+        left, right = (replace(end, **_one(field, values)) for end in (setup.test.left, setup.test.right))
         return replace(setup, test=replace(setup.test, left=left, right=right))
 
     return apply

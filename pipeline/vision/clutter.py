@@ -122,7 +122,8 @@ def _polygon(
     if mask is None:
         mask = np.zeros((camera.height, camera.width), np.uint8)
     points = np.rint(np.clip(np.column_stack([u, v]), -30_000, 30_000) * 16).astype(np.int32)
-    return cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
+    cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
+    return mask
 
 
 def _frame(length: float, width: float) -> tuple[Array, Array]:
@@ -157,7 +158,7 @@ def _text(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]
     mask = np.zeros((camera.height, camera.width), np.uint8)
     cv2.putText(mask, thing.text, (int(u - w / 2), int(v + h / 2)), font, scale, 255, 2, cv2.LINE_AA)
     turn = cv2.getRotationMatrix2D((u, v), -np.degrees(thing.angle_rad + camera.roll_rad), 1.0)
-    return [(cv2.warpAffine(mask, turn, (camera.width, camera.height)), 1.0)]
+    return [(np.asarray(cv2.warpAffine(mask, turn, (camera.width, camera.height)), np.uint8), 1.0)]
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ class ChessBoard:
         lift = camera.homography(1.0)[:, 2] - base[:, 2]
         spatial = np.column_stack([base[:, 0], base[:, 1], lift, base[:, 2]])
         pose = np.vstack([np.column_stack([turn[:, :2], [*self.place_m, self.height_m]]), [0.0, 0.0, 1.0]])
-        return spatial @ pose
+        return np.asarray(spatial @ pose)
 
     def corners(self, camera: Camera) -> Array:
         """Exact pixels (rows * columns, 2) of the inner corners, row by row."""
@@ -211,7 +212,7 @@ def board_layer(board: ChessBoard, camera: Camera, light: Light, channels: int, 
     blurred square waves, exactly where the board is locally flat; a pixel counts with its variance 1/12.
     """
     back = np.linalg.inv(board.homography(camera))
-    v, u = (a.ravel().astype(float) for a in np.mgrid[0 : camera.height, 0 : camera.width])
+    v, u = (a.ravel().astype(float) for a in np.indices((camera.height, camera.width)))
     a, b = _on_board(back, camera, u, v)
     sigma = sqrt(blur_px**2 + 1.0 / 12.0) / camera.px_per_m
     half = 0.5 * board.square_m * np.array([board.columns + 3, board.rows + 3])
@@ -235,4 +236,4 @@ def _wave(at: Array, square: float, corners: int, sigma: float) -> Array:
     """Square wave of +-1 that changes sign at the corners' lines, blurred by ``sigma``."""
     line = at / square + 0.5 * (corners - 1)
     near = np.clip(np.rint(line), 0, corners - 1)  # the outer border is drawn by the sheet, not by a sign
-    return (2.0 * ndtr((line - near) * square / sigma) - 1.0) * np.where(near % 2 == 0, 1.0, -1.0)
+    return np.asarray((2.0 * ndtr((line - near) * square / sigma) - 1.0) * np.where(near % 2 == 0, 1.0, -1.0))

@@ -124,8 +124,8 @@ def _noise(width: int, height: int, along: float, across: float, rng: Rng) -> Im
         rng.standard_normal((h, w), dtype=np.float32), (0, 0), sigmaX=along / fx, sigmaY=across / fy
     )
     if fx == 1 and fy == 1:
-        return small[:height, :width]
-    return cv2.resize(small, (w * fx, h * fy), interpolation=cv2.INTER_CUBIC)[:height, :width]
+        return np.asarray(small[:height, :width], np.float32)
+    return np.asarray(cv2.resize(small, (w * fx, h * fy), interpolation=cv2.INTER_CUBIC), np.float32)[:height, :width]
 
 
 def _along(ground: Ground, width: int, height: int, along: float, across: float, rng: Rng) -> Image:
@@ -135,9 +135,10 @@ def _along(ground: Ground, width: int, height: int, along: float, across: float,
     side = int(np.hypot(width, height)) + 2
     flat = _noise(side, side, along, across, rng)
     turn = cv2.getRotationMatrix2D((side / 2, side / 2), -np.degrees(ground.angle_rad), 1.0)
-    turn[:, 2] -= ((side - width) / 2, (side - height) / 2)
-    return cv2.warpAffine(flat, turn, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    turn[:, 2] -= np.array([(side - width) / 2, (side - height) / 2])
+    turned = cv2.warpAffine(flat, turn, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    return np.asarray(turned, np.float32)
 
 
 def _unit(texture: Image) -> Image:
-    return ((texture - texture.mean()) / max(float(texture.std()), 1e-9)).astype(np.float32)
+    return np.asarray((texture - texture.mean()) / max(float(texture.std()), 1e-9), np.float32)

@@ -95,7 +95,7 @@ class Camera:
         flip = -1.0 if self.mirrored else 1.0
         pose = np.array([[c, -s * flip, 0.0], [s, c * flip, 0.0], [0.0, 0.0, 1.0]])
         shift = np.array([[1.0, 0.0, -self.look_at_m[0]], [0.0, 1.0, -self.look_at_m[1]], [0.0, 0.0, 1.0]])
-        return np.diag([self.px_per_m, self.px_per_m, 1.0]) @ self._pinhole(height_m) @ pose @ shift
+        return np.asarray(np.diag([self.px_per_m, self.px_per_m, 1.0]) @ self._pinhole(height_m) @ pose @ shift)
 
     def _pinhole(self, height_m: float) -> Array:
         gx, gy = self.perspective_per_m

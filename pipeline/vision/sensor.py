@@ -68,10 +68,10 @@ def expose(sensor: Sensor, brightness: Image, rng: np.random.Generator) -> Pixel
     """Picture (h, w) or (h, w, 3 or 4; RGB) of a brightness (h, w, channels)."""
     picture = brightness
     if sensor.blur_px:
-        picture = cv2.GaussianBlur(picture, (0, 0), sensor.blur_px)
+        picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), sensor.blur_px), np.float32)
     if sensor.motion_px:
-        picture = cv2.filter2D(picture, -1, _streak(sensor.motion_px, sensor.motion_rad))
-    picture = np.maximum(picture.reshape(brightness.shape), 0.0)
+        picture = np.asarray(cv2.filter2D(picture, -1, _streak(sensor.motion_px, sensor.motion_rad)), np.float32)
+    picture = np.maximum(picture.reshape(brightness.shape), np.float32(0.0))
     if sensor.noise or sensor.shot_noise:
         spread = np.sqrt(np.float32(sensor.noise**2) + np.float32(sensor.shot_noise**2) * picture)
         picture = picture + spread * rng.standard_normal(picture.shape, dtype=np.float32)
@@ -81,11 +81,13 @@ def expose(sensor: Sensor, brightness: Image, rng: np.random.Generator) -> Pixel
         soft = cv2.GaussianBlur(picture, (0, 0), 1.5).reshape(picture.shape)
         picture = picture + np.float32(sensor.sharpen) * (picture - soft)
     top = 2**sensor.bit_depth - 1
-    pixels = np.clip(np.rint(picture * top), 0, top).astype(np.uint8 if sensor.bit_depth == 8 else np.uint16)
+    counts = np.clip(np.rint(picture * top), 0, top)
+    pixels: Pixels = counts.astype(np.uint8) if sensor.bit_depth == 8 else counts.astype(np.uint16)
     if sensor.mode == "grey":
         return pixels[:, :, 0]
     if sensor.mode == "alpha":
-        return np.dstack([pixels, np.full(pixels.shape[:2], np.iinfo(pixels.dtype).max, pixels.dtype)])
+        opaque = np.full_like(pixels[:, :, :1], np.iinfo(pixels.dtype).max)
+        return np.concatenate([pixels, opaque], axis=2)
     return pixels
 
 
@@ -95,7 +97,7 @@ def _streak(length_px: float, angle_rad: float) -> Image:
     kernel, _, _ = np.histogram2d(
         at * np.sin(angle_rad), at * np.cos(angle_rad), bins=2 * half + 1, range=[[-half - 0.5, half + 0.5]] * 2
     )
-    return (kernel / kernel.sum()).astype(np.float32)
+    return np.asarray(kernel / kernel.sum(), np.float32)
 
 
 def encode(pixels: Pixels, suffix: str, *, jpeg_quality: int = 95, exif_orientation: int = 1) -> bytes:

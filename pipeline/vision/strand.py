@@ -200,8 +200,9 @@ def half_plane(distance: Array, gradient: Array, cells: int = 1) -> Array:
     b = np.maximum(np.min(gradient, axis=0) / a, 1e-4)
     d = np.clip(distance / a, -1.5, 1.5)
     p, m = 0.5 * (1.0 + b), 0.5 * (1.0 - b)
-    parts = [np.maximum(d + p, 0) ** 2, -(np.maximum(d + m, 0) ** 2), -(np.maximum(d - m, 0) ** 2)]
-    return np.clip((sum(parts) + np.maximum(d - p, 0) ** 2) / (2.0 * b), 0.0, 1.0)
+    outer = np.maximum(d + p, 0) ** 2 + np.maximum(d - p, 0) ** 2
+    inner = np.maximum(d + m, 0) ** 2 + np.maximum(d - m, 0) ** 2
+    return np.asarray(np.clip((outer - inner) / (2.0 * b), 0.0, 1.0))
 
 
 def soft_edge(distance: Array, gradient: Array, cells: int = 1, *, blur_px: float) -> Array:
@@ -259,7 +260,7 @@ def _near(nodes: _Nodes, camera: Camera, radius: float) -> tuple[NDArray[np.intp
     index = np.flatnonzero(mask)
     v, u = (a.astype(float) for a in np.divmod(index, camera.width))
     _, i = cKDTree(np.column_stack([nodes.u, nodes.v])).query(np.column_stack([u, v]))
-    return index, u, v, i
+    return index, u, v, np.asarray(i)
 
 
 def _jacobian(camera: Camera, u: Array, v: Array) -> Array:
