@@ -1,0 +1,243 @@
+"""The inverse problem exactly as the paper states it (Sec. 4), for comparison and the virtual experiment of Table 1.
+
+Three control points at given abscissae and a constant K0 are fitted to the forces and curvatures of all steps,
+
+    sum_j (F_j^S - F_j^G)^2 + w sum_j sum_i (K_ji^S - K_ji^G)^2      Eq. (7), w = 1e-3 (N m)^2
+
+with the sum over i on the vertices of the simulated grid; w = 0 and K0 = 0 is Eq. (6). Levenberg-Marquardt from
+EI = 0.01 N m^2 constant and K0 = 1 1/m; the evolution over the iterations is kept (Figs. 4 and 5). It is scipy's
+trust-region form of the method: MINPACK's cannot be told that a trial has no equilibrium, and with the secant reading
+it ends at the limit point half-way.
+
+w has a unit and its sum depends on the number of vertices: the default of `rod.inverse` weights every residual by its
+standard deviation instead, and fits positions rather than curvatures. Nothing here keeps the stiffness positive: with
+K0 forced to zero the fit runs into negative stiffness at low curvature, which is the paper's Fig. 6. Trials whose
+moment falls anywhere but in the two end joints (curvature K0, no moment) have no shape that means anything and are
+refused.
+
+Signs and units: chord frame, SI; displacement from the natural chord of the mounted cable, or from the length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from rod.bending_test import BendingTest, simulate
+from rod.characteristic import Characteristic, Reading
+from rod.equilibrium import Equilibrium, Outcome
+from rod.sensitivity import derivatives
+
+Array = NDArray[np.float64]
+
+PAPER_WEIGHT = 1e-3
+PAPER_START = (0.01, 1.0)
+
+
+@dataclass(frozen=True)
+class Virtual:
+    """Data of the fit: displacements and forces (n,) m, N; curvatures at the vertices (n, elements + 1) 1/m or None."""
+
+    length: float
+    displacements: Array
+    forces: Array
+    curvatures: Array | None = None
+
+
+@dataclass(frozen=True)
+class PaperIteration:
+    """State of the fit at one iteration: control points (k,) N m^2, K0 1/m, objective N^2."""
+
+    ordinates: Array
+    pre_curvature: float
+    objective: float
+
+
+@dataclass(frozen=True)
+class PaperFit:
+    """Result of the paper's fit.
+
+    Attributes
+    ----------
+    characteristic : Characteristic
+    pre_curvature : 1/m
+    objective : N^2
+    history : tuple of PaperIteration
+        From the start to the result.
+    steps : tuple of Equilibrium
+        At the result.
+    outcome : Outcome or None
+        Of the first simulated step that is not a stable equilibrium; None if all are.
+    converged : bool
+    """
+
+    characteristic: Characteristic
+    pre_curvature: float
+    objective: float
+    history: tuple[PaperIteration, ...]
+    steps: tuple[Equilibrium, ...]
+    outcome: Outcome | None
+    converged: bool
+
+    @property
+    def iterations(self) -> int:
+        """Levenberg-Marquardt iterations, the start not counted."""
+        return len(self.history) - 1
+
+
+def paper_fit(
+    data: Virtual,
+    knots: ArrayLike,
+    *,
+    reading: Reading = "secant",
+    weight: float = PAPER_WEIGHT,
+    start: tuple[float, float] = PAPER_START,
+    pre_curvature: float | None = None,
+    zero: Literal["natural", "length"] = "natural",
+    elements: int = 100,
+    tolerance: float = 1e-12,
+) -> PaperFit:
+    """Fit control points and K0 by Eq. (7), or Eq. (6).
+
+    Parameters
+    ----------
+    data : Virtual
+        ``curvatures`` None drops the curvature term.
+    knots : (k,) 1/m
+    reading : {"secant", "tangent"}
+        What the control points mean; the paper's iterative method makes them a secant.
+    weight : N^2 m^2
+        w of Eq. (7).
+    start : (N m^2, 1/m)
+    pre_curvature : 1/m or None
+        Fixes K0; None fits it.
+    zero : {"natural", "length"}
+        From where displacement is counted.
+    elements : int
+    tolerance : float
+        Relative change of objective and parameters at which the method stops.
+
+    Raises
+    ------
+    ValueError
+        If the start has no equilibrium, or there are fewer data than parameters.
+    """
+    at = np.asarray(knots, float)
+    problem = _Problem(data, at, reading, weight, pre_curvature, zero, elements)
+    begin = np.ones(at.size) if pre_curvature is not None else np.r_[np.ones(at.size), 1.0]
+    unit = np.r_[np.full(at.size, start[0]), [start[1] if start[1] else 1.0] * (pre_curvature is None)]
+    count = data.forces.size * (1 if data.curvatures is None else 1 + data.curvatures.shape[1])
+    if count < begin.size:
+        raise ValueError(f"{count} data do not determine {begin.size} parameters")
+    history: list[PaperIteration] = []
+    accepted = problem.simulate(begin * unit, None)
+    trial = accepted
+
+    def residual(p: Array) -> Array:
+        nonlocal trial
+        if np.array_equal(p, begin):
+            trial = accepted
+        elif np.all(np.isfinite(p)):
+            trial = problem.simulate(p * unit, accepted.steps)
+        else:  # scipy's trust region, shrunk to nothing at a limit point
+            return np.full(count, np.inf)
+        return trial.residual
+
+    def jacobian(p: Array) -> Array:  # called where a trial was accepted, right after it
+        nonlocal accepted
+        accepted = trial
+        history.append(problem.iteration(p * unit, accepted))
+        return problem.jacobian(accepted) * unit
+
+    if not np.all(np.isfinite(accepted.residual)):
+        raise ValueError(f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m")
+    with np.errstate(all="ignore"):  # at a limit point scipy's trust region shrinks until its own ratios overflow
+        found = least_squares(
+            residual, begin, jacobian, x_scale="jac", xtol=tolerance, ftol=tolerance, gtol=tolerance, max_nfev=100
+        )
+    end = problem.simulate(found.x * unit, accepted.steps)
+    history.append(problem.iteration(found.x * unit, end))
+    outcome = next((step.outcome for step in end.steps if not step.good), None)
+    law, K0 = problem.split(found.x * unit)
+    return PaperFit(
+        law, K0, float(end.residual @ end.residual), tuple(history), end.steps, outcome, bool(found.status > 0)
+    )
+
+
+def _means_something(test: BendingTest, step: Equilibrium) -> bool:
+    """Whether a step is an equilibrium, stable but for a falling moment in the end joints."""
+    if step.good:
+        return True
+    falling = test.characteristic.tangent(step.kappa, step.rod.section.pre_curvature) <= 0.0
+    reached = abs(step.chord - (step.hold.chord or 0.0)) < 1e-6 * test.length
+    return step.outcome is Outcome.LIMIT_POINT and reached and not bool(np.any(falling[1:-1]))
+
+
+@dataclass(frozen=True)
+class _Simulation:
+    """Steps of one trial and its residuals (r,)."""
+
+    test: BendingTest
+    steps: tuple[Equilibrium, ...]
+    residual: Array
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Eq. (7) with its fixed choices; parameters: control points, then K0 if it is free."""
+
+    data: Virtual
+    knots: Array
+    reading: Reading
+    weight: float
+    fixed: float | None
+    zero: Literal["natural", "length"]
+    elements: int
+
+    def split(self, parameters: Array) -> tuple[Characteristic, float]:
+        k = self.knots.size
+        law = Characteristic.from_ordinates(self.knots, parameters[:k], reading=self.reading)
+        return law, float(parameters[k]) if self.fixed is None else self.fixed
+
+    def simulate(self, parameters: Array, warm: Sequence[Equilibrium] | None) -> _Simulation:
+        law, K0 = self.split(parameters)
+        test = BendingTest(self.data.length, law, K0, zero=self.zero, elements=self.elements)
+        steps = simulate(test, chords=test.zero_chord - self.data.displacements, branch="up", starts=warm)
+        reached = all(_means_something(test, step) for step in steps)
+        forces = np.array([step.force for step in steps]) - self.data.forces
+        rows = [forces]
+        if self.data.curvatures is not None:
+            rows.append(np.sqrt(self.weight) * (np.array([s.kappa for s in steps]) - self.data.curvatures).ravel())
+        value = np.concatenate(rows)
+        return _Simulation(test, steps, value if reached else np.full(value.size, np.inf))
+
+    def jacobian(self, here: _Simulation) -> Array:
+        """Exact; an equilibrium whose moment falls somewhere (negative stiffness) has derivatives too."""
+        steps = [replace(step, outcome=Outcome.CONVERGED) for step in here.steps]
+        slopes = derivatives(here.test, steps, ("ordinates", "pre_curvature", "chord"))
+        k = self.knots.size
+        chain = np.eye(k + 2)[:, : k + (self.fixed is None)]
+        if self.fixed is None:
+            chain[k + 1, k] = self._zero_by_pre_curvature(here.test)
+        rows = [np.stack([slope.force for slope in slopes])]
+        if self.data.curvatures is not None:
+            rows.append(np.sqrt(self.weight) * np.vstack([slope.kappa for slope in slopes]))
+        return np.asarray(np.vstack(rows) @ chain)
+
+    def _zero_by_pre_curvature(self, test: BendingTest) -> float:
+        """Derivative of the natural chord of the discrete cable, m^2: edges turn by their distance from mid-span."""
+        if self.zero == "length":
+            return 0.0
+        angles, edges = test.rod.mounted.angles, test.rod.edges
+        middles = np.cumsum(edges) - 0.5 * edges
+        turn = 0.5 * test.length - middles
+        return float(-np.sum(edges * np.sin(angles) * turn))
+
+    def iteration(self, parameters: Array, here: _Simulation) -> PaperIteration:
+        law, K0 = self.split(parameters)
+        return PaperIteration(law.ordinates, K0, float(here.residual @ here.residual))
