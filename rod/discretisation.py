@@ -117,7 +117,7 @@ class Rod:
         profile = self.section.profile
         scale = self.section.law.stiffness_scale * (1.0 if profile is None else float(np.max(np.abs(profile))))
         friction = self.section.friction
-        scale += 0.0 if friction is None else friction.half_width / friction.stick_curvature
+        scale += 0.0 if friction is None else friction.stiffness
         if not (np.isfinite(scale) and scale > 0.0):
             raise ValueError("the characteristic has no stiffness")
         return scale

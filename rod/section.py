@@ -40,25 +40,40 @@ class InternalFriction:
     elements : int
         Elements slip one after the other at stick_curvature * (1..elements) / elements: one is a sharp stick-slip,
         several a rounded loop. Three follow a smooth loop to a few per cent.
+    beside : InternalFriction or None
+        Further elements acting in parallel: a loop of any form is a sum of such groups.
     """
 
     half_width: float
     stick_curvature: float
     elements: int = 3
+    beside: InternalFriction | None = None
 
     def __post_init__(self) -> None:
         if not (self.half_width >= 0.0 and self.stick_curvature > 0.0 and self.elements >= 1):
             raise ValueError(f"need half_width >= 0, stick_curvature > 0 and elements >= 1, got {self}")
 
-    @property
+    @cached_property
     def stick(self) -> Array:
-        """Curvature change c_e to slip of each element, (elements, 1) 1/m."""
-        return self.stick_curvature * np.arange(1, self.elements + 1)[:, None] / self.elements
+        """Curvature change c_e to slip of each element, (count, 1) 1/m; those beside follow."""
+        own = self.stick_curvature * np.arange(1, self.elements + 1)[:, None] / self.elements
+        return own if self.beside is None else np.vstack([own, self.beside.stick])
+
+    @cached_property
+    def slip(self) -> Array:
+        """Slip moment M_e of each element, (count, 1) N m."""
+        own = np.full((self.elements, 1), self.half_width / self.elements)
+        return own if self.beside is None else np.vstack([own, self.beside.slip])
+
+    @cached_property
+    def own(self) -> Array:
+        """1 for the elements of this record, 0 for those beside, (count, 1)."""
+        return (np.arange(self.stick.size) < self.elements).astype(float)[:, None]
 
     @property
-    def share(self) -> float:
-        """Slip moment M_e of one element, N m."""
-        return self.half_width / self.elements
+    def stiffness(self) -> float:
+        """Stiffness of all elements while they stick, N m^2."""
+        return float(np.sum(self.slip / self.stick))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +139,7 @@ class Section:
 
     def virgin(self) -> tuple[Array, Array]:
         """``relaxed`` and ``reached`` of the mounted cable."""
-        elements = 0 if self.friction is None else self.friction.elements
+        elements = 0 if self.friction is None else self.friction.stick.size
         return np.repeat(self.pre_curvature[None], elements, axis=0), np.zeros_like(self.pre_curvature)
 
     def rest_curvature(self, K: Array, memory: Memory) -> Array:
@@ -137,13 +152,13 @@ class Section:
         elastic = self._set_response(memory) if self.plastic_rate else self._elastic
         if self.friction is None:
             return elastic
-        stick, share, relaxed = self.friction.stick, self.friction.share, memory.relaxed
+        stick, slip, relaxed = self.friction.stick, self.friction.slip, memory.relaxed
 
         def with_friction(K: Array) -> tuple[Array, Array]:
             m, tangent = elastic(K)
             u = (K - relaxed) / stick
             sticking = np.abs(u) < 1.0
-            return m + share * np.clip(u, -1.0, 1.0).sum(axis=0), tangent + share * (sticking / stick).sum(axis=0)
+            return m + (slip * np.clip(u, -1.0, 1.0)).sum(axis=0), tangent + (slip * sticking / stick).sum(axis=0)
 
         return with_friction
 
@@ -174,7 +189,7 @@ class Section:
         if self.friction is None:
             return energy
         u = np.clip((K - memory.relaxed) / self.friction.stick, -1.0, 1.0)
-        return np.asarray(energy + 0.5 * self.friction.share * (self.friction.stick * u**2).sum(axis=0))
+        return np.asarray(energy + 0.5 * (self.friction.slip * self.friction.stick * u**2).sum(axis=0))
 
     def potential(self, K: Array, memory: Memory) -> Array:
         """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
@@ -194,4 +209,4 @@ class Section:
             return np.asarray(energy)
         u = np.abs((K - memory.relaxed) / self.friction.stick)
         element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * self.friction.stick
-        return np.asarray(energy + self.friction.share * element.sum(axis=0))
+        return np.asarray(energy + (self.friction.slip * element).sum(axis=0))

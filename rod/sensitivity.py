@@ -112,7 +112,7 @@ def derivatives(
     """
     moves = directions(test, parameters)
     rest = _mounted(test, moves)
-    elements = 0 if test.friction is None else test.friction.elements
+    elements = 0 if test.friction is None else test.friction.stick.size
     past = _Past(
         np.repeat(moves.pre_curvature[None], elements, axis=0),
         np.zeros_like(moves.pre_curvature),
@@ -227,9 +227,10 @@ def _moment(test: BendingTest, step: Equilibrium, K: Array, moves: Directions, p
         u = (K - memory.relaxed) / stick
         sticking = (np.abs(u) < 1.0)[:, :, None]
         slow = past.relaxed / stick[:, :, None]
-        slow = slow + u[:, :, None] * (moves.scalar("stick_curvature") / friction.stick_curvature)
-        moment = moment - friction.share * np.where(sticking, slow, 0.0).sum(axis=0)
-        moment = moment + np.clip(u, -1.0, 1.0).sum(axis=0)[:, None] * moves.scalar("hysteresis") / friction.elements
+        slow = slow + (friction.own * u)[:, :, None] * (moves.scalar("stick_curvature") / friction.stick_curvature)
+        moment = moment - (friction.slip[:, :, None] * np.where(sticking, slow, 0.0)).sum(axis=0)
+        built = (friction.own * np.clip(u, -1.0, 1.0)).sum(axis=0) / friction.elements
+        moment = moment + built[:, None] * moves.scalar("hysteresis")
     return np.asarray(moment)
 
 
@@ -337,7 +338,8 @@ def _advanced(
     if section.friction is not None:
         stick = section.friction.stick
         u = ((K - memory.relaxed) / stick)[:, :, None]
-        slid = stick[:, :, None] * moves.scalar("stick_curvature") / section.friction.stick_curvature
+        growth = section.friction.own * stick / section.friction.stick_curvature
+        slid = growth[:, :, None] * moves.scalar("stick_curvature")
         relaxed = np.where(np.abs(u) < 1.0, past.relaxed, dK[None] - np.sign(u) * slid)
     ends = []
     for end, support, slip, move in (

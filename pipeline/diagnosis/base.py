@@ -20,6 +20,7 @@ from pipeline.diagnosis.causes.camera import scaled
 from pipeline.diagnosis.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
+from rod.knots import place_knots
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -133,7 +134,7 @@ def start(test: MeasuredTest, facts: Facts, *, knots: int, elements: int, straig
         slope, rest = np.ptp(K) / max(float(np.max(np.abs(m))), 1e-30), 0.0
     reach = max(float(np.quantile(K, 0.995)) - rest, 0.2 * facts.curvature_scale)
     base = Base(
-        knots=np.linspace(0.0, reach, knots) if knots > 1 else np.zeros(1),
+        knots=place_knots(0.0, reach, knots) if knots > 2 else np.linspace(0.0, reach, knots),
         stiffness=float(1.0 / slope),
         length=test.length,
         scale_std=max(test.scale_std, 1e-7),

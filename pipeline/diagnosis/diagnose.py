@@ -6,7 +6,7 @@ set of names -> a second cause -> what is left -> gain on held-out steps -> the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
 from pipeline.diagnosis.presentation import present
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.verdict import credible_set, probabilities
-from pipeline.diagnosis.workbench import Workbench, prepare, scored
+from pipeline.diagnosis.workbench import Workbench, prepare, scored, with_finer_law
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -116,9 +116,16 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     accepted = _second_cause(bench, singles, settings) or singles[0]
+    accepted = _with_finer_law(bench, accepted, settings)
     left = _left_over(bench, accepted.fitted, settings)
     alien = left.p_value < settings.alien_false_alarm and left.excess > settings.explained_share * accepted.gain
     return Conclusion(singles, chance, len(members), accepted, left, alien)
+
+
+def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:
+    """The accepted explanation with f_EI identified again: more control points, and a range that fits its shapes."""
+    finer = with_finer_law(bench.observation, accepted.fitted, bench.suspicion.causes, settings)
+    return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 
 def _second_cause(bench: Workbench, singles: list[Explanation], settings: DiagnosisSettings) -> Explanation | None:

@@ -6,10 +6,11 @@ place or time, and with further forms of the same cause where several may add up
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fit import Extension, Fit, Term, fit
 from pipeline.diagnosis.observation import Observation
 from pipeline.diagnosis.pairs import Pair, best_pairs, pair_gains
@@ -38,14 +39,14 @@ class Explanation:
     gain: float
     weighed: Weighed
 
-    def amount(self, cause: int) -> tuple[float, float]:
-        """Amount of a cause (its strongest form) and its standard deviation."""
-        owners = [self.causes[0]] * len(self.fitted.extension.terms)
-        if len(self.causes) == 2:
-            owners[-1] = self.causes[1]
-        terms = [i for i, owner in enumerate(owners) if owner == cause]
-        values = [self.fitted.amount(i) for i in terms]
-        return max(values, key=lambda pair: abs(pair[0]))
+    def amount(self, cause: Cause) -> tuple[float, float]:
+        """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest."""
+        own = [i for i, term in enumerate(self.fitted.extension.terms) if term.cause is cause]
+        if not cause.additive:
+            return max((self.fitted.amount(i) for i in own), key=lambda pair: abs(pair[0]))
+        at = [self.fitted.extension.owners[i] for i in own]
+        variance = float(self.fitted.covariance[np.ix_(at, at)].sum())
+        return float(self.fitted.vector[at].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
 def candidates(suspicion: Suspicion, settings: DiagnosisSettings) -> list[int]:
@@ -186,13 +187,13 @@ def _add_cause(
 def _explanation(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: Suspicion) -> Explanation:
     terms = fitted.extension.terms
     first = suspicion.causes[causes[0]]
-    amount = max((fitted.amount(i)[0] for i, term in enumerate(terms) if term.cause is first), key=abs)
     gain = base.chi2 - fitted.chi2
     weighed = Weighed(
         gain=gain,
         tuned=sum(len(term.variant.tuned) for term in terms) + len(terms) - 1,
         scan=sum(scan_share(suspicion.statistic[suspicion.of(cause)]) for cause in causes),
         signs=1 if first.sign else 2,
-        excess=amount / first.plausible(fitted.extension.facts),
     )
-    return Explanation(causes, fitted, gain, weighed)
+    found = Explanation(causes, fitted, gain, weighed)
+    excess = found.amount(first)[0] / first.plausible(fitted.extension.facts)
+    return replace(found, weighed=replace(weighed, excess=excess))

@@ -65,7 +65,11 @@ def stiffness_change(before: Fit, after: Fit) -> float:
     """Root mean square of the relative difference of f_EI at equal curvature, on the range of the model before."""
     low, high = visited(before)
     K = np.linspace(low, high, 60)
-    return _rms_change(before, before.vector, after.vector[: len(before.vector)], K)
+    f = [
+        m.extension.base.characteristic(m.vector).tangent(K, m.extension.base.pre_curvature(m.vector))
+        for m in (before, after)
+    ]
+    return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
 
 
 def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Array:

@@ -24,6 +24,10 @@ from scipy import linalg
 Array = NDArray[np.float64]
 
 
+SIGNIFICANT = 3.0
+"""Standard deviations of a chi-square from which the base model has an excess that can be shared out."""
+
+
 @dataclass(frozen=True, eq=False)
 class Fold:
     """Predictions of one left-out level, whitened residuals (n,) of both models and Jacobians of the extended one.
@@ -59,7 +63,10 @@ def folds_by_level(displacement: Array, branch: tuple[str, ...], *, same: float)
 
 
 def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> HeldOut | None:
-    """Share of the excess removed over all folds, with its 95 % interval; None where the base has no excess."""
+    """Share of the excess removed over all folds, with its 95 % interval.
+
+    None where the base model's excess on them is within three standard deviations of chance: a share of nothing.
+    """
     base, extended = [], []
     for fold in folds:
         root = predictive_root(fold.inside, fold.outside)
@@ -68,7 +75,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     before, after = np.concatenate(base), np.concatenate(extended)
     count = len(before)
     excess = float(before @ before) - count
-    if excess <= 0.0:
+    if excess <= SIGNIFICANT * np.sqrt(2.0 * count):
         return None
     removed = (float(before @ before) - float(after @ after)) / excess
     # what the extension takes away is the signal; noise is drawn anew, as large as what it leaves
@@ -76,7 +83,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     level = np.sqrt(max(1.0, float(after @ after) / count))
     noise = level * rng.standard_normal((draws, count))
     base_chi2 = np.sum((signal + noise) ** 2, axis=1)
-    share = (base_chi2 - np.sum(noise**2, axis=1)) / np.maximum(base_chi2 - count, 1e-9 * count)
+    share = (base_chi2 - np.sum(noise**2, axis=1)) / np.maximum(base_chi2 - count, 0.5 * excess)
     low, high = np.quantile(share, [0.025, 0.975])
     return HeldOut(removed, (float(min(low, removed)), float(max(high, removed))), excess)
 

@@ -85,8 +85,8 @@ def named_causes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
 
 
 def _part(bench: Workbench, found: Explanation, cause: int, names: list[str], probability: float) -> CausePart:
-    amount, std = found.amount(cause)
     kind = bench.suspicion.causes[cause]
+    amount, std = found.amount(kind)
     return CausePart(
         name=kind.name,
         **{"class": names},
@@ -115,7 +115,7 @@ def table(
             rows.append(_unseen_row(cause.name, cause.unit))
             continue
         found = refitted.get(index)
-        estimate, std = found.amount(index) if found else (float(scores.estimate[best]), float(scores.std[best]))
+        estimate, std = found.amount(cause) if found else (float(scores.estimate[best]), float(scores.std[best]))
         if found:
             shift = stiffness_change(bench.base, found.fitted)
         else:

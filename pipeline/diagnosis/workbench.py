@@ -8,7 +8,7 @@ than any misfit; fit again; if another control point of the characteristic remov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from pipeline.diagnosis.prediction import Facts, facts_of
 from pipeline.diagnosis.score import null_maxima, threshold
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.knots import place_knots
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -106,11 +107,18 @@ def prepare(
         observation = observe(
             test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
         )
-        fitted = _fit(observation, fitted.extension, fitted.vector, settings, near=fitted)
+        extension, vector = fitted.extension, fitted.vector
+        if len(base.knots) > 2:
+            extension, vector = with_knots(fitted, len(base.knots))
+        fitted = _fit(observation, extension, vector, settings, near=fitted)
     suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
-    while refine and len(base.knots) < settings.knots_most and _law_is_too_coarse(suspicion, settings):
-        base, vector = _refined(fitted)
-        fitted = _fit(observation, Extension(base, facts), vector, settings, near=fitted)
+    while (
+        refine
+        and 2 < len(fitted.extension.base.knots) < settings.knots_most
+        and _law_is_too_coarse(suspicion, settings)
+    ):
+        extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + 1)
+        fitted = _fit(observation, extension, vector, settings, near=fitted)
         suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     return scored(test, observation, fitted, suspicion, settings)
 
@@ -179,11 +187,28 @@ def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> boo
     return gain > settings.knot_gain and gain >= float(suspicion.statistic.max()) ** 2
 
 
-def _refined(fitted: Fit) -> tuple[Base, Array]:
-    """The base model with one more control point, equally spaced, and its vector along the spline so far."""
+def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
+    """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
     base = fitted.extension.base
     law = base.characteristic(fitted.vector)
-    knots = np.linspace(0.0, float(base.knots[-1]), len(base.knots) + 1)
+    K0 = base.pre_curvature(fitted.vector)
+    reach = max(float(step.kappa.max()) for step in fitted.run.steps) - K0
+    knots = place_knots(0.0, reach, count)
     ordinates = np.maximum(law.f(knots), 0.05 * float(np.max(law.ordinates))) / base.stiffness
-    finer = Base(knots, base.stiffness, base.length, base.scale_std, base.length_std, base.elements, base.straight)
-    return finer, np.r_[ordinates, fitted.vector[len(base.knots) :]]
+    extension = replace(fitted.extension, base=replace(base, knots=knots))
+    return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]
+
+
+def with_finer_law(observation: Observation, fitted: Fit, causes: Sequence[Cause], settings: DiagnosisSettings) -> Fit:
+    """The model with as many control points as its residuals ask for; f_EI is identified again."""
+    law = [cause for cause in causes if cause.name == "nonlinear_stiffness"]
+    while law and 2 < len(fitted.extension.base.knots) < settings.knots_most:
+        asked = suspect(observation, fitted, law, visible=settings.visible, trace=settings.trace)
+        if asked.statistic.size == 0 or float(asked.statistic.max()) ** 2 <= settings.knot_gain:
+            break
+        extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + 1)
+        finer = _fit(observation, extension, vector, settings, near=fitted)
+        if finer.run.prediction is None or fitted.chi2 - finer.chi2 < settings.knot_gain:
+            break
+        fitted = finer
+    return fitted

@@ -77,6 +77,7 @@ class ScaleError:
     unit: str = "-"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "camera"
     needs: str = "the cable's length or the displacement log to compare with"
     summary: str = "The scale of the photos (px/mm) is off, so every photographed length and curvature is off alike."
@@ -109,6 +110,7 @@ class LensDistortion:
     unit: str = "-"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "camera"
     needs: str = "the cable away from the centre of the picture"
     summary: str = "The lens magnifies the rim of the picture otherwise than its centre (barrel or cushion)."
@@ -149,6 +151,7 @@ class CameraTilt:
     unit: str = "1/m"
     sign: int = 0
     combines: bool = True
+    additive: bool = False
     seat: str = "camera"
     needs: str = "photos of different chords, or the cable's length"
     summary: str = "The camera looks askew, so the scale changes across the picture."

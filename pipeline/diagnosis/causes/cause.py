@@ -61,6 +61,8 @@ class Cause(Protocol):
         1 if the amount cannot be negative, 0 if it can.
     combines : bool
         Whether several forms may act together (a profile along the cable is a sum of forms).
+    additive : bool
+        Whether the amounts of forms acting together add up; else the largest is the size of the cause.
     seat : str
         Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first kind only.
     needs : str
@@ -81,6 +83,7 @@ class Cause(Protocol):
     unit: str
     sign: int
     combines: bool
+    additive: bool
     seat: str
     needs: str
     summary: str

@@ -17,6 +17,10 @@ from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
 
+ROUND = 8
+"""Elements of a friction that slips gradually: the corner is then round to 1/8 of its width."""
+
+
 @dataclass(frozen=True)
 class NonlinearStiffness:
     """``nonlinear_stiffness``: the bending stiffness depends on curvature in another way than the model's."""
@@ -25,6 +29,7 @@ class NonlinearStiffness:
     unit: str = "N m^2"
     sign: int = 0
     combines: bool = True
+    additive: bool = False
     seat: str = "cable"
     needs: str = "steps of different curvature"
     summary: str = "The bending stiffness depends on curvature, or does so in another form than the spline allows."
@@ -75,7 +80,8 @@ class Hysteresis:
     name: str = "hysteresis"
     unit: str = "N m"
     sign: int = 1
-    combines: bool = False
+    combines: bool = True
+    additive: bool = True
     seat: str = "cable"
     needs: str = "an unloading branch"
     summary: str = "Wires rub on each other: the moment depends on the way the cable was bent to its shape."
@@ -92,16 +98,20 @@ class Hysteresis:
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Loops with sharp to round corners: slip after 5, 20 and 60 % of the range of curvatures."""
+        """Sharp and round loops that have slipped after some share of the range of curvatures."""
         reach = (0.01 * facts.curvature_scale, 2.0 * facts.curvature_scale)
+        kinds = [("with a sharp corner", 0.0, share) for share in (0.06, 0.15, 0.4, 1.0)]
+        kinds += [("with a round corner", 1.0, share) for share in (0.1, 0.3, 0.8)]
         return tuple(
-            Variant("slipping", at=share * facts.curvature_scale, tuned=("at",), at_range=reach)
-            for share in (0.05, 0.2, 0.6)
+            Variant(label, at=share * facts.curvature_scale, width=round_, tuned=("at",), at_range=reach)
+            for label, round_, share in kinds
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that slips after a curvature change ``at``."""
-        friction = InternalFriction(max(amount, 0.0), variant.at)
+        """Friction of half width ``amount`` that has slipped after a curvature change ``at``; round if it has a width."""
+        beside = model.bending.friction
+        elements = ROUND if variant.width > 0.0 else 1
+        friction = InternalFriction(max(amount, 0.0), variant.at, elements, beside=beside)
         return replace(model, bending=replace(model.bending, friction=friction))
 
 
@@ -113,6 +123,7 @@ class PlasticSet:
     unit: str = "1/m per 1/m"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "cable"
     needs: str = "an unloading branch or a force-free photo after bending"
     summary: str = "Bending leaves the cable bent: the pre-curvature grows with the largest curvature reached."

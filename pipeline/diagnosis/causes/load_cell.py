@@ -47,6 +47,7 @@ class ForceOffset:
     unit: str = "N"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "load cell"
     needs: str = "a force reading of the force-free cable, or large changes of the bow"
     summary: str = "The load cell shows a constant force too much or too little."
@@ -79,6 +80,7 @@ class ForceGain:
     unit: str = "-"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "load cell"
     needs: str = "nothing helps: it is the scale of EI itself"
     summary: str = "The load cell shows all forces too large or too small by one factor."
@@ -108,6 +110,7 @@ class ForceDrift:
     unit: str = "N/s"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "load cell"
     needs: str = "times in the force log"
     summary: str = "The load cell's zero wanders steadily while the test runs."
@@ -141,6 +144,7 @@ class Relaxation:
     unit: str = "-"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "cable"
     needs: str = "several force samples, with times, in every hold"
     summary: str = "The cable gives way while a step is held: the force decays toward a smaller value."

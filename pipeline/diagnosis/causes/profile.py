@@ -1,7 +1,8 @@
 """What changes along the cable: pre-curvature K0(s) and bending stiffness EI(s).
 
-Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of mean zero and largest absolute value one, so the
-amount is the largest deviation from the mean. Forms: growing along the cable, more (or less) in the middle than at the
+Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of largest absolute value one. It has mean zero, so
+the amount is the largest deviation from the mean; only a soft spot counts from the cable beside it, whose stiffness is
+the one that is wanted. Forms: growing along the cable, more (or less) in the middle than at the
 ends, S-shaped, and a spot at a place that is found by scanning. Several forms may add up.
 """
 
@@ -43,8 +44,8 @@ def forms() -> tuple[Variant, ...]:
     )
 
 
-def profile(variant: Variant, position: Array) -> Array:
-    """``phi`` at relative positions 0..1 that sample the cable evenly."""
+def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> Array:
+    """``phi`` at relative positions 0..1 that sample the cable evenly; a spot ``from_beside`` keeps its mean."""
     if variant.width > 0.0:
         values = np.exp(-0.5 * ((position - variant.at) / variant.width) ** 2)
     elif variant.at == 2.0:
@@ -53,7 +54,7 @@ def profile(variant: Variant, position: Array) -> Array:
         values = np.sin(2.0 * np.pi * position)
     else:
         values = 2.0 * position - 1.0
-    deviation = values - np.mean(values)
+    deviation = values if from_beside and variant.width > 0.0 else values - np.mean(values)
     return np.asarray(deviation / np.max(np.abs(deviation)))
 
 
@@ -70,6 +71,7 @@ class PreCurvatureVarying:
     unit: str = "1/m"
     sign: int = 0
     combines: bool = True
+    additive: bool = False
     seat: str = "cable"
     needs: str = "photos; a photo of the force-free cable shows it directly"
     summary: str = "The pre-curvature varies along the cable: set from the spool, or a kink."
@@ -103,10 +105,14 @@ class StiffnessVarying:
     unit: str = "-"
     sign: int = 0
     combines: bool = True
+    additive: bool = False
     seat: str = "cable"
     needs: str = "photos under load"
     summary: str = "The bending stiffness varies along the cable: a soft spot, a splice, a stiff label."
-    sign_means: str = "positive: stiffer toward the right end, in the middle, or in the spot; relative to the mean"
+    sign_means: str = (
+        "positive: stiffer toward the right end or in the middle, relative to the mean; or in the spot, relative to the "
+        "cable beside it"
+    )
     apart: str = (
         "Nothing of it shows without force, and its trace grows with the moment, while a varying pre-curvature is there "
         "from the start. Turned end for end, the cable takes it along."
@@ -125,5 +131,9 @@ class StiffnessVarying:
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply the moments by ``1 + amount * phi``; never below a twentieth."""
         given = model.bending.rod.section.profile
-        factor = 1.0 + amount * profile(variant, position_of(model)) + (0.0 if given is None else given - 1.0)
+        factor = (
+            1.0
+            + amount * profile(variant, position_of(model), from_beside=True)
+            + (0.0 if given is None else given - 1.0)
+        )
         return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, 0.05)))

@@ -27,6 +27,7 @@ class BearingFriction:
     unit: str = "N m"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "an unloading branch or a force-free photo"
     summary: str = "The bearings turn with a constant friction moment, against their turning direction."
@@ -62,6 +63,7 @@ class BearingStiffness:
     unit: str = "N m/rad"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photos at several steps"
     summary: str = "The bearings spring back: a moment that grows with their turn, from the mounted position."
@@ -94,6 +96,7 @@ class RigidEnds:
     unit: str = "m"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photos that show the cable near its ends"
     summary: str = "Clamps hold the cable's ends straight: a piece between bearing axis and free cable does not bend."
@@ -125,6 +128,7 @@ class RigCompliance:
     unit: str = "m/N"
     sign: int = 1
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photographed chords beside the displacement log"
     summary: str = "The frame or the drive yields under force: less of the displacement reaches the cable."
@@ -157,6 +161,7 @@ class DisplacementOffset:
     unit: str = "m"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photographed chords beside the displacement log"
     summary: str = "The displacement was not zero where the log says so: play in the drive, or zeroed under force."
@@ -188,6 +193,7 @@ class LengthError:
     unit: str = "-"
     sign: int = 0
     combines: bool = False
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photos with a known scale"
     summary: str = "The stated cable length is not the length between the bearing axes."
@@ -219,6 +225,7 @@ class InPlaneLoad:
     unit: str = "N/m"
     sign: int = 0
     combines: bool = True
+    additive: bool = False
     seat: str = "rig"
     needs: str = "photos at several steps"
     summary: str = "A load acts along the cable in the plane of the test: its weight on a tilted table, or a draught."
