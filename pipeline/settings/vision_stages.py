@@ -115,15 +115,21 @@ class SegmentationSettings(StageSettings):
         gt=1,
         description="widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches",
     )
-    junction_widths: float = Field(2.5, gt=0, description="widths; strips' ends that meet at a crossing are so near")
+    junction_widths: float = Field(3.5, gt=0, description="widths; strips' ends that meet at a crossing are so near")
+    touching_widths: float = Field(
+        2.0, gt=0, description="widths; an end nearer than that to the middle of another strip touches it"
+    )
+    min_partner_widths: float = Field(
+        8.0, gt=0, description="widths; an end that meets a strip shorter than that meets a bolt or a letter"
+    )
     level_factors: tuple[float, ...] = Field(
         (0.5, 2.0, 0.25), description="ratios to Otsu's level that are tried next: texture may push it up or down"
     )
     least_level: float = Field(
         5.0, gt=0, description="sigmas of the ground; the last level at which a cable may be found"
     )
-    max_branching_readings: int = Field(
-        4, ge=1, description="readings with a long but branching strip after which the branch is believed"
+    max_judged_pictures: int = Field(
+        4, ge=1, description="readings with a long strip that are judged; what four of them refuse is not the cable"
     )
     max_covered_share: float = Field(
         0.5, gt=0, le=1, description="share of the photo; a mask that covers more is ground, not cable"
@@ -214,7 +220,7 @@ class BearingSettings(StageSettings):
         0.1, ge=0, description="widths; the blurred rim of a cover spoils the edges so far beyond its circle"
     )
     cut_std_widths: float = Field(
-        0.02, gt=0, description="widths; a cut with pliers is square to about a twentieth of the width"
+        0.04, gt=0, description="widths; a cut with pliers is square and the path centred to about a twentieth"
     )
     given_std_px: float = Field(1.0, gt=0, description="px; how well a person reads an axis off a screen")
     end_std_widths: float = Field(

@@ -47,32 +47,49 @@ class Wanted:
     across_objects: bool = True  # False where covers interrupt the cable: beyond a cover it is not the cable any more
 
 
-def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading:
-    """The first reading with a strip that is long enough and does not branch, or else the best."""
+def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Iterator[tuple[Reading, ...]]:
+    """Readings with a strip that is long enough, one tuple for each picture and level, the likeliest first.
+
+    Where none has one, the reading with the longest strip comes alone.
+    """
     nothing = np.zeros((1, 1), np.uint8)
-    best, branching = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
+    best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
     for picture, level in _pictures(standout, settings):
-        for reading in _readings(picture, level, wanted, settings):
-            long = reading.longest >= wanted.least_length
-            if long and reading.strips[0].branch < _branch_limit(reading, settings):
-                return reading
-            branching += long
-            if reading.longest > best.longest:
-                best = reading
-        if branching >= settings.max_branching_readings:
-            break
-    return best
+        readings = list(_readings(picture, level, wanted, settings))
+        long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
+        if long:
+            given += 1
+            yield long
+        if given >= settings.max_judged_pictures:
+            return
+        best = max([best, *readings], key=lambda reading: reading.longest)
+    if not given:
+        yield (best,)
 
 
 def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> bool:
-    """True if something of the cable's width leaves the strip, or three strips' ends meet at one of its ends."""
-    if strip.branch >= _branch_limit(reading, settings):
+    """True if something of the cable's width leaves, crosses or meets the strip, so that its course is ambiguous."""
+    width = reading.width
+    if strip.branch >= settings.min_branch_widths * width:
         return True
-    reach = settings.junction_widths * reading.width
-    long = [other for other in reading.strips if other.length > settings.min_piece_widths * reading.width]
+    reach = settings.junction_widths * width
+    long = [other for other in reading.strips if other.length > settings.min_piece_widths * width]
     ends = np.array([end for other in long for end in (other.path[0], other.path[-1])])
-    at_end = any((np.hypot(*(ends - end).T) < reach).sum() >= 3 for end in (strip.path[0], strip.path[-1]))
-    return at_end or _touched(strip, long, reading, settings)
+    if any((np.hypot(*(ends - end).T) < reach).sum() >= 3 for end in (strip.path[0], strip.path[-1])):
+        return True
+    near = settings.touching_widths * width
+    partners = [o for o in reading.strips if o is not strip and o.length > settings.min_partner_widths * width]
+    meets = [
+        _touches(end, a, b, near) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)
+    ]
+    return any(meets)
+
+
+def _touches(end: int, strip: Strip, other: Strip, near: float) -> bool:
+    """True if an end of ``strip`` lies on the course of ``other``, away from the ends of that."""
+    margin = int(2.0 * near)
+    inner = other.path[margin : len(other.path) - margin]
+    return bool(len(inner)) and bool(np.hypot(*(inner - strip.path[end]).T).min() < near)
 
 
 def approaches_itself(path: Array, width: float) -> bool:
@@ -80,24 +97,6 @@ def approaches_itself(path: Array, width: float) -> bool:
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     first, second = cKDTree(path).query_pairs(1.2 * width, output_type="ndarray").T
     return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
-
-
-def _branch_limit(reading: Reading, settings: SegmentationSettings) -> float:
-    return settings.min_branch_widths * reading.width
-
-
-def _touched(strip: Strip, long: list[Strip], reading: Reading, settings: SegmentationSettings) -> bool:
-    """Ends of two other strips on both sides of the same place of the path: another cable crosses."""
-    inner = strip.path[int(4 * reading.width) : -int(4 * reading.width) or None]
-    if len(inner) < 2:
-        return False
-    touching = []
-    for other in long:
-        for end in (other.path[0], other.path[-1]) if other is not strip else ():
-            distance = np.hypot(*(inner - end).T)
-            if distance.min() < settings.junction_widths * reading.width:
-                touching.append(inner[int(np.argmin(distance))])
-    return any(np.hypot(*(a - b)) < 4.0 * reading.width for i, a in enumerate(touching) for b in touching[i + 1 :])
 
 
 def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tuple[Image, float]]:
@@ -135,12 +134,11 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
     above = picture > level
     if above.mean() > settings.max_covered_share:
         return
-    widths = [wanted.width] if wanted.width is not None else ridge_widths(above.astype(np.uint8), settings)
+    widths = [wanted.width] if wanted.width is not None else _guess_widths(above, settings)
     for width in widths:
         reading = _read(above, width, level, wanted, settings)
-        yield reading
-        if wanted.width is None and (merged := _split_by_highlight(reading)) is not None:
-            yield _read(above, merged, level, wanted, settings)
+        merged = _split_by_highlight(reading) if wanted.width is None else None
+        yield reading if merged is None else _read(above, merged, level, wanted, settings)
 
 
 def _read(above: Array, width: float, level: float, wanted: Wanted, settings: SegmentationSettings) -> Reading:
@@ -154,12 +152,25 @@ def _read(above: Array, width: float, level: float, wanted: Wanted, settings: Se
     return Reading(tuple(strips), mask, thick, width, level)
 
 
+def _guess_widths(above: Array, settings: SegmentationSettings) -> list[float]:
+    """Widths of strips in the mask as it is, and once gaps of the narrowest strips' size are closed."""
+    mask = above.astype(np.uint8)
+    widths = ridge_widths(mask, settings)
+    closed = ridge_widths(strip_mask(above, widths[0], settings), settings) if widths else []
+    new = [width for width in closed if all(abs(np.log(width / known)) > 0.2 for known in widths)]
+    return widths + new
+
+
 def _split_by_highlight(reading: Reading) -> float | None:
-    """Width of the cable if the two longest strips are its two sides along a highlight, else None."""
-    if len(reading.strips) < 2 or reading.strips[1].length < 0.6 * reading.strips[0].length:
+    """Width of the cable if another strip runs beside the longest one, its other side along a highlight, else None."""
+    if len(reading.strips) < 2:
         return None
-    a, b = reading.strips[:2]
-    apart = np.hypot(*(a.path[:, None, :] - b.path[None, ::4, :]).transpose(2, 0, 1)).min(axis=1)
-    distance = float(np.median(apart))
-    calm = float(np.percentile(apart, 80) - np.percentile(apart, 20)) < 0.35 * distance
-    return distance + 0.5 * (a.width + b.width) if calm and distance < 4.0 * max(a.width, b.width) else None
+    side = reading.strips[0]
+    others = np.vstack([strip.path for strip in reading.strips[1:]])
+    apart, _ = cKDTree(others).query(side.path)
+    beside = apart[apart < 4.0 * side.width]
+    if len(beside) < 0.6 * len(apart):
+        return None
+    distance = float(np.median(beside))
+    calm = float(np.percentile(beside, 80) - np.percentile(beside, 20)) < 0.35 * distance
+    return distance + side.width if calm else None

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
@@ -65,9 +66,10 @@ def _body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
 
 
 def at_border(end: CableEnd, photo: Photo, width_px: float) -> bool:
-    """True if the end lies within a width of the picture's border."""
+    """True if the end lies within a width of the picture's border, or a hundredth of the picture."""
     u, v = end.place
-    return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < width_px)
+    reach = max(width_px, 0.01 * max(photo.size))
+    return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < reach)
 
 
 def lead_to_axes(
@@ -97,8 +99,12 @@ def _to_circle(start: Array, direction: Array, center: Array, radius: float) -> 
     return along - float(np.sqrt(max(radius**2 - aside**2, 0.0)))
 
 
-def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float, settings: BearingSettings) -> Bearing:
+def settle_end(
+    axis: Bearing, path: Array, closeup: Closeup, width: float, settings: BearingSettings
+) -> tuple[Bearing, Array]:
     """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
+
+    The last sections of a path feel the end and are replaced by a parabola that continues the path.
 
     Parameters
     ----------
@@ -111,11 +117,13 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float, setti
     settings : BearingSettings
     """
     if axis.kind not in ("end", "clamp"):
-        return axis
+        return axis, path
+    body, outward = _body(path, width, 1.5 * settings.trimmed_widths * width)
+    reach = max(float((path[-1] - body[-1]) @ outward), 1.0)
+    path = _led_on(body, outward, reach, width)
     settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
     if axis.kind == "clamp":
-        return settled
-    outward = end_direction(path, width)
+        return settled, path
     across = np.array([-outward[1], outward[0]])
     along = np.arange(-1.5 * width, 1.5 * width + 0.125, 0.25)
     rows = np.linspace(-0.25, 0.25, 9) * width
@@ -125,29 +133,58 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float, setti
     places = [_half_level(profile, along, width) for profile in profiles]
     known = np.array([place for place in places if place is not None])
     if len(known) < 5:
-        return settled
+        return settled, path
     middle = float(np.median(known))
     # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
     std = float(np.hypot(1.4826 * np.median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
-    end = path[-1] + middle * outward
-    return replace(settled, center_px=(float(end[0]), float(end[1])), std_px=std)
+    path = _led_on(body, outward, max(reach + middle, 1.0), width)
+    return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
+
+
+def _led_on(body: Array, outward: Array, reach: float, width: float) -> Array:
+    """The body and a parabola through its last four widths, ``reach`` px onward."""
+    across = np.array([-outward[1], outward[0]])
+    along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
+    # counted from the end: a loop may come back beside it
+    last = np.cumprod((along > -4.0 * width)[::-1])[::-1].astype(bool)
+    parabola = np.polynomial.Polynomial.fit(along[last], aside[last], 2)
+    steps = np.linspace(0.0, reach, max(2, round(reach) + 1))[1:]
+    return np.vstack([body, body[-1] + steps[:, None] * outward + parabola(steps)[:, None] * across])
 
 
 def _half_level(profile: Array, along: Array, width: float) -> float | None:
     """Where the grey value leaves the cable's for the ground's; None without a clear step."""
     cable, ground = np.median(profile[along < -0.6 * width]), np.median(profile[along > 0.6 * width])
     relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
-    inside = np.flatnonzero(relief > 0.5)
-    if not len(inside) or inside[-1] + 1 >= len(along):
+    fallen = np.flatnonzero((relief < 0.5) & (along > -0.6 * width))
+    if not len(fallen) or relief[i := int(fallen[0]) - 1] < 0.5:
         return None
-    i = int(inside[-1])
     share = (relief[i] - 0.5) / (relief[i] - relief[i + 1])
     return float(along[i] + share * (along[i + 1] - along[i]))
 
 
-def between_axes(
-    path: Array, seen: Array, axes: tuple[Bearing, Bearing], margin: float
-) -> tuple[Array, tuple[int, int] | None]:
+def without_specks(seen: NDArray[np.bool_], points_per_width: float) -> slice:
+    """Range of a path from its first to its last seen point, without specks at the ends: a screw on a cover."""
+    first, last = 0, len(seen)
+    for direction in (1, -1):
+        runs = _runs(seen[::direction])
+        while len(runs) > 1:
+            (start, stop), (following, _) = runs[0], runs[1]
+            if stop - start >= points_per_width or following - stop < 0.5 * points_per_width:
+                break
+            runs = runs[1:]
+        edge = runs[0][0] if runs else 0
+        first, last = (edge, last) if direction == 1 else (first, len(seen) - edge)
+    return slice(first, max(last, first + 3))
+
+
+def _runs(seen: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Start and stop of each run of True."""
+    steps = np.diff(np.concatenate([[0], seen.astype(int), [0]]))
+    return list(zip(np.flatnonzero(steps == 1).tolist(), np.flatnonzero(steps == -1).tolist(), strict=True))
+
+
+def between_axes(path: Array, axes: tuple[Bearing, Bearing], margin: float) -> tuple[Array, tuple[int, int] | None]:
     """Cut the path (px, left to right) to what is seen between the axes and lead it straight on to them.
 
     Returns
@@ -156,11 +193,10 @@ def between_axes(
     visible : (first, last) or None
         None if less than five points are seen.
     """
-    usable = seen.astype(bool).copy()
     left, right = (np.array(axis.center_px) for axis in axes)
     start, stop = (int(np.argmin(np.hypot(*(path - place).T))) for place in (left, right))
-    usable[:start] = False
-    usable[stop + 1 :] = False
+    usable = np.zeros(len(path), bool)
+    usable[start : stop + 1] = True
     for axis, place in zip(axes, (left, right), strict=True):
         if axis.radius_px is not None:
             usable &= np.hypot(*(path - place).T) > axis.radius_px + margin

@@ -1,0 +1,242 @@
+"""The cable is found on any usable photo and refused with its reason on any other. Truth: the rendered curve."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from pipeline.records import Rejected
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.bearings import BearingHints
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import Photo
+from pipeline.vision.render import Camera, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.segmentation import find_cable
+from pipeline.vision.sheath import Sheath
+
+SETTINGS = VisionSettings()
+SCALE = 5_500.0
+LENGTH, DIAMETER, COVER = 0.17, 0.0046, 0.012
+CURVE = Curve.from_curvature(lambda s: 5.0 + 3.0 * np.sin(pi * s / LENGTH), LENGTH)
+CAMERA = Camera(1150, 480, SCALE, look_at_m=(0.5 * CURVE.chord, 0.022))
+GREY = (0.75,) * 3
+COLOUR = Sensor(mode="colour", noise=0.01)
+
+
+def scene(**changes: object) -> Scene:
+    return replace(
+        Scene(Strand(CURVE, DIAMETER), CAMERA, ground=Ground(colour=GREY), sensor=Sensor(noise=0.01)), **changes
+    )
+
+
+def strand(colour: tuple[float, float, float], **sheath: object) -> Strand:
+    return Strand(CURVE, DIAMETER, Sheath(colour, **sheath))
+
+
+def photo_of(picture: Picture, bits: int = 8) -> Photo:
+    pixels = picture.pixels
+    return Photo("a.png", pixels if pixels.ndim == 2 else np.ascontiguousarray(pixels[..., 2::-1]), bits)
+
+
+KNOWN = Cable(DIAMETER * SCALE, LENGTH * SCALE, BearingHints(cover_px=COVER * SCALE))
+UNKNOWN = Cable()
+
+
+def find(scene: Scene, cable: Cable = KNOWN) -> tuple[RoughCable | Rejected, Picture]:
+    picture = render(scene)
+    return find_cable(photo_of(picture, scene.sensor.bit_depth), SETTINGS, cable=cable), picture
+
+
+def offset_widths(rough: RoughCable, picture: Picture) -> float:
+    """Largest distance of the visible path from the true centerline, in cable diameters."""
+    true = np.column_stack(
+        [np.interp(np.linspace(0, 1, 8001), np.linspace(0, 1, len(w)), w) for w in (picture.u_px, picture.v_px)]
+    )
+    first, last = rough.visible
+    distance, _ = cKDTree(true).query(rough.path_px[first : last + 1])
+    return float(distance.max() / (DIAMETER * SCALE))
+
+
+LOOKS: dict[str, dict[str, object]] = {
+    "black on grey": {},
+    "white on black": {"cable": strand((0.9,) * 3), "ground": Ground(colour=(0.12,) * 3)},
+    "grey on grey": {"cable": strand((0.45,) * 3)},
+    "red on green, like luminance": {
+        "cable": strand((0.75, 0.15, 0.15)),
+        "ground": Ground(colour=(0.25, 0.45, 0.25)),
+        "sensor": COLOUR,
+    },
+    "yellow on white": {"cable": strand((0.9, 0.8, 0.1)), "ground": Ground(colour=(0.9,) * 3), "sensor": COLOUR},
+    "highlight": {"cable": strand((0.17,) * 3, gloss=0.8, shininess=60.0)},
+    "text": {"cable": strand((0.17,) * 3, text="H07RN-F 3G1.5", text_size=0.9)},
+    "stripe": {"cable": strand((0.17,) * 3, stripe=0.2, stripe_colour=(0.85,) * 3)},
+    "stranded rope": {"cable": strand((0.3,) * 3, strands=0.4)},
+    "shadow": {"light": Light(elevation_rad=0.95, ambient=0.45, shadow=0.35)},
+    "light falls off": {"light": Light(gradient=(0.5, -0.3), vignette=0.3)},
+    "brushed metal": {"ground": Ground("brushed", GREY, 0.05, 2.0)},
+    "cloth": {"ground": Ground("cloth", GREY, 0.05, 2.0)},
+    "wood": {"ground": Ground("wood", GREY, 0.06, 2.0, 0.7)},
+    "stone": {"ground": Ground("stone", GREY, 0.05)},
+    "squared paper": {"ground": Ground("squared", GREY, 0.3)},
+    "noise of 5 %": {"sensor": Sensor(noise=0.05)},
+    "12 bits in 16": {"sensor": Sensor(bit_depth=12, noise=0.01)},
+    "blur of 2 px": {"sensor": Sensor(blur_px=2.0, noise=0.01)},
+    "objects and writing": {
+        "things": (
+            Thing("ruler", (0.05, 0.054), (0.06, 0.012), 0.1, (0.85,) * 3),
+            Thing("pen", (0.14, 0.055), (0.05, 0.006), -0.1),
+            Thing("disc", (0.02, 0.045), (0.015, 0.015), 0.0, (0.2,) * 3),
+            Thing("text", (0.09, -0.012), (0.05, 0.006), 0.0, (0.1,) * 3, "Probe 7b"),
+        )
+    },
+    "a second, shorter cable": {"others": (Strand(Curve.from_curvature(3.0, 0.05), DIAMETER, place_m=(0.06, 0.045)),)},
+}
+
+
+@pytest.mark.parametrize("cable", [KNOWN, UNKNOWN], ids=["diameter known", "nothing known"])
+@pytest.mark.parametrize("look", LOOKS, ids=str)
+def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
+    rough, picture = find(scene(**LOOKS[look]), cable)
+    assert isinstance(rough, RoughCable), rough.reason
+    # A quarter of the width is what the sub-pixel search takes in; it is the cable and not one of its edges.
+    assert offset_widths(rough, picture) < 0.25
+    covered = COVER / LENGTH
+    first, last = rough.visible
+    seen = np.hypot(*np.diff(rough.path_px[first : last + 1], axis=0).T).sum() / (LENGTH * SCALE)
+    # Without knowing of covers, one of the ground's grey may pass for ground or its dark screw for cable.
+    most = 1.01 * (1 - covered) if cable is KNOWN else 1.01
+    assert 0.97 * (1 - covered) < seen < most
+    assert rough.half_width_px == pytest.approx(0.5 * DIAMETER * SCALE, rel=0.3)
+    if cable is KNOWN:
+        assert rough.left.kind == rough.right.kind == "cover"
+        assert np.hypot(*np.subtract(rough.left.center_px, picture.left_px)) < 0.5
+        assert np.hypot(*np.subtract(rough.right.center_px, picture.right_px)) < 0.5
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("roll", [0.0, 0.06, pi / 2, pi, -pi / 2])
+def test_camera_may_be_turned_and_mirrored(roll: float, mirrored: bool) -> None:
+    upright = abs(np.sin(roll)) > 0.9
+    camera = replace(CAMERA, roll_rad=roll, mirrored=mirrored)
+    camera = replace(camera, width=CAMERA.height, height=CAMERA.width) if upright else camera
+    rough, picture = find(scene(camera=camera))
+    assert isinstance(rough, RoughCable), rough.reason
+    assert offset_widths(rough, picture) < 0.1
+    left, right = np.array(rough.left.center_px), np.array(rough.right.center_px)
+    assert (right - left)[1 if upright else 0] > 0
+    assert np.hypot(*(rough.path_px[0] - left)) < 1e-6
+    assert np.hypot(*(rough.path_px[-1] - right)) < 1.0
+
+
+def test_figures_of_the_photo_are_true() -> None:
+    flat = strand((0.17,) * 3)
+    for noise, blur in ((0.01, 0.8), (0.03, 1.5)):
+        rough, _ = find(scene(cable=flat, sensor=Sensor(noise=noise, blur_px=blur), light=Light(ambient=1.0)))
+        assert isinstance(rough, RoughCable)
+        assert rough.noise == pytest.approx(noise, rel=0.1)
+        assert rough.dark
+        # ambient light leaves a matt cylinder at its full colour in the middle and half of it at the flanks
+        assert 0.75 - 0.17 <= rough.contrast <= 0.75 - 0.5 * 0.17
+        assert rough.blur_px == pytest.approx(blur, rel=0.35)
+
+
+def test_window_is_the_photo_along_the_cable() -> None:
+    picture = render(scene())
+    rough = find_cable(photo_of(picture), SETTINGS, cable=KNOWN)
+    assert isinstance(rough, RoughCable)
+    first, last = rough.visible
+    for u, v in np.rint(rough.path_px[first:last:20]).astype(int):
+        assert rough.grey[v - rough.origin_px[1], u - rough.origin_px[0]] == pytest.approx(picture.pixels[v, u] / 255)
+
+
+def test_neighbour_photo_narrows_the_search_and_changes_nothing() -> None:
+    thing = Thing("pen", (0.09, -0.015), (0.16, 0.006), 0.0)
+    first, _ = find(scene())
+    assert isinstance(first, RoughCable)
+    picture = render(scene(camera=replace(CAMERA, look_at_m=(0.5 * CURVE.chord + 0.004, 0.022)), things=(thing,)))
+    alone = find_cable(photo_of(picture), SETTINGS, cable=KNOWN)
+    helped = find_cable(photo_of(picture), SETTINGS, cable=KNOWN, near=first)
+    assert isinstance(alone, RoughCable) and isinstance(helped, RoughCable)
+    assert np.abs(np.subtract(alone.left.center_px, helped.left.center_px)).max() < 0.05
+    # a neighbour that misleads costs time, not the photo
+    astray = replace(first, path_px=first.path_px * 0.2)
+    assert isinstance(find_cable(photo_of(picture), SETTINGS, cable=KNOWN, near=astray), RoughCable)
+
+
+def test_free_ends_are_the_axes_where_nothing_covers_them() -> None:
+    rough, picture = find(scene(covers=(None, None)), Cable(DIAMETER * SCALE))
+    assert isinstance(rough, RoughCable)
+    for bearing, true in ((rough.left, picture.left_px), (rough.right, picture.right_px)):
+        assert bearing.kind == "end"
+        assert np.hypot(*np.subtract(bearing.center_px, true)) < 3.0 * bearing.std_px
+        assert bearing.std_px < 0.05 * DIAMETER * SCALE
+
+
+def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
+    cable = replace(strand((0.17,) * 3), overhang_m=0.012)
+    picture = render(scene(cable=cable, covers=(None, None)))
+    hints = BearingHints(given_px=(picture.left_px, picture.right_px))
+    rough = find_cable(photo_of(picture), SETTINGS, cable=Cable(DIAMETER * SCALE, LENGTH * SCALE, hints))
+    assert isinstance(rough, RoughCable)
+    assert rough.path_px[0] == pytest.approx(picture.left_px)
+    assert offset_widths(rough, picture) < 0.1
+
+
+SECOND = Strand(CURVE, DIAMETER, place_m=(0.0, 0.022))
+ACROSS = Strand(Curve.from_curvature(0.1, 0.06), DIAMETER, place_m=(0.06, 0.02), angle_rad=1.0)
+ASIDE = replace(CAMERA, look_at_m=(0.14, 0.022))
+CLOTH = Ground("cloth", GREY, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("code", "changes", "cable"),
+    [
+        ("photo/contrast", {"cable": strand((0.74,) * 3), "ground": CLOTH}, KNOWN),
+        ("photo/contrast", {"cable": strand((0.70,) * 3), "ground": CLOTH, "sensor": Sensor(noise=0.05)}, UNKNOWN),
+        ("photo/leaves-frame", {"camera": ASIDE}, KNOWN),
+        ("photo/leaves-frame", {"camera": ASIDE}, UNKNOWN),
+        ("photo/crossing", {"others": (ACROSS,)}, KNOWN),
+        ("photo/crossing", {"others": (ACROSS,), "covers": (None, None)}, UNKNOWN),
+        ("photo/two-candidates", {"others": (SECOND,), "covers": (None, None)}, UNKNOWN),
+        ("photo/bearing", {"covers": (None, None)}, KNOWN),
+        ("photo/blur", {"sensor": Sensor(blur_px=8.0, noise=0.005)}, Cable(DIAMETER * SCALE)),
+    ],
+)
+def test_unusable_photo_is_refused_with_its_reason(code: str, changes: dict[str, object], cable: Cable) -> None:
+    outcome, _ = find(scene(**changes), cable)
+    assert isinstance(outcome, Rejected)
+    assert outcome.code == code
+    assert outcome.reason.startswith("a.png: ") and outcome.reason.endswith(".")
+    assert outcome.figure
+
+
+def test_cable_that_crosses_itself_is_refused() -> None:
+    loop = Curve.from_curvature(1.45 * pi / 0.2, 0.2)
+    camera = Camera(900, 900, SCALE, look_at_m=(0.5 * loop.chord, 0.5 * float(loop.y.max() + loop.y.min())))
+    outcome, _ = find(scene(cable=Strand(loop, DIAMETER, overhang_m=0.08), camera=camera, covers=(None, None)), UNKNOWN)
+    assert isinstance(outcome, Rejected)
+    assert outcome.code == "photo/crossing"
+
+
+def test_wrong_diameter_is_refused_with_both_widths() -> None:
+    wrong = replace(KNOWN, diameter_px=1.9 * DIAMETER * SCALE)
+    outcome, _ = find(scene(), wrong)
+    assert isinstance(outcome, Rejected)
+    assert outcome.code in ("photo/width", "photo/contrast")
+
+
+def test_empty_table_is_refused() -> None:
+    empty = Photo("a.png", np.full((400, 600), 180, np.uint8), 8)
+    outcome = find_cable(empty, SETTINGS, cable=KNOWN)
+    assert isinstance(outcome, Rejected)
+
+
+def test_cable_that_lies_on_itself_is_refused() -> None:
+    ring = Curve.from_curvature(2.4 * pi / 0.2, 0.2)
+    camera = Camera(700, 700, SCALE, look_at_m=(0.5 * ring.chord, 0.5 * float(ring.y.max() + ring.y.min())))
+    outcome, _ = find(scene(cable=Strand(ring, DIAMETER, overhang_m=0.03), camera=camera, covers=(None, None)), UNKNOWN)
+    assert isinstance(outcome, Rejected)
+    assert outcome.code == "photo/crossing"
