@@ -52,6 +52,7 @@ def fit_along(
             longest=settings.longest_correlation_diameters * diameter,
             correlation_length=correlation_length,
             iterations=iterations,
+            bias_share=settings.bias_share,
         )
 
     while intervals < most:  # long cables only

@@ -114,7 +114,9 @@ class _Diagonal:
         """Restricted likelihood, -2 log, and sigma squared at every weight."""
         share = self.shrinkage(weights)
         freedom = self.count - self.null
-        sigma2 = (self.total - (self.gamma2 * self.projected**2 / share).sum(axis=1)) / freedom
+        # Without noise nothing is left but rounding, which must not become the logarithm of zero.
+        left = self.total - (self.gamma2 * self.projected**2 / share).sum(axis=1)
+        sigma2 = np.maximum(left, 1e-20 * self.total) / freedom
         rank = len(self.gamma2) - self.null
         value = freedom * np.log(sigma2) + np.log(share).sum(axis=1) - rank * np.log(weights)
         return value + self.noise_log_det, sigma2
@@ -189,8 +191,12 @@ class Problem:
         best = weights[[int(np.argmin(diagonal.criterion(weights)[0]))]]
         return np.asarray(diagonal.back @ (np.sqrt(diagonal.gamma2) * diagonal.projected / diagonal.shrinkage(best)[0]))
 
-    def smooth(self, correlation_length: float) -> Smooth:
-        """Estimate, covariance and gain, averaged over the likelihood of the weight."""
+    def smooth(self, correlation_length: float, *, bias_share: float = 1.0) -> Smooth:
+        """Estimate, covariance and gain, averaged over the likelihood of the weight.
+
+        The posterior covariance is that of the noise carried through the fit, and of the smoothing's bias if the truth
+        were as rough as the penalty allows. ``bias_share`` is the part of the latter that is counted.
+        """
         diagonal = self._diagonal(correlation_length)
         weights = diagonal.weights()
         value, sigma2 = diagonal.criterion(weights)
@@ -200,7 +206,8 @@ class Problem:
         each = np.sqrt(diagonal.gamma2) * diagonal.projected / share
         mean = odds @ each
         spread = np.sqrt(odds)[:, None] * (each - mean)
-        variance = np.diag(odds @ (sigma2[:, None] / share)) + spread.T @ spread
+        noise = diagonal.gamma2 / share**2
+        variance = np.diag(odds @ (sigma2[:, None] * (noise + bias_share * (1.0 / share - noise)))) + spread.T @ spread
         values, vectors = np.linalg.eigh(variance)
         # In these coordinates the whitened design is orthogonal, with squared column lengths gamma2.
         orthogonal = whiten(self.design, self.std, self.gaps, correlation_length) @ diagonal.back

@@ -1,0 +1,205 @@
+"""Curvature spline: integration and derivatives against closed forms, errors and bands against known noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+from scipy.special import fresnel
+
+from pipeline.vision.curvature import CurveFit, PlaneCurve, fit_curve, initial_curve, make_frame
+
+LENGTH = 0.2
+
+
+def curve_of(kappa, *, intervals=24, angle=0.3, length=LENGTH):
+    """Curve whose spline is the least-squares fit of kappa(s) on the grid."""
+    frame = make_frame(0.0, length, intervals=intervals, order=3)
+    coefficients = np.linalg.lstsq(frame.values, kappa(frame.grid), rcond=None)[0]
+    return PlaneCurve(frame, coefficients, np.array([0.01, 0.02]), angle)
+
+
+def noisy(kappa, rng, *, std, correlation, count=240, hidden=0.006, length=LENGTH):
+    """Points along the curve of kappa(s) with correlated errors along the normal; hidden ends."""
+    fine = np.linspace(0.0, length, 4001)
+    theta = CubicSpline(fine, kappa(fine)).antiderivative()
+    x, y = (
+        CubicSpline(fine, np.cos(theta(fine))).antiderivative(),
+        CubicSpline(fine, np.sin(theta(fine))).antiderivative(),
+    )
+    s = np.linspace(hidden, length - hidden, count)
+    rho = np.exp(-(s[1] - s[0]) / correlation) if correlation else 0.0
+    e = rng.standard_normal(count)
+    for i in range(1, count):
+        e[i] = rho * e[i - 1] + np.sqrt(1.0 - rho**2) * e[i]
+    points = np.column_stack([x(s), y(s)])
+    return s, points + std * e[:, None] * np.column_stack([-np.sin(theta(s)), np.cos(theta(s))])
+
+
+def fit(s, points, *, intervals=26, order=3, breaks=(), length=LENGTH, std=1e-5) -> CurveFit:
+    frame = make_frame(0.0, length, intervals=intervals, order=order, breaks=breaks)
+    start = initial_curve(points, s, frame)
+    return fit_curve(points, np.full(len(s), std), start=start, s=s, order=order, longest=0.01)
+
+
+def bow(s):
+    """A pre-curved cable under load: kappa = K0 at both ends, with a slope."""
+    return 2.0 + 7.0 * np.sin(np.pi * s / LENGTH)
+
+
+def test_constant_curvature_integrates_to_a_circle():
+    curve = curve_of(lambda s: 12.0 + 0.0 * s)
+    s = np.linspace(0.0, LENGTH, 57)
+    points, angle = curve.at(s)
+    anchor = curve.frame.grid[curve.frame.anchor]
+    assert_allclose(angle, 0.3 + 12.0 * (s - anchor), atol=1e-12)
+    exact = curve.point + np.column_stack([np.sin(angle) - np.sin(0.3), np.cos(0.3) - np.cos(angle)]) / 12.0
+    assert_allclose(points, exact, atol=1e-11 * LENGTH)
+
+
+def test_linear_curvature_integrates_to_a_clothoid():
+    rate = 400.0
+    curve = curve_of(lambda s: rate * s, angle=0.0)
+    anchor = curve.frame.grid[curve.frame.anchor]
+    s = np.linspace(0.0, LENGTH, 33)
+    sine, cosine = np.sqrt(np.pi / rate) * np.array(
+        fresnel(np.array([s, np.full_like(s, anchor)]) * np.sqrt(rate / np.pi))
+    )
+    # Turned so that the angle is zero at the anchor, where the clothoid's is rate * anchor^2 / 2.
+    turn = -0.5 * rate * anchor**2
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    exact = curve.point + np.column_stack([cosine[0] - cosine[1], sine[0] - sine[1]]) @ rotation.T
+    assert_allclose(curve.at(s)[0], exact, atol=1e-8 * LENGTH)  # 2e-5 px on a photo, at a turn of 8 rad
+
+
+def test_bases_are_the_derivatives():
+    curve = curve_of(bow)
+    s = np.linspace(0.0, LENGTH, 41)
+    angle = curve.at(s)[1]
+    normal, turn, bend = curve.bases(s)
+    across = np.column_stack([-np.sin(angle), np.cos(angle)])
+    for j in (0, 1, 2, 9, curve.frame.size - 1):
+        step = np.zeros(curve.frame.size)
+        step[j] = 1e-5 if j else 1e-8
+        moved, back = curve.moved(step), curve.moved(-step)
+        size = 2.0 * step[j]
+        change = ((moved.at(s)[0] - back.at(s)[0]) * across).sum(axis=1) / size
+        # Between the ends of a cell the basis is linear; it gives the steps and the bands, not the curve.
+        assert_allclose(normal[:, j], change, atol=2e-3 * np.abs(change).max())
+        assert_allclose(
+            turn[:, j], (moved.at(s)[1] - back.at(s)[1]) / size, atol=2e-3 * np.abs(turn[:, j]).max() + 1e-9
+        )
+        assert_allclose(bend[:, j], (moved.curvature(s) - back.curvature(s)) / size, atol=1e-6)
+
+
+def test_feet_are_the_nearest_points():
+    curve = curve_of(bow)
+    s = np.linspace(0.02, 0.18, 20)
+    where, angle = curve.at(s)
+    across = np.column_stack([-np.sin(angle), np.cos(angle)])
+    assert_allclose(curve.foot(where + 5e-4 * across, s + 1e-3, steps=12), s, atol=1e-9)
+
+
+def test_exact_points_give_back_the_curvature():
+    s, points = noisy(bow, np.random.default_rng(0), std=0.0, correlation=0.0)
+    found = fit(s, points)
+    at = np.linspace(0.0, LENGTH, 101)
+    assert np.max(np.abs(found.curve.curvature(at) - bow(at))) < 2e-3 * 9.0  # unseen ends included
+
+
+def test_ends_keep_pre_curvature_and_slope():
+    """kappa(0) = K0 with the slope of a loaded cable: neither value nor slope may be drawn to zero."""
+    rng = np.random.default_rng(1)
+    ends = np.array(
+        [fit(*noisy(bow, rng, std=1e-6, correlation=0.001)).curve.curvature(np.array([0.0, 1e-3])) for _ in range(20)]
+    )
+    assert abs(np.mean(ends[:, 0]) - 2.0) < 0.015 * 9.0  # the target for the last 10 mm, 6 mm beyond the last point
+    assert_allclose(np.mean(np.diff(ends)) / 1e-3, 7.0 * np.pi / LENGTH, rtol=0.15)
+
+
+def test_correlated_noise_is_estimated_and_bands_are_true():
+    """40 curves: the 95 % band of kappa covers 90 to 99 % inside and at the unseen ends, sigma and length come back."""
+    rng = np.random.default_rng(2)
+    at = np.linspace(0.0, LENGTH, 81)
+    inner = (at > 0.01) & (at < LENGTH - 0.01)
+    covered, sigma, length = [], [], []
+    for _ in range(40):
+        peak, sharp = rng.uniform(2.0, 8.0), rng.uniform(0.0, 0.2)
+
+        def kappa(s, peak=peak, sharp=sharp):
+            return 2.0 + peak * (np.sin(np.pi * s / LENGTH) - sharp * np.sin(3.0 * np.pi * s / LENGTH))
+
+        found = fit(*noisy(kappa, rng, std=3e-6, correlation=0.0015))
+        std = np.linalg.norm(found.curve.bases(at)[2] @ found.smooth.root, axis=1)
+        covered.append(np.abs(found.curve.curvature(at) - kappa(at)) < 1.96 * std)
+        sigma.append(found.smooth.sigma * 1e-5)
+        length.append(found.smooth.correlation_length)
+    covered = np.array(covered)
+    assert 0.90 <= covered[:, inner].mean() <= 0.99
+    assert 0.90 <= covered[:, ~inner].mean() <= 1.0
+    assert_allclose(np.median(sigma), 3e-6, rtol=0.1)  # its own scatter is 7 % with 75 independent sections
+    assert_allclose(np.median(length), 0.0015, rtol=0.2)
+
+
+def test_white_noise_bands_are_too_narrow_for_correlated_errors():
+    """Why the correlation is estimated: taken as white, the same errors give bands that cover far less than 95 %."""
+    rng = np.random.default_rng(3)
+    at = np.linspace(0.02, 0.18, 50)
+    covered = {"white": [], "estimated": []}
+    for _ in range(15):
+        s, points = noisy(bow, rng, std=3e-6, correlation=0.004)
+        frame = make_frame(0.0, LENGTH, intervals=26, order=3)
+        start = initial_curve(points, s, frame)
+        for name, known in (("white", 1e-6), ("estimated", None)):
+            found = fit_curve(
+                points, np.full(len(s), 1e-5), start=start, s=s, order=3, longest=0.01, correlation_length=known
+            )
+            std = np.linalg.norm(found.curve.bases(at)[2] @ found.smooth.root, axis=1)
+            covered[name].append(np.mean(np.abs(found.curve.curvature(at) - bow(at)) < 1.96 * std))
+    assert np.mean(covered["estimated"]) > 0.9
+    assert np.mean(covered["white"]) < 0.8
+
+
+def test_third_derivative_is_the_better_penalty():
+    rng = np.random.default_rng(4)
+    at = np.linspace(0.01, 0.19, 91)
+    error = {2: [], 3: []}
+    for _ in range(10):
+        s, points = noisy(bow, rng, std=3e-6, correlation=0.001)
+        for order, found in error.items():
+            found.append(np.sqrt(np.mean((fit(s, points, order=order).curve.curvature(at) - bow(at)) ** 2)))
+    assert np.mean(error[3]) < 0.85 * np.mean(error[2])
+
+
+def test_outliers_do_not_bend_the_curve():
+    s, points = noisy(bow, np.random.default_rng(5), std=2e-6, correlation=0.0)
+    at = np.linspace(0.01, 0.19, 91)
+    spoiled = points.copy()
+    spoiled[100:108, 1] += 5e-4  # eight neighbours off by 250 standard deviations
+    plain, robust = fit(s, points), fit(s, spoiled)
+    assert np.all(robust.weight[100:108] == 0.0)
+    assert np.max(np.abs(robust.curve.curvature(at) - plain.curve.curvature(at))) < 0.01 * 9.0
+
+
+def test_a_break_follows_a_point_load():
+    """A point load at mid-span: kappa has a kink; with a break its slope jumps there, without one it is rounded off."""
+
+    def kappa(s):
+        return 3.0 + 60.0 * np.minimum(s, LENGTH - s)
+
+    s, points = noisy(kappa, np.random.default_rng(6), std=1e-6, correlation=0.0, count=400)
+    at = np.linspace(0.03, 0.17, 141)
+    error = [
+        np.max(np.abs(fit(s, points, breaks=breaks, intervals=20).curve.curvature(at) - kappa(at)))
+        for breaks in ((), (0.5 * LENGTH,))
+    ]
+    assert error[1] < 0.01 * 9.0
+    assert error[0] > 3.0 * error[1]
+
+
+def test_frames_refuse_nonsense():
+    with pytest.raises(ValueError, match="at least 4 intervals"):
+        make_frame(0.0, 1.0, intervals=3, order=3)
+    with pytest.raises(ValueError, match="inside the range"):
+        make_frame(0.0, 1.0, intervals=8, order=3, breaks=(1.0,))
