@@ -162,14 +162,19 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
     }
     best = max(evidence, key=lambda count: evidence[count])
     count = min(best + options.spare, most)
-    tau = rich.posterior(options.tau).tau
-    chosen = refit(rich, place_knots(low, high, count), tau=tau, evaluations=options.evaluations)
+    broad = rich.posterior(options.tau)
+    sized = replace(rich, model=replace(rich.model, slope=broad.slope))
+    chosen = refit(sized, place_knots(low, high, count), tau=broad.tau, evaluations=options.evaluations)
     used += chosen.evaluations
     if chosen.evaluation.failure is not None:  # the start with fewer control points has no equilibrium
         chosen = rich
     posterior = chosen.posterior(options.tau)
-    mean = evaluate(replace(chosen.model, tau=posterior.tau), posterior.mean, starts=chosen.evaluation.equilibria)
+    mean = evaluate(
+        replace(chosen.model, tau=posterior.tau, slope=posterior.slope),
+        posterior.mean,
+        starts=chosen.evaluation.equilibria,
+    )
     used += 1
     if mean.failure is None:
-        chosen = replace(chosen, model=replace(chosen.model, tau=posterior.tau), evaluation=mean)
+        chosen = replace(chosen, model=replace(chosen.model, tau=posterior.tau, slope=posterior.slope), evaluation=mean)
     return chosen, {n: value - evidence[best] for n, value in evidence.items()}, used

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rod.bending_test import simulate
 from rod.equilibrium import Equilibrium, Outcome
 from rod.fit_model import POSE, FitModel, StepData
-from rod.knots import roughness
+from rod.knots import first_slope, roughness
 from rod.photo_residual import Pose, Simulated, distance
 from rod.sensitivity import derivatives
 
@@ -228,7 +228,7 @@ def _whitened(model: FitModel, u: Array, fits: tuple[StepFit, ...], equilibria: 
     prior = np.zeros((len(model.nuisances), model.size))
     prior[:, model.laws :] = np.eye(len(model.nuisances))
     add("prior", u[model.laws :], prior)
-    root = _root(roughness(model.knots)) / model.tau
+    root = np.vstack([_root(roughness(model.knots)) / model.tau, first_slope(model.knots)[None] / model.slope])
     smooth = np.zeros((root.shape[0], model.size))
     smooth[:, : model.knots.size] = root
     add("smoothness", root @ u[: model.knots.size], smooth)

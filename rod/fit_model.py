@@ -67,8 +67,8 @@ class FitModel:
     length : m
         As told.
     knots : (k,) 1/m
-    tau : float
-        Prior standard deviation of d^2 log f / dt^2, see `rod.knots`.
+    tau, slope : float
+        Prior standard deviations of d^2 log f / dt^2, and of d log f / dt at the first knot; see `rod.knots`.
     elements : int
         Of the simulated rod.
     zero : m or None
@@ -88,6 +88,7 @@ class FitModel:
     zero: float | None
     nuisances: dict[str, float]
     blur: tuple[float, float] = (1.0, 1.0)
+    slope: float = 3.0
 
     @property
     def size(self) -> int:

@@ -5,6 +5,10 @@ density ``exp(-int (d^2 z / dt^2)^2 dt / (2 tau^2))`` with ``t`` from 0 to 1 ove
 it makes the number of knots harmless from above, and its size tau follows from the data. With the natural spline
 through the control points the integral is the quadratic form of `roughness`.
 
+A cable that was never set bends alike to both sides of its rest curvature: f_EI is even about K0 and its slope there
+zero. Not every cable is such, so the slope at the first knot has a prior of its own, ``N(0, sigma^2)``, whose size
+follows from the data too, from "none" to "any".
+
 Units: knots in 1/m; z, t and tau are pure numbers.
 """
 
@@ -47,6 +51,12 @@ def roughness(knots: Array) -> Array:
         return np.asarray(rows[:, :, None] * rows[:, None, :])
 
     return np.asarray(np.sum(h / 6.0 * (square(left) + 4.0 * square(middle) + square(right)), axis=0))
+
+
+def first_slope(knots: Array) -> Array:
+    """Row g with ``g @ z = dz/dt`` of the natural spline through z at the first knot, (p,)."""
+    t = (knots - knots[0]) / (knots[-1] - knots[0])
+    return np.asarray(CubicSpline(t, np.eye(t.size), bc_type="natural")(0.0, 1))
 
 
 def log_prior_volume(S: Array) -> float:

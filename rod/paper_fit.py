@@ -152,7 +152,7 @@ def paper_fit(
         nonlocal accepted
         accepted = trial
         history.append(problem.iteration(p * unit, accepted))
-        return problem.jacobian(accepted) * unit
+        return np.asarray(problem.jacobian(accepted) * unit)
 
     if not np.all(np.isfinite(accepted.residual)):
         raise ValueError(f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m")
