@@ -169,7 +169,8 @@ def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> She
         sheet.text(words("nav_findings"), bold=True)
         for finding in troubles:
             if sheet.room() > 30.0:
-                sheet.text(f"{words(f'level_{finding.level}')}: {finding.message}", size=9.0)
+                message = finding.message.replace("+-", "±")
+                sheet.text(f"{words(f'level_{finding.level}')}: {message}", size=9.0)
     return sheet
 
 
@@ -277,20 +278,20 @@ def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings
     for line in (*view.named, *view.gain, *view.leftover):
         sheet.text(line)
     if part.table:
-        height = min(ranking.ranking_height(part, settings), 330.0)
+        height = min(ranking.ranking_height(part, settings), 280.0)
         ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
     before, after = (residual_map(values) for values in (part.residuals_before, part.residuals_after))
     for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
         if residuals is not None and residuals.steps:
-            area = sheet.part(190.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
+            area = sheet.part(165.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
             maps.draw_map(area, residuals, words, settings, title=words(title))
     if before is not None or after is not None:
-        sheet.y += 196.0
+        sheet.y += 170.0
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]
     for text in texts:
         if sheet.room() > 24.0:
-            sheet.pairs([text], size=9.0)
+            sheet.pairs([text], size=8.5)
     return sheet
 
 

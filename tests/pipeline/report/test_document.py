@@ -126,6 +126,8 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert ('id="map-after"' in page) == found
     assert ("removes 94 %" in text) == found
     assert ("A hump at mid-span" in text) == (verdict == "unexplained")
+    assert ('id="leftover"' in page) == (verdict == "unexplained")
+    assert 'id="force-rest"' in page
     assert ("turn the cable end for end" in text) == (verdict != "adequate")
     assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
 
@@ -188,3 +190,23 @@ def test_report_is_small_and_the_same_each_time(full_result, tmp_path):
     assert path.read_bytes() == write_report(full_result, tmp_path / "b").read_bytes()
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["report.html"]
     assert base64.b64decode(full_result.photos[0].preview.jpeg_base64)[:2] == b"\xff\xd8"
+
+
+def test_branches_fitted_apart_are_drawn(full_result):
+    branches = {"loading": full_result.inverse.curve, "unloading": full_result.balance.curve}
+    inverse = full_result.inverse.model_copy(update={"branches": branches})
+    few = full_result.model_copy(update={"inverse": inverse, "photos": []})
+    assert 'id="branches"' in report_html(few)
+
+
+def test_curve_without_covariance_gives_a_bound(full_result):
+    curve = full_result.inverse.curve.model_copy(update={"tangent_factor_Nm2": []})
+    inverse = full_result.inverse.model_copy(update={"curve": curve})
+    text = Page(report_html(full_result.model_copy(update={"inverse": inverse, "photos": []}))).text
+    assert "The error is an upper bound" in text
+
+
+def test_answer_of_an_extended_model_speaks_of_its_own_pre_curvature(diagnosed):
+    heading = re.search(r"<h1>(.*?)</h1>", report_html(diagnosed("named")), re.DOTALL)[1]
+    assert "K0 = 2.001 ± 0.006 1/m" in heading
+    assert "Before the extension: The two independent ways agree" in report_html(diagnosed("named"))

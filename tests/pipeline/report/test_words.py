@@ -52,3 +52,8 @@ def test_unknown_language_is_a_mistake_of_the_caller():
 def test_unknown_key_is_not_passed_over():
     with pytest.raises(KeyError):
         Words()("no such words")
+
+
+def test_tails_of_probability_are_not_claimed():
+    assert Words().probability(1e-30) == "< 0.0001"
+    assert Words("de").probability(0.432, name="p") == "p = 0,43"

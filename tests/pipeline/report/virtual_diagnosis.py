@@ -51,7 +51,7 @@ def diagnosis_of(verdict, photos):
             steps=[photo.step for photo in photos],
             branches=[STEPS[photo.step][1] for photo in photos],
             shape_sigma=rows,
-            force_sigma=[0.3] * len(photos),
+            force_sigma=[6.0 * size] * len(photos),
         ).model_dump()
 
     return DiagnosisPart(
@@ -86,7 +86,9 @@ def diagnosis_of(verdict, photos):
         if verdict != "adequate"
         else None,
         extended=curve_of(0.005) if found else None,
-        leftover={"message": "A hump at mid-span on all photos."} if verdict == "unexplained" else None,
+        leftover={"message": "A hump at mid-span on all photos.", "s_m": s.tolist(), "shape_m": (1e-6 * wave).tolist()}
+        if verdict == "unexplained"
+        else None,
         residuals_before=residuals(1.0),
         residuals_after=residuals(0.1) if found else None,
         twins={"hysteresis": {"bearing_friction": 0.97, "plastic_set": -0.4}, "bearing_friction": {"plastic_set": 0.3}},
