@@ -115,7 +115,8 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
         if role in spec.columns:
             wanted = spec.columns[role]
             if isinstance(wanted, int):
-                places = [wanted - 1] if wanted <= len(header) and looks_like_number(header[wanted - 1]) else []
+                there = wanted <= len(header) and (role not in MEASURED or looks_like_number(header[wanted - 1]))
+                places = [wanted - 1] if there else []
             else:
                 places = [place for place, cell in enumerate(header) if _same(cell, wanted)]
         else:

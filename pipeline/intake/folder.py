@@ -60,7 +60,7 @@ def _search(folder: Path, above: tuple[tuple[int, int], ...], depth: int) -> Ite
             yield folder
             return
         status = folder.stat()
-        entries = sorted((entry.name for entry in os.scandir(folder) if entry.is_dir()), key=natural_key)
+        entries = sorted((entry.name for entry in folder.iterdir() if entry.is_dir()), key=natural_key)
     except OSError:
         return
     identity = (status.st_dev, status.st_ino)
@@ -157,7 +157,7 @@ def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tup
 
 def candidate_logs(folder: Path) -> list[str]:
     """Files beside ``specimen.toml`` that may be a force log, in natural order."""
-    names = [entry.name for entry in os.scandir(folder) if Path(entry.name).suffix.casefold() in LOG_SUFFIXES]
+    names = [entry.name for entry in folder.iterdir() if entry.suffix.casefold() in LOG_SUFFIXES]
     return sorted((name for name in names if not NO_PHOTO.search(name)), key=natural_key)
 
 

@@ -74,9 +74,10 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
             tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, "share of the largest force"
         )
     inflation = math.sqrt(_inflation(fits))
-    sigmas = _sigmas(fits, floor)
+    sigmas = [sigma * inflation for sigma in _sigmas(fits, floor)]
+    bend = _left_over(holds, fits, sigmas, degree)
     std = tuple(
-        math.hypot(sigma * inflation * fit.leverage, floor, fit.wander) for sigma, fit in zip(sigmas, fits, strict=True)
+        math.hypot(sigma * fit.leverage, floor, fit.wander, bend) for sigma, fit in zip(sigmas, fits, strict=True)
     )
     return HoldForces(tuple(fit.value for fit in fits), std, degree, FROM_SAMPLES)
 
@@ -128,11 +129,9 @@ def _possible(hold: Hold, degree: int) -> int:
 
 def _degree(holds: Sequence[Hold], settings: IntakeSettings) -> int:
     """The lowest degree to which neither one nor two more degrees add significantly, over all holds."""
-    rss, freedom = [], []
-    for degree in range(settings.trend_degree_max + 3):
-        fits = [_Fit.of(hold, degree) for hold in holds]
-        rss.append(sum(float(fit.residuals @ fit.residuals) for fit in fits))
-        freedom.append(sum(fit.freedom for fit in fits))
+    highest = settings.trend_degree_max + 2
+    rss = np.sum([_left_squares(hold, highest) for hold in holds], axis=0)
+    freedom = [sum(len(h.times) - 1 - _possible(h, degree) for h in holds) for degree in range(highest + 1)]
     for degree in range(settings.trend_degree_max):
         steps = (degree + 1, degree + 2)
         if all(
@@ -142,12 +141,38 @@ def _degree(holds: Sequence[Hold], settings: IntakeSettings) -> int:
     return settings.trend_degree_max
 
 
+def _left_squares(hold: Hold, highest: int) -> Array:
+    """Sum of squared residuals of one hold for the degrees 0 to ``highest``, from one orthogonal basis."""
+    possible = _possible(hold, highest)
+    basis, _ = np.linalg.qr(np.polynomial.legendre.legvander(_scaled(hold)[0], possible))
+    forces = hold.forces - np.mean(hold.forces)
+    taken = np.cumsum((basis.T @ forces) ** 2)
+    left = np.maximum(float(forces @ forces) - taken, 0.0)
+    return np.concatenate([left, np.full(highest - possible, left[-1])])
+
+
 def _p_value(rss: float, freedom: int, rss_more: float, freedom_more: int) -> float:
     """F-test of a larger against a smaller model; 1 where it cannot be made."""
     added = freedom - freedom_more
     if added <= 0 or freedom_more <= 0 or rss_more <= 0.0:
         return 1.0
     return float(special.fdtrc(added, freedom_more, (rss - rss_more) / added / (rss_more / freedom_more)))
+
+
+def _left_over(holds: Sequence[Hold], fits: Sequence[_Fit], sigmas: Sequence[float], degree: int) -> float:
+    """What a trend of one degree more would still change at the photos, rms over the holds beyond its own noise, in N.
+
+    A relaxation is no polynomial: what is too small to be asked for is still there. Without any trend there is nothing
+    to leave over.
+    """
+    if degree == 0:
+        return 0.0
+    finer = [_Fit.of(hold, degree + 1) for hold in holds]
+    excess = [
+        (more.value - fit.value) ** 2 - sigma**2 * (more.leverage**2 - fit.leverage**2)
+        for fit, more, sigma in zip(fits, finer, sigmas, strict=True)
+    ]
+    return math.sqrt(max(0.0, sum(excess) / len(excess)))
 
 
 def _inflation(fits: Sequence[_Fit]) -> float:

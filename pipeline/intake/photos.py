@@ -207,7 +207,9 @@ def _loose(name: str, *, whole: bool = True) -> str:
 
 def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | None, str, list[Finding]]:
     """Path and hash of a photo; a file that cannot be read is a finding, and the rest of the specimen is measured."""
-    path = folder / name
+    path = inside(folder, name, allow_outside=settings.allow_outside)
+    if path is None:
+        return None, "", [doubtful("photo/outside", f"{name} leads out of the folder and was not read")]
     try:
         check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
         return path, sha256(path), []

@@ -1,0 +1,183 @@
+"""One log in every way people and machines write it: the same steps come out."""
+
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.intake.forcelog import read_force_log
+from pipeline.intake.specimenfile import LogSpec
+from pipeline.settings.intake import IntakeSettings
+
+SETTINGS = IntakeSettings()
+PLAIN = """\
+step,branch,time_s,displacement_mm,force_N,image
+0,mounted,1.0,0.0,-0.002,
+0,mounted,5.0,0.0,0.003,a_0.png
+1,loading,61.0,4.5,2.301,
+1,loading,65.0,4.5,2.304,a_1.png
+2,unloading,121.0,2.25,1102.903,
+2,unloading,125.0,2.25,1102.899,a_2.png
+"""
+GERMAN = (
+    PLAIN.replace(",", ";")
+    .replace(".png", "#png")
+    .replace(".", ",")
+    .replace("#", ".")
+    .replace(
+        "step;branch;time_s;displacement_mm;force_N;image",
+        "Schritt;Richtung;Zeit [s];Weg [mm];Prüfkraft [N];Bild",
+    )
+    .replace("mounted", "montiert")
+    .replace("unloading", "Entlastung")
+    .replace("loading", "Belastung")
+)
+METADATA = "Prüfprotokoll\n\nPrüfer;Müller\nKraftaufnehmer;500 N\nDatum;21.11.2026\n\n"
+VARIANTS = {
+    "contract": PLAIN,
+    "semicolons": PLAIN.replace(",", ";"),
+    "tabs": PLAIN.replace(",", "\t"),
+    "german": GERMAN,
+    "german cp1252": GERMAN.encode("cp1252"),
+    "utf-8 with mark": b"\xef\xbb\xbf" + GERMAN.encode(),
+    "utf-16 with mark": GERMAN.encode("utf-16"),
+    "utf-16 big endian": b"\xfe\xff" + GERMAN.encode("utf-16-be"),
+    "utf-16 without mark": GERMAN.encode("utf-16-le"),
+    "windows lines": PLAIN.replace("\n", "\r\n"),
+    "old mac lines": PLAIN.replace("\n", "\r"),
+    "blank rows": PLAIN.replace("\n1,", "\n\n,,,,,\n1,", 1) + "\n\n;;;\n,,,,,\n",
+    "metadata": METADATA + GERMAN,
+    "metadata cp1252": (METADATA + GERMAN).encode("cp1252"),
+    "unit row": PLAIN.replace(
+        "step,branch,time_s,displacement_mm,force_N,image",
+        "Schritt,Richtung,Zeit,Weg,Kraft,Bild\n,,s,mm,[N],",
+    ),
+    "slash units": PLAIN.replace("time_s,displacement_mm,force_N", "t / s,Weg / mm,F / N"),
+    "units in words": PLAIN.replace("time_s,displacement_mm,force_N", "Zeit in s,Weg in mm,Kraft in N"),
+    "capitals": PLAIN.replace(
+        "step,branch,time_s,displacement_mm,force_N", "STEP,Branch,TIME (S),Displacement (MM),FORCE (N)"
+    ),
+    "quoted": PLAIN.replace("2.301", '"2.301"').replace("a_1.png", '"a_1.png"'),
+    "quoted decimal commas": '"' + GERMAN.replace(";", '","').replace("\n", '"\n"')[:-1],
+    "thousands": GERMAN.replace("1102,9", "1.102,9").replace("1102,8", "1.102,8"),
+    "english thousands": PLAIN.replace(",", ";").replace("1102.9", "1,102.9").replace("1102.8", "1,102.8"),
+    "blanks as thousands": GERMAN.replace("1102,", "1\u00a0102,"),
+    "typographic minus": PLAIN.replace("-0.002", "−0.002"),
+    "exponents": PLAIN.replace("2.301", "2.301e+00").replace("-0.002", "-2.0E-03"),
+    "carried down": PLAIN.replace("0,mounted,5.0,0.0", ",,5.0,").replace("1,loading,65.0", ",,65.0"),
+    "other columns": "\n".join(
+        f"{row},{extra}" for row, extra in zip(PLAIN.splitlines(), ["Temperature [C]", *"abcdef"], strict=True)
+    ),
+    "step texts": PLAIN.replace("\n0,", "\nStufe 0,").replace("\n1,", "\nStufe 1,").replace("\n2,", "\nStufe 2,"),
+    "surplus separators": PLAIN.replace("\n", ",,\n"),
+}
+
+
+def read(content, tmp_path, **spec):
+    path = tmp_path / "force.csv"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return read_force_log(path, LogSpec(**spec), SETTINGS)
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_same_steps_from_every_variant(name, tmp_path):
+    log = read(VARIANTS[name], tmp_path)
+    assert [step.step for step in log.steps] == [0, 1, 2]
+    assert [step.branch for step in log.steps] == ["mounted", "loading", "unloading"]
+    assert [step.image for step in log.steps] == ["a_0.png", "a_1.png", "a_2.png"]
+    np.testing.assert_allclose([step.displacement_m for step in log.steps], [0.0, 4.5e-3, 2.25e-3], rtol=1e-12)
+    samples = [-0.002, 0.003, 2.301, 2.304, 1102.903, 1102.899]
+    np.testing.assert_allclose(np.concatenate([step.forces_N for step in log.steps]), samples, rtol=1e-12)
+    times = [1.0, 5.0, 61.0, 65.0, 121.0, 125.0]
+    np.testing.assert_allclose(np.concatenate([step.times_s for step in log.steps]), times, rtol=1e-12)
+    assert [step.photo_time_s for step in log.steps] == [5.0, 65.0, 125.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "factor"),
+    [
+        ("Kraft [mN]", 1e-3), ("Kraft [kN]", 1e3), ("F / mN", 1e-3), ("force_mN", 1e-3), ("Kraft (µN)", 1e-6),
+        ("Kraft [μN]", 1e-6), ("FORCE (KN)", 1e3), ("Last [kgf]", 9.80665), ("Kraft daN", 10.0), ("Kraft", 1.0),
+    ],
+)  # fmt: skip
+def test_unit_of_the_force(header, factor, tmp_path):
+    log = read(PLAIN.replace("force_N", header), tmp_path)
+    np.testing.assert_allclose(log.steps[1].forces_N, np.array([2.301, 2.304]) * factor, rtol=1e-12)
+    assert ("log/unit-assumed" in [finding.code for finding in log.findings]) == (header == "Kraft")
+
+
+def test_units_of_displacement_and_time(tmp_path):
+    log = read(PLAIN.replace("displacement_mm", "Weg [µm]").replace("time_s", "Zeit [min]"), tmp_path)
+    assert log.steps[1].displacement_m == pytest.approx(4.5e-6)
+    assert log.steps[1].photo_time_s == pytest.approx(65.0 * 60.0)
+
+
+def test_what_the_user_says_wins(tmp_path):
+    odd = PLAIN.replace("force_N", "channel 3").replace("displacement_mm", "Traverse")
+    log = read(odd, tmp_path, columns={"force": "Channel 3", "displacement": "traverse"}, units={"force": "mN"})
+    assert log.steps[1].forces_N[0] == pytest.approx(2.301e-3)
+    log = read("Schritt;Weg;Kraft\n1;1,500;2,301\n2;4,250;2,902\n", tmp_path, decimal=",")
+    assert log.steps[1].displacement_m == pytest.approx(4.25e-3)
+    log = read("Schritt;Weg;Kraft\n1;1,500;2,301\n2;4,250;2,902\n", tmp_path, decimal=".", units={"displacement": "µm"})
+    assert log.steps[1].displacement_m == pytest.approx(4250e-6)
+
+
+def test_a_log_without_header_by_column_numbers(tmp_path):
+    rows = "\n".join(PLAIN.splitlines()[1:])
+    columns = {"step": 1, "branch": 2, "time": 3, "displacement": 4, "force": 5, "image": 6}
+    log = read("Versuch 12\n" + rows, tmp_path, columns=columns)
+    assert [step.image for step in log.steps] == ["a_0.png", "a_1.png", "a_2.png"]
+    assert log.steps[0].forces_N[0] == pytest.approx(-0.002)
+
+
+def test_clock_times_and_epochs_count_from_the_first_row(tmp_path):
+    times = ["1.0", "5.0", "61.0", "65.0", "121.0", "125.0"]
+    clock = ["12:00:01", "12:00:05", "12:01:01", "12:01:05", "12:02:01", "12:02:05"]
+    dated = [f"2026-11-21 {time}" for time in clock]
+    german = [f"21.11.2026 {time}" for time in clock]
+    epoch = [f"{1.8e9 + float(time):.1f}" for time in times]
+    for written in (clock, dated, german, epoch):
+        text = PLAIN
+        for old, new in zip(times, written, strict=True):
+            text = text.replace(f",{old},", f",{new},", 1)
+        log = read(text, tmp_path)
+        assert [step.photo_time_s for step in log.steps] == [4.0, 64.0, 124.0], written
+        assert "log/clock-time" in [finding.code for finding in log.findings]
+
+
+def test_missing_forces_are_left_out_and_told(tmp_path):
+    for missing in ("", "NaN", "n/a", "-", "inf", "#WERT!"):
+        log = read(PLAIN.replace("2.301", missing), tmp_path)
+        assert len(log.steps[1].forces_N) == 1
+        assert [f.level for f in log.findings if f.code == "log/missing-force"] == ["warning"]
+
+
+def test_photo_named_in_a_row_without_force_is_kept(tmp_path):
+    log = read(PLAIN.replace("2.304,a_1.png", ",a_1.png"), tmp_path)
+    assert log.steps[1].image == "a_1.png"
+
+
+def test_time_that_runs_backwards_is_not_used(tmp_path):
+    log = read(PLAIN.replace("65.0", "5.0"), tmp_path)
+    assert log.steps[1].times_s.size == 0
+    assert log.steps[1].photo_time_s is None
+    assert "log/time-order" in [finding.code for finding in log.findings]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", "log/empty"),
+        ("\n \n;;;\n", "log/empty"),
+        ("step,displacement_mm,force_N\n1,4.0,abc\n", "log/not-a-number"),
+        ("step,displacement_mm,force_N\n1,4.0,1e12\n", "log/not-a-number"),
+        ("step,displacement_mm,force_N\n1,1.2.3,4\n", "log/not-a-number"),
+        ("step;displacement_mm;force_N\n1;0,5;1.5\n2;1,5;2.5\n", "log/not-a-number"),
+        ("step,displacement_mm,force_mm\n1,4.0,1\n", "log/unit"),
+        ("Kraft;Kraft [N];Weg\n1;1;1\n", "log/ambiguous-column"),
+    ],
+)
+def test_refusals(text, code, tmp_path):
+    with pytest.raises(InputError) as refused:
+        read(text, tmp_path)
+    assert refused.value.code == code
+    assert str(tmp_path / "force.csv") in refused.value.sentence

@@ -1,0 +1,107 @@
+"""The force at the photo: unbiased under relaxation and drift, and its standard deviation covers.
+
+Truth is the noise-free force of the simulated hold at the time of the photo.
+"""
+
+import numpy as np
+import pytest
+
+from pipeline.intake.holdforce import FROM_SAMPLES, Hold, hold_forces
+from pipeline.settings.intake import IntakeSettings
+
+SETTINGS = IntakeSettings()
+
+
+def campaign(seed, *, trend, sigma=0.01, samples=8, holds=7, duration=20.0, correlation=0.0):
+    """Holds of a log and the true forces at their photos, taken at the end."""
+    rng = np.random.default_rng(seed)
+    made, truth = [], []
+    for number in range(holds):
+        level = 3.0 * (1.0 - np.exp(-number / 2.0))
+        t = np.linspace(0.5, duration, samples) + 60.0 * number
+        noise = rng.standard_normal(samples)
+        for later in range(1, samples):
+            noise[later] = correlation * noise[later - 1] + np.sqrt(1.0 - correlation**2) * noise[later]
+        clean = level * trend(t - 60.0 * number)
+        made.append(Hold(t, clean + sigma * noise, photo_time=float(t[-1])))
+        truth.append(float(clean[-1]))
+    return made, np.array(truth)
+
+
+TRENDS = {
+    "none": lambda t: np.ones_like(t),
+    "drift": lambda t: 1.0 + 2e-3 * t,
+    "relaxation": lambda t: 1.0 + 0.05 * np.exp(-t / 6.0),
+    "slow relaxation": lambda t: 1.0 + 0.03 * np.exp(-t / 20.0),
+}
+
+
+@pytest.mark.parametrize("name", TRENDS)
+@pytest.mark.parametrize("samples", [8, 30, 200])
+def test_standard_deviation_covers(name, samples):
+    z = []
+    for seed in range(100):
+        holds, truth = campaign(seed, trend=TRENDS[name], samples=samples)
+        found = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
+        z.append((np.array(found.force) - truth) / np.array(found.std))
+    inside = np.mean(np.abs(z) < 1.96)
+    # 700 values: binomial standard deviation 0.8 %; one noise for all holds of a log correlates them
+    assert 0.925 < inside < 0.975
+
+
+def test_correlated_samples_count_for_less():
+    z = []
+    for seed in range(100):
+        holds, truth = campaign(seed, trend=TRENDS["none"], samples=100, correlation=0.6)
+        found = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
+        z.append((np.array(found.force) - truth) / np.array(found.std))
+    assert 0.90 < np.mean(np.abs(z) < 1.96) < 0.985
+
+
+def test_mean_of_a_steady_hold():
+    holds, _ = campaign(0, trend=TRENDS["none"])
+    found = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
+    assert found.degree == 0
+    np.testing.assert_allclose(found.force, [hold.forces.mean() for hold in holds], rtol=1e-12)
+    pooled = np.sqrt(np.mean([hold.forces.var(ddof=1) for hold in holds]))
+    np.testing.assert_allclose(found.std, pooled / np.sqrt(8.0), rtol=1e-6)
+
+
+def test_holds_with_different_noise_keep_their_own():
+    quiet, _ = campaign(1, trend=TRENDS["none"], sigma=0.002, samples=40, holds=3)
+    loud, _ = campaign(2, trend=TRENDS["none"], sigma=0.05, samples=40, holds=3)
+    found = hold_forces([*quiet, *loud], resolution=1e-6, settings=SETTINGS)
+    assert max(found.std[:3]) < 0.3 * min(found.std[3:])
+
+
+def test_never_zero():
+    same = [Hold(np.arange(4.0), np.full(4, level), 3.0) for level in (0.0, 1.0, 2.0)]
+    found = hold_forces(same, resolution=0.01, settings=SETTINGS)
+    # never below a constant distribution over the last digit
+    np.testing.assert_array_less(0.99 * 0.01 / np.sqrt(12.0), found.std)
+    zero = hold_forces([Hold(np.zeros(1), np.zeros(1), None)], resolution=0.0, settings=SETTINGS)
+    assert zero.std[0] > 0.0
+
+
+def test_single_samples_get_a_share_of_the_largest_force():
+    singles = [Hold(np.array([float(n)]), np.array([float(n)]), None) for n in range(4)]
+    found = hold_forces(singles, resolution=1e-4, settings=SETTINGS)
+    assert found.std == pytest.approx([0.003 * 3.0] * 4)
+    assert found.source != FROM_SAMPLES
+
+
+def test_unknown_moment_costs_the_run_of_the_trend():
+    holds, _ = campaign(3, trend=TRENDS["drift"], samples=50)
+    at_photo = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
+    nowhere = hold_forces([Hold(h.times, h.forces, None) for h in holds], resolution=1e-5, settings=SETTINGS)
+    run = float(np.std(holds[-1].forces))
+    assert nowhere.std[-1] > at_photo.std[-1]
+    assert nowhere.std[-1] == pytest.approx(run, rel=0.35)
+
+
+def test_scale_of_forces_does_not_matter():
+    holds, _ = campaign(4, trend=TRENDS["relaxation"])
+    small = [Hold(h.times, 1e-3 * h.forces, h.photo_time) for h in holds]
+    one, other = (hold_forces(h, resolution=r, settings=SETTINGS) for h, r in ((holds, 1e-5), (small, 1e-8)))
+    np.testing.assert_allclose(np.array(other.force), 1e-3 * np.array(one.force), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(np.array(other.std), 1e-3 * np.array(one.std), rtol=1e-6)
