@@ -2,7 +2,7 @@
 
 The folder holds nothing a measured one would not hold. ``truth.json``: id, effects, law (of K - K0), K0 (mean, and at
 101 places along the free cable), length, scale, and for each step force, chord and, at 101 equidistant arc lengths,
-kappa (1/m), moment (N m), position (mm) and the pixel path of the centerline; (0, 0) is the centre of the top-left pixel.
+kappa (1/m), moment (N m), position (mm) and the pixel path of the centerline, (0, 0) the middle of the first pixel.
 """
 
 from __future__ import annotations

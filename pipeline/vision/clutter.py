@@ -212,7 +212,7 @@ def board_layer(board: ChessBoard, camera: Camera, light: Light, channels: int, 
     blurred square waves, exactly where the board is locally flat; a pixel counts with its variance 1/12.
     """
     back = np.linalg.inv(board.homography(camera))
-    v, u = (a.ravel().astype(float) for a in np.indices((camera.height, camera.width)))
+    v, u = (a.ravel() for a in np.indices((camera.height, camera.width), dtype=np.float64))
     a, b = _on_board(back, camera, u, v)
     sigma = sqrt(blur_px**2 + 1.0 / 12.0) / camera.px_per_m
     half = 0.5 * board.square_m * np.array([board.columns + 3, board.rows + 3])
