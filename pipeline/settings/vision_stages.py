@@ -175,11 +175,24 @@ class SegmentationSettings(StageSettings):
 class BearingSettings(StageSettings):
     """Bearing covers and axes."""
 
-    radius_tolerance: float = Field(
-        0.08,
+    radius_std: float = Field(
+        0.01,
+        gt=0,
+        description="relative; of a cover's radius in px where the scale is known: 0.1 mm on 12 mm, and light",
+    )
+    radius_std_by_cable: float = Field(
+        0.05, gt=0, description="relative; where only the cable's width on the photo tells the scale"
+    )
+    search_radii: float = Field(
+        0.12,
         gt=0,
         lt=0.5,
-        description="relative; cover diameter and scale are known to a few percent before the cross-check",
+        description="radii; half range along a ray in which the rim is searched around the first guess",
+    )
+    ring_width: float = Field(
+        0.05,
+        gt=0,
+        description="radii; standard deviation of the ring that seeks centres: as well as the radius is known",
     )
     min_rim: float = Field(
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.covers import find_cover
+from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
@@ -57,7 +57,8 @@ def find_bearings(
     if radius is None:
         first, second = (_visible_end(end, width_px, settings) for end in ends)
         return first, second
-    circles = [find_cover(photo, end, radius, width_px, settings) for end in ends]
+    std = settings.radius_std if hints.cover_px is not None else settings.radius_std_by_cable
+    circles = [find_cover(photo, end, Radius(radius, std), width_px, settings) for end in ends]
     first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
     return first, second
 

@@ -45,8 +45,16 @@ class Circle:
         return Bearing(self.center, self.std, self.radius, self.radius_std, "cover")
 
 
+@dataclass(frozen=True)
+class Radius:
+    """Expected radius of a cover in px and its relative standard deviation."""
+
+    px: float
+    std: float
+
+
 def find_cover(
-    photo: Photo, end: CableEnd, radius_px: float, width_px: float, settings: BearingSettings
+    photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
 ) -> Circle | None:
     """The cover at the end of a cable.
 
@@ -55,8 +63,8 @@ def find_cover(
     photo : Photo
     end : CableEnd
         Where the cable's mask ends: at the rim, or beyond it where cover and cable look alike.
-    radius_px : px
-        Expected radius; the true one may differ by ``settings.radius_tolerance``.
+    radius : Radius
+        Expected radius. One that comes out otherwise tells of a shadow taken for the rim and widens the std.
     width_px : px
         Of the cable.
 
@@ -66,17 +74,19 @@ def find_cover(
         None if no circle shows at least ``settings.min_rim`` of its rim.
     """
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
-    window = _Window.cut(photo, end.place, (2.0 + 1.0 + settings.radius_tolerance) * radius_px, radius_px)
+    window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
     if window is None:
         return None
     along, aside = _along_cable(window, end)
-    on_cable = (along < 0) & (np.abs(aside) < 0.8 * width_px)
-    fall = np.maximum(np.abs(along) / radius_px - 1.4, 0.0) / 0.3
-    prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius_px)) ** 2 - 0.5 * fall**2)
-    rim = _best_circle(photo, window, radius_px, on_cable, prior, settings)
-    if rim is not None and rim.rim >= settings.min_rim:
-        return rim
-    return _by_dot(photo, window, radius_px, along, aside, settings)
+    fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
+    prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius.px)) ** 2 - 0.5 * fall**2)
+    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
+    for cable_from in (0.0, -2.4 * radius.px):
+        on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
+        found = _best_circle(photo, window, radius, on_cable, prior, settings)
+        if found is not None and found.rim >= settings.min_rim:
+            return found
+    return _by_dot(photo, window, radius.px, along, aside, settings)
 
 
 def _by_dot(
@@ -86,33 +96,35 @@ def _by_dot(
     spread = settings.aside_std_radii * radius_px
     prior = np.exp(-0.5 * (aside / spread) ** 2 - 0.5 * ((along - radius_px) / spread) ** 2)
     nowhere = np.zeros(prior.shape, bool)
-    dots = [_best_circle(photo, window, share * radius_px, nowhere, prior, settings) for share in settings.dot_radii]
+    # the sizes tried are a third apart
+    sizes = [Radius(share * radius_px, 0.08) for share in settings.dot_radii]
+    dots = [_best_circle(photo, window, size, nowhere, prior, settings) for size in sizes]
     seen = [dot for dot in dots if dot is not None and dot.rim >= settings.sure_rim]
     if not seen:
         return None
     dot = max(seen, key=lambda circle: circle.rim)
-    return replace(dot, radius=radius_px, radius_std=settings.radius_tolerance * radius_px)
+    return replace(dot, radius=radius_px, radius_std=0.1 * radius_px)
 
 
 def _best_circle(
     photo: Photo,
     window: _Window,
-    radius_px: float,
+    radius: Radius,
     blind: NDArray[np.bool_],
     prior: Array,
     settings: BearingSettings,
 ) -> Circle | None:
     """The circle with the most of its rim seen among the best centres of the window."""
-    votes = _votes(window, radius_px / window.reduction, blind, settings) * prior
+    votes = _votes(window, radius.px / window.reduction, blind, settings) * prior
     best: Circle | None = None
     for _ in range(settings.candidates):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius_px, settings)
+        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, settings)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
         if best is not None and best.rim > settings.sure_rim:
             break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius_px / window.reduction)), 0.0, cv2.FILLED)
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
     return best
 
 
@@ -166,7 +178,7 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: B
     half = int(np.ceil(1.25 * radius))
     y, x = np.mgrid[-half : half + 1, -half : half + 1].astype(np.float32)
     distance = np.hypot(x, y) + np.float32(1e-6)
-    ring = np.exp(-0.5 * ((distance - radius) / max(0.7, 0.6 * settings.radius_tolerance * radius)) ** 2)
+    ring = np.exp(-0.5 * ((distance - radius) / max(0.7, settings.ring_width * radius)) ** 2)
     ring /= distance * ring.sum()
     votes = np.zeros(strength.shape, np.float32)
     for channel in range(gu.shape[2]):
@@ -176,29 +188,34 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: B
     return votes
 
 
-def fit_circle(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Circle | None:
+def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingSettings) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
     Strategy: radial profiles, twice (the second time from the fitted centre and radius); the edge is the centroid of
     the slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight.
     """
+    radius = expected.px
     count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
-    span = max(4.0, 2.0 * settings.radius_tolerance * radius)
+    span = max(4.0, settings.search_radii * radius)
     parameters = np.array([*center, radius])
     for span_now in (span, max(3.0, 0.5 * span)):
         edge = _radial_edges(photo, parameters, ray, span_now, settings)
-        fitted = _robust_circle(parameters, ray, edge, span_now)
+        fitted = _robust_circle(parameters, ray, edge, span_now, expected)
         if fitted is None:
             return None
         parameters, covariance = fitted
     off = np.hypot(*(parameters[:2] - center))
-    if off > 0.5 * radius or abs(parameters[2] / radius - 1.0) > 1.5 * settings.radius_tolerance:
+    if off > 0.5 * radius or abs(parameters[2] - radius) > max(4.0 * expected.std * radius, 1.0):
         return None
     edge = _radial_edges(photo, parameters, ray, span, settings)
     rim = float(np.mean(np.abs(edge) < max(0.75, settings.rim_tolerance * radius)))
-    std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
+    # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
+    excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
+    std = float(
+        np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
+    )
     radius_std = float(np.hypot(np.sqrt(covariance[2, 2]), settings.center_std_floor_px))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
@@ -230,7 +247,9 @@ def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float, sett
     return np.where(seen & (peak > settings.rim_over_texture * float(np.median(strength[:, ~inner]))), edge, np.nan)
 
 
-def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> tuple[Array, Array] | None:
+def _robust_circle(
+    parameters: Array, ray: Array, edge: Array, span: float, expected: Radius
+) -> tuple[Array, Array] | None:
     found = np.isfinite(edge)
     if found.sum() < 12:
         return None
@@ -245,7 +264,11 @@ def _robust_circle(parameters: Array, ray: Array, edge: Array, span: float) -> t
         normal = design.T @ (tukey[:, None] * design)
         if np.linalg.det(normal) < 1e-4 * len(points) ** 3 * 1e-2:  # less than an eighth of the rim: no centre
             return None
-        change = np.linalg.solve(normal, design.T @ (tukey * residual))
+        gradient = design.T @ (tukey * residual)
+        prior = (scale / (expected.std * expected.px)) ** 2
+        normal[2, 2] += prior
+        gradient[2] += prior * (expected.px - fit[2])
+        change = np.linalg.solve(normal, gradient)
         fit = fit + change
         # The scale may fall by a third a step: a robust fit that trusts its first guess too early keeps its error.
         floor = 0.67 * scale if step < 6 else 0.03

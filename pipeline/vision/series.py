@@ -20,11 +20,12 @@ from pipeline.vision.bearings import BearingHints, PixelPair
 from pipeline.vision.board import calibrate_by_board
 from pipeline.vision.calibration import Calibration, check_scale, from_found, from_number
 from pipeline.vision.centerline import measure_centerline
+from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
 from pipeline.vision.plane import PlaneMap
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.segmentation import Cable, find_cable
+from pipeline.vision.segmentation import find_cable
 
 
 @dataclass(frozen=True)

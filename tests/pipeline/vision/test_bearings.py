@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.bearings import BearingHints, find_bearings, left_first
-from pipeline.vision.covers import find_cover
+from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
@@ -53,7 +53,7 @@ def centre_errors(scene: Scene, *, off: float = 0.0, radius_error: float = 0.0) 
         circle = find_cover(
             photo_of(picture, scene.sensor.bit_depth),
             rough_end(picture, side, radius, off),
-            radius * (1 + radius_error),
+            Radius(radius * (1 + radius_error), 0.01 if radius_error == 0 else 0.05),
             scene.cable.diameter_m * SCALE,
             STAGE,
         )
@@ -119,7 +119,9 @@ def test_cover_of_the_grounds_own_look_is_found_by_its_dot() -> None:
     picture = render(scene(covers=(cover, cover)))
     radius = 0.006 * SCALE
     for side, true in enumerate((picture.left_px, picture.right_px)):
-        circle = find_cover(photo_of(picture), rough_end(picture, side, radius), radius, 0.0046 * SCALE, STAGE)
+        circle = find_cover(
+            photo_of(picture), rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE, STAGE
+        )
         assert circle is not None
         assert np.hypot(*np.subtract(circle.center, true)) < 5.0 * circle.std
         assert circle.radius == radius
