@@ -205,22 +205,22 @@ class Characteristic:
 
     def f(self, u: ArrayLike) -> Array:
         """The spline itself at the abscissa ``u`` (n,) 1/m, N m^2, in its own reading."""
-        return evaluate(self._pieces.f, self._pieces, np.asarray(u, float))
+        return evaluate(self._pieces.f, self._pieces.cardinal, np.asarray(u, float))
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m, shape of ``K`` broadcast with ``K0``."""
         u, u0, D = self._arguments(K, K0)
         if self.reading == "secant":
             return np.asarray(self.f(u) * D)
-        F = self._pieces.F
-        return np.asarray(evaluate(F, self._pieces, u) - evaluate(F, self._pieces, u0))
+        p = self._pieces
+        return np.asarray(evaluate(p.F, p.cardinal, u) - evaluate(p.F, p.cardinal, u0))
 
     def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Tangent reading dm/dK, N m^2."""
         u, _, D = self._arguments(K, K0)
         if self.reading == "tangent":
             return self.f(u) + np.zeros_like(D)
-        return np.asarray(self.f(u) + slope(self._pieces, u) * D)
+        return np.asarray(self.f(u) + slope(self._pieces.f, self._pieces.cardinal, u) * D)
 
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
@@ -229,7 +229,7 @@ class Characteristic:
             return self.f(u) + np.zeros_like(D)
         # Mean of f over [u0, u]. Where the interval is short the difference of primitives loses digits, and Simpson's
         # rule is exact (f is a cubic there) but for a knot inside, whose share is of the order of interval^3.
-        span = max(float(np.ptp(self._pieces.breaks)), float(np.max(np.abs(u - u0), initial=0.0)))
+        span = max(float(np.ptp(self._pieces.cardinal.breaks)), float(np.max(np.abs(u - u0), initial=0.0)))
         short = np.abs(D) <= 1e-4 * span
         simpson = (self.f(u0) + 4.0 * self.f(0.5 * (u + u0)) + self.f(u)) / 6.0
         return np.where(short, simpson, self.moment(K, K0) / np.where(short, 1.0, D))
@@ -238,10 +238,10 @@ class Characteristic:
         """Energy per length int_{K0}^{K} m dk, N: Eq. (5) with the factor 1/2 taken out."""
         u, u0, D = self._arguments(K, K0)
         p = self._pieces
-        rise = evaluate(p.G, p, u) - evaluate(p.G, p, u0)
+        rise = evaluate(p.G, p.cardinal, u) - evaluate(p.G, p.cardinal, u0)
         if self.reading == "secant":
-            return np.asarray(evaluate(p.F, p, u) * D - rise)
-        return np.asarray(rise - evaluate(p.F, p, u0) * D)
+            return np.asarray(evaluate(p.F, p.cardinal, u) * D - rise)
+        return np.asarray(rise - evaluate(p.F, p.cardinal, u0) * D)
 
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """`moment` and `tangent` as one function of K (n,) for fixed pre-curvature (n,) or (1,): Newton's inner call.
@@ -250,13 +250,13 @@ class Characteristic:
         """
         p, excess, secant = self._pieces, self.abscissa == "excess", self.reading == "secant"
         table = np.vstack([p.f, p.F])
-        rest = evaluate(p.F, p, np.zeros(1) if excess else K0)
+        rest = evaluate(p.F, p.cardinal, np.zeros(1) if excess else K0)
 
         def moment_and_tangent(K: Array) -> tuple[Array, Array]:
             D = K - K0
             u = D if excess else K
-            segment = p.breaks.searchsorted(u)
-            t = u - p.origin.take(segment)
+            segment = p.cardinal.breaks.searchsorted(u)
+            t = u - p.cardinal.origin.take(segment)
             f0, f1, f2, f3, F0, F1, F2, F3, F4 = table.take(segment, axis=1)
             f = ((f3 * t + f2) * t + f1) * t + f0
             if secant:
@@ -268,20 +268,20 @@ class Characteristic:
     def moment_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment with respect to the control points, (n, p) in 1/m; exact, m is linear in them."""
         u, u0, D = self._arguments(K, K0)
-        p = self._pieces
+        c = self._pieces.cardinal
         if self.reading == "secant":
-            return np.asarray(evaluate(p.cardinal_f, p, u) * np.broadcast_to(D, np.shape(D))[..., None])
-        rise = evaluate(p.cardinal_primitive, p, u) - evaluate(p.cardinal_primitive, p, u0)
-        return np.asarray(np.broadcast_to(rise, (*np.shape(D), self.knots.size)))
+            rise = evaluate(c.f, c, u + 0.0 * D) * D
+        else:
+            rise = evaluate(c.F, c, u + 0.0 * D) - _last(evaluate(c.F, c, u0), D)
+        return np.moveaxis(rise, 0, -1)
 
     def tangent_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the tangent dm/dK with respect to the control points, (n, p), dimensionless."""
         u, _, D = self._arguments(K, K0)
-        p = self._pieces
-        value = np.broadcast_to(evaluate(p.cardinal_f, p, u), (*np.shape(D), self.knots.size))
-        if self.reading == "tangent":
-            return value.copy()
-        return np.asarray(value + slope(p, u, cardinal=True) * D[..., None])
+        c = self._pieces.cardinal
+        u = u + 0.0 * D
+        value = evaluate(c.f, c, u)
+        return np.moveaxis(value if self.reading == "tangent" else value + slope(c.f, c, u) * D, 0, -1)
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2 (negative for positive stiffness)."""
@@ -297,3 +297,8 @@ class Characteristic:
         if self.abscissa == "excess":
             return D, np.zeros(()), D
         return K_, K0_, D
+
+
+def _last(values: Array, like: Array) -> Array:
+    """Values (p, ...) with as many axes after the first as ``like`` has, so that they broadcast."""
+    return values.reshape(values.shape[:1] + (1,) * (like.ndim - values.ndim + 1) + values.shape[1:])

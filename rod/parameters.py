@@ -37,6 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,9 +56,9 @@ class Directions:
     Attributes
     ----------
     names : (q,)
-    pre_curvature, profile : (n, q)
-    ordinates : (p, q)
-    edges : (n + 1, q)
+    pre_curvature, profile : (q, n)
+    ordinates : (q, p)
+    edges : (q, n + 1)
         Edge lengths, rigid pieces first and last.
     scalars : dict of (q,)
         Everything that is one number, under the names of the table.
@@ -72,7 +73,27 @@ class Directions:
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
-        return self.scalars.get(name, np.zeros(len(self.names)))
+        return self.scalars.get(name, self.none)
+
+    @cached_property
+    def none(self) -> Array:
+        """Zeros, (q,)."""
+        return np.zeros(len(self.names))
+
+    @cached_property
+    def geometric(self) -> bool:
+        """Whether any edge changes its length."""
+        return bool(np.any(self.edges))
+
+    @cached_property
+    def lawful(self) -> bool:
+        """Whether any control point changes."""
+        return bool(np.any(self.ordinates))
+
+    @cached_property
+    def profiled(self) -> bool:
+        """Whether the stiffness profile changes."""
+        return bool(np.any(self.profile))
 
     def has(self, *names: str) -> bool:
         """Whether one of these numbers is a parameter."""
@@ -119,19 +140,19 @@ def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions
     q, joints = len(names), test.rod.section.pre_curvature.size
     law = test.characteristic
     p = law.knots.size if isinstance(law, Characteristic) else 0
-    made = Directions(names, np.zeros((joints, q)), np.zeros((joints, q)), np.zeros((p, q)), np.zeros((joints + 1, q)))
+    made = Directions(names, np.zeros((q, joints)), np.zeros((q, joints)), np.zeros((q, p)), np.zeros((q, joints + 1)))
     fields = {"pre_curvature": made.pre_curvature, "stiffness_profile": made.profile, "ordinates": made.ordinates}
     column = 0
     for labels, name, basis in blocks:
         columns = slice(column, column + len(labels))
         column += len(labels)
         if basis is not None:
-            fields[name][:, columns] = basis
+            fields[name][columns] = basis.T
             continue
         if name in _GEOMETRY:
             left, right, length = _GEOMETRY[name]
-            made.edges[0, columns], made.edges[-1, columns] = left, right
-            made.edges[1:-1, columns] = (test.rod.elements * (length - left - right))[:, None]
+            made.edges[columns, 0], made.edges[columns, -1] = left, right
+            made.edges[columns, 1:-1] = test.rod.elements * (length - left - right)
         for scalar in (f"{name}_left", f"{name}_right") if name in _BOTH_ENDS else (name,):
             if scalar in _SCALARS:
                 made.scalars.setdefault(scalar, np.zeros(q))[columns] = 1.0

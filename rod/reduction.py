@@ -167,11 +167,10 @@ class System:
         return border
 
     def softened(self, edge: EdgeState, force: Array) -> Array:
-        """Extent of every edge, (2, n + 2, q) m, for a small force (2, n + 2, q) or (2, 1, q) N: h rot C^-1 rot^T."""
-        h = self.rod.edges[:, None]
+        """Extent of every edge, (2, q, n + 2) m, for a small force (2, q, n + 2) or (2, q, 1) N: h rot C^-1 rot^T."""
+        h, cos, sin = self.rod.edges, edge.cos, edge.sin
         if self._difference == 0.0:
-            return np.asarray(self._axial * h * force)
-        cos, sin = edge.cos[:, None], edge.sin[:, None]
+            return np.asarray((self._axial * h) * force)
         along, across = self._axial * (cos * force[0] + sin * force[1]), self._shear * (cos * force[1] - sin * force[0])
         return np.array((h * (cos * along - sin * across), h * (sin * along + cos * across)))
 
@@ -179,7 +178,7 @@ class System:
         if self._difference == 0.0:
             soft = self._axial * self.rod.length
             return np.array(((soft, 0.0), (0.0, soft)))
-        return np.asarray(self.softened(edge, np.eye(2)[:, None, :]).sum(axis=1))
+        return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
 
     def _restoring(self, edge: EdgeState) -> Array:
         return edge.along + (edge.along**2 - edge.across**2) * self._difference
@@ -220,7 +219,7 @@ class System:
         multipliers = self._scale * multipliers if info == 0 else np.full((k + 1, p), np.nan)
         dR = np.zeros((2, p))
         dR[self._imposed] = multipliers[:k]
-        return solved[:, k + 1 :] - solved[:, : k + 1] @ multipliers, dR
+        return (solved.T[k + 1 :] - multipliers.T @ solved.T[: k + 1]).T, dR
 
     def excess_negatives(self, balance: Balance) -> int:
         """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
