@@ -23,10 +23,13 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from pipeline.rounding import plain
+
+# A figure of its own, or a part of a page.
+Area = Figure | SubFigure
 
 # role: (in light, in dark). The light colours differ in every role: they are how a role is found again in the SVG.
 PALETTE = {
@@ -120,7 +123,7 @@ def style(scale: float = 1.0) -> Iterator[None]:
 
 def drawing(
     name: str,
-    draw: Callable[[FigureBase], Axes],
+    draw: Callable[[Area], Axes],
     *,
     size: tuple[float, float] = (400.0, 300.0),
     title: str,
@@ -175,7 +178,7 @@ def _along(part: tuple[float, float], level: int) -> str:
 
 
 def plot_area(
-    figure: FigureBase, *, left: float = 54.0, right: float = 12.0, top: float = TWO_ROWS, bottom: float = 42.0
+    figure: Area, *, left: float = 54.0, right: float = 12.0, top: float = TWO_ROWS, bottom: float = 42.0
 ) -> Axes:
     """One pair of axes with margins in px: a fixed layout costs a tenth of matplotlib's constrained one."""
     width, height = figure.bbox.width, figure.bbox.height  # in px, for all figures are drawn at 72 dots per inch
@@ -193,7 +196,7 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
         axis.set_major_formatter(number_ticks(decimal))
     axes.tick_params(length=3)
     if legend:
-        place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
+        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
         many = (
             {"handlelength": 1.1, "columnspacing": 0.9, "handletextpad": 0.4} if legend > 4 else {"columnspacing": 1.4}
         )

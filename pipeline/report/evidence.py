@@ -14,7 +14,7 @@ from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import curves, seen_range
 from pipeline.report.units import suited
 from pipeline.report.words import Words
-from pipeline.result import PhotoPart, PreviewPart, Result
+from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
 
 TALL = (400.0, 350.0)
@@ -146,7 +146,7 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
     return drawn
 
 
-def map_rms(residuals: maps.ResidualMap, words: Words) -> str:
+def map_rms(residuals: ResidualMap, words: Words) -> str:
     """Root mean square of a residual map by step, as text."""
     texts = []
     for step, row in zip(residuals.steps, residuals.shape_sigma, strict=True):

@@ -8,13 +8,13 @@ positive), displacement in mm. Bands hold the share of normal errors named in th
 from __future__ import annotations
 
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 from matplotlib.ticker import MaxNLocator
 
-from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, finish, plot_area, step_colours
+from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
 from pipeline.report.curves import Visited, curves, visited
 from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
@@ -48,14 +48,14 @@ def force_unit(result: Result, words: Words) -> Unit:
     return suited((step.force_N for step in result.steps), "N", decimal=words.decimal)
 
 
-def draw_characteristic(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_characteristic(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw f_EI by every way with its band; what was never visited is shaded."""
     axes, parts, unit = plot_area(figure), curves(result), stiffness_unit(result, words)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
     margin = 0.14 * (high - low)
     left = min(0.0, low) if abs(low) < 0.5 * (high - low) else low - margin
     left = min(left, low - 0.04 * (high - low))
-    shade = {"facecolor": LIGHT["unvisited"], "alpha": 0.14, "linewidth": 0.0}
+    shade: dict[str, Any] = {"facecolor": LIGHT["unvisited"], "alpha": 0.14, "linewidth": 0.0}
     axes.axvspan(left, low, label=words("unvisited"), **shade)
     axes.axvspan(high, high + margin, **shade)
     for method, curve in parts.items():
@@ -103,11 +103,11 @@ def _banded(
     half = band_width(settings) * std
     low, high = unit.factor * (value - half), unit.factor * (value + half)
     axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0)
-    width = {"lw": 3.0} if method == "extended" else {}
+    width: dict[str, Any] = {"lw": 3.0} if method == "extended" else {}
     axes.plot(kappa, unit.factor * value, color=LIGHT[method], ls=DASHES[method], label=words(f"way_{method}"), **width)
 
 
-def draw_moment(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
     axes, parts, unit = plot_area(figure), curves(result), moment_unit(result, words)
     if result.balance and result.balance.points_kappa_per_m:
@@ -131,7 +131,7 @@ def draw_moment(figure: FigureBase, result: Result, words: Words, settings: Repo
     )
 
 
-def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw the paper's (kappa, f_EI)-graph, Eq. (14) point by point and photo by photo, under the balance curve."""
     axes, unit = plot_area(figure), stiffness_unit(result, words)
     pointwise = result.balance.pointwise if result.balance else []
@@ -150,7 +150,7 @@ def draw_pointwise(figure: FigureBase, result: Result, words: Words, settings: R
     )
 
 
-def draw_branches(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw f_EI fitted to loading and to unloading apart."""
     axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
     fitted = result.inverse.branches if result.inverse else {}
@@ -167,7 +167,7 @@ def draw_branches(figure: FigureBase, result: Result, words: Words, settings: Re
     )
 
 
-def draw_forces(figure: FigureBase, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
     height = figure.bbox.height
     axes = plot_area(figure, bottom=0.38 * height)
@@ -206,7 +206,7 @@ def draw_forces(figure: FigureBase, result: Result, words: Words, settings: Repo
 
 def _branch(axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words) -> None:
     """Measured forces of one branch with error bars, and their residuals below."""
-    look = {
+    look: dict[str, Any] = {
         "ls": "none",
         "marker": MARKERS[branch],
         "ms": 5.5,
@@ -243,7 +243,7 @@ def force_residual(step: StepPart) -> float | None:
     return (step.force_N - step.force_fit_N) / step.force_std_N
 
 
-def draw_curvatures(figure: FigureBase, result: Result, words: Words) -> Axes:
+def draw_curvatures(figure: Area, result: Result, words: Words) -> Axes:
     """Draw kappa(s) of the visible cable on all photos in one picture; later steps are brighter."""
     axes = plot_area(figure, top=ONE_ROW)
     traced = [photo for photo in result.photos if photo.kappa_per_m]

@@ -119,7 +119,7 @@ def unreadable(path: Path, name: str, error: Exception) -> Result:
     reason = f"{path.name} of {name} cannot be read ({type(error).__name__}); run the specimen again."
     return Result(
         status="failed",
-        specimen=SpecimenPart(id=name, length_m=0.0, diameter_m=0.0, folder=name, moving_bearing=""),
+        specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),
         findings=[FindingPart(code="result/unreadable", level="error", message=reason)],
     )
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.figure import FigureBase
 from numpy.typing import NDArray
 
-from pipeline.report.canvas import LIGHT, ONE_ROW, finish, number_ticks, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, number_ticks, plot_area
 from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import ResidualMap, Result
@@ -45,9 +44,7 @@ def measured_map(result: Result) -> ResidualMap | None:
     )
 
 
-def draw_map(
-    figure: FigureBase, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = ""
-) -> Axes:
+def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
     axes = plot_area(figure, left=92.0, right=70.0, top=20.0 if title else 8.0)
     s = 1e3 * np.asarray(residuals.s_m)
@@ -83,7 +80,7 @@ def draw_map(
 
 
 def draw_force_rest(
-    figure: FigureBase, before: ResidualMap, after: ResidualMap | None, words: Words, settings: ReportSettings
+    figure: Area, before: ResidualMap, after: ResidualMap | None, words: Words, settings: ReportSettings
 ) -> Axes:
     """Draw forces left over by step in sigma, before and after the extension."""
     axes, noise = plot_area(figure, top=ONE_ROW), settings.residual_noise_sigma
@@ -98,7 +95,7 @@ def draw_force_rest(
     return axes
 
 
-def draw_leftover(figure: FigureBase, s_m: list[float], shape_m: list[float], words: Words) -> Axes:
+def draw_leftover(figure: Area, s_m: list[float], shape_m: list[float], words: Words) -> Axes:
     """Draw the pattern of what no cause explains, along the cable."""
     axes, unit = plot_area(figure, top=8.0), suited(shape_m, "m", decimal=words.decimal)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
@@ -110,7 +107,7 @@ def _numbers(row: list[float | None]) -> Array:
     return np.array([np.nan if v is None else v for v in row])
 
 
-def _scale(figure: FigureBase, axes: Axes, image: ScalarMappable, label: str, words: Words) -> None:
+def _scale(figure: Area, axes: Axes, image: ScalarMappable, label: str, words: Words) -> None:
     """Colour bar right of the axes."""
     box, width = axes.get_position(), figure.bbox.width
     bar = figure.add_axes((box.x1 + 12.0 / width, box.y0, 12.0 / width, box.height))
@@ -119,7 +116,7 @@ def _scale(figure: FigureBase, axes: Axes, image: ScalarMappable, label: str, wo
     bar.grid(False)
 
 
-def draw_cosines(figure: FigureBase, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
+def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
     """Draw how alike the signatures of causes are: |cos| = 1 cannot be told apart by this test."""
     names = list(dict.fromkeys([*cosines, *(other for row in cosines.values() for other in row)]))
     axes = plot_area(figure, left=134.0, right=64.0, top=8.0, bottom=108.0)

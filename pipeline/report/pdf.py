@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.image import imread
 
 from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
-from pipeline.report.canvas import FONT, LIGHT, style
+from pipeline.report.canvas import FONT, LIGHT, Area, style
 from pipeline.report.curves import curves
 from pipeline.report.diagnosed import diagnosis_view, residual_map
 from pipeline.report.document import simulation_texts
@@ -78,7 +78,7 @@ class Sheet:
         for name, text in rows:
             self.text(f"{name}: {text}", size=size)
 
-    def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> FigureBase:
+    def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> Area:
         """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
         inner = PAGE[0] - 2.0 * MARGIN
         x0, x1 = (MARGIN + share * inner for share in (left, right))
@@ -236,9 +236,9 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         *source.facts,
     ]
     rows += [(name, digest[:16]) for name, digest in source.inputs]
-    for row in rows:
+    for pair in rows:
         if sheet.room() > 24.0:
-            sheet.pairs([row], size=8.0)
+            sheet.pairs([pair], size=8.0)
     return sheet
 
 
@@ -249,7 +249,7 @@ def _height(photo: PhotoPart) -> float:
     return 0.0 if preview is None else min(width * preview.height / preview.width, 0.2 * PAGE[1])
 
 
-def _picture(part: FigureBase, photo: PhotoPart, words: Words) -> None:
+def _picture(part: Area, photo: PhotoPart, words: Words) -> None:
     """One photo with its centerline; hidden parts dashed."""
     if photo.preview is None:
         return

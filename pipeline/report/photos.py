@@ -11,9 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 
-from pipeline.report.canvas import LIGHT, ONE_ROW, finish, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
 from pipeline.report.figures import band_width
 from pipeline.report.units import suited
 from pipeline.report.words import Words
@@ -61,7 +60,7 @@ def bearing_marks(photo: PhotoPart) -> list[tuple[float, float]]:
     return [((p[0] + 0.5) / photo.preview.reduction, (p[1] + 0.5) / photo.preview.reduction) for p in axes if p]
 
 
-def draw_photo_curvature(figure: FigureBase, photo: PhotoPart, words: Words, settings: ReportSettings) -> Axes:
+def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words, settings: ReportSettings) -> Axes:
     """Draw kappa(s) of one photo with its band and the fit; below, the position left over along the normal."""
     height, s = figure.bbox.height, 1e3 * np.asarray(photo.s_m)
     residual = bool(photo.shape_residual_m)
@@ -90,7 +89,7 @@ def draw_photo_curvature(figure: FigureBase, photo: PhotoPart, words: Words, set
     return axes
 
 
-def _residual(figure: FigureBase, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> Axes:
+def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> Axes:
     """Measured minus simulated position along the normal, with the noise of the photo as a band around zero."""
     axes = plot_area(figure, top=0.66 * figure.bbox.height)
     unit = suited([*photo.shape_residual_m, *photo.shape_residual_std_m], "m", decimal=words.decimal)

@@ -53,13 +53,12 @@ def specimen_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     """What was given: lengths, rig, free text, and the scale of the photos with its source."""
     part = result.specimen
     rows = [
-        (words("length"), f"{words.number(1e3 * part.length_m, 6)} mm ({words('given')})"),
-        (words("diameter"), f"{words.number(1e3 * part.diameter_m, 6)} mm ({words('given')})"),
-        (
-            words("moving"),
-            words(part.moving_bearing) if part.moving_bearing in ("left", "right") else part.moving_bearing,
-        ),
+        (words(name), f"{words.number(1e3 * value, 6)} mm ({words('given')})")
+        for name, value in (("length", part.length_m), ("diameter", part.diameter_m))
+        if value is not None
     ]
+    if part.moving_bearing in ("left", "right"):
+        rows.append((words("moving"), words(part.moving_bearing)))
     if result.scale is not None:
         scale = words.measured(result.scale.px_per_mm, result.scale.px_per_mm * result.scale.std_relative)
         rows.append((words("scale"), f"{scale} px/mm {words('scale_from', source=result.scale.source)}"))

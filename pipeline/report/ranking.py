@@ -8,9 +8,8 @@ physics.
 from __future__ import annotations
 
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 
-from pipeline.report.canvas import LIGHT, finish, plot_area
+from pipeline.report.canvas import LIGHT, Area, finish, plot_area
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart
 from pipeline.settings import ReportSettings
@@ -28,7 +27,7 @@ def ranking_height(diagnosis: DiagnosisPart, settings: ReportSettings) -> float:
     return 54.0 + ROW_PX * len(ranked(diagnosis, settings))
 
 
-def draw_ranking(figure: FigureBase, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
+def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
     """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
     rows, width = ranked(diagnosis, settings), figure.bbox.width
     named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}

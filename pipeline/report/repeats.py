@@ -6,9 +6,8 @@ from itertools import groupby
 from operator import itemgetter
 
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 
-from pipeline.report.canvas import LIGHT, Drawing, drawing, finish, plot_area
+from pipeline.report.canvas import LIGHT, Area, Drawing, drawing, finish, plot_area
 from pipeline.report.curves import Visited
 from pipeline.report.figures import band_width
 from pipeline.report.pooling import Pooled, pool
@@ -77,7 +76,7 @@ def _pooled_figure(
 ) -> Drawing:
     """Draw the single curves, the scatter between specimens, and the mean with its band."""
 
-    def draw(figure: FigureBase) -> Axes:
+    def draw(figure: Area) -> Axes:
         axes, half = plot_area(figure), band_width(settings)
         for index, curve in enumerate(curves[:40]):  # more lines than that are a blot
             label = words("pooled_single") if index == 0 else None

@@ -59,7 +59,7 @@
   }
   // Overlay: colours of Okabe and Ito, then the same with dashes.
   const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f"], dashes = ["", "7 3", "2 3", "9 3 2 3"];
-  const svg = "http://www.w3.org/2000/svg", W = 640, H = 380, L = 62, R = 14, T = 12, B = 48;
+  const svg = "http://www.w3.org/2000/svg", L = 62, R = 14, T = 12, B = 48;
   const make = (name, values, text) => {
     const node = document.createElementNS(svg, name);
     for (const key in values) node.setAttribute(key, values[key]);
@@ -74,7 +74,7 @@
   };
   const LIMIT = 40;
   const draw = () => {
-    const place = find("overlay-plot");
+    const place = find("overlay-plot"), W = Math.max(340, Math.min(640, place.clientWidth)), H = Math.round(60 + W / 2);
     const chosen = rows.filter((row) => row.box && row.box.checked);
     find("overlay-empty").hidden = chosen.length > 0;
     place.replaceChildren();
