@@ -1,0 +1,221 @@
+"""All photos of a specimen on one scale; rendered series with known axes, the shared benches and real photographs."""
+
+import json
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from pipeline.intake.folder import read_specimen
+from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Side, Specimen, Traces
+from pipeline.settings import IntakeSettings
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision import trace_photo, trace_series
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
+from pipeline.vision.sheath import Sheath
+
+SETTINGS = VisionSettings()
+SCALE, LENGTH, DIAMETER, COVER = 5_500.0, 0.17, 0.0046, 0.012
+
+
+def arch(bend: float) -> Curve:
+    return Curve.from_curvature(lambda s: bend * np.sin(pi * s / LENGTH) + 1.0, LENGTH)
+
+
+CURVES = [arch(bend) for bend in (2.0, 5.0, 8.0)]
+TRAVEL = [CURVES[0].chord - curve.chord for curve in CURVES]
+
+
+def series(
+    folder: Path,
+    *,
+    moving: Side = "left",
+    given: RigSpec | None = None,
+    camera: Camera | None = None,
+    scale_error: float | None = 0.0,
+    drift_m: float = 0.0,
+    covers: bool = True,
+) -> Specimen:
+    """Three photos of a cable pushed by one bearing; ``scale_error`` None leaves the scale out."""
+    camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022)) if camera is None else camera
+    steps, images = [], {}
+    for i, curve in enumerate(CURVES):
+        start = TRAVEL[i] if moving == "left" else 0.0
+        cover = Cover(COVER) if covers else None
+        scene = Scene(
+            Strand(curve, DIAMETER, Sheath((0.17,) * 3), (start, drift_m * i)),
+            camera,
+            (cover, cover),
+            Light(gradient=(0.1, 0.0)),
+            Ground("brushed", (0.75,) * 3, 0.02),
+            sensor=Sensor(noise=0.01),
+            seed=i,
+        )
+        name = f"step_{i:02d}.png"
+        assert cv2.imwrite(str(folder / name), render(scene).pixels)
+        steps.append(LoadStep(i, "loading", TRAVEL[i], 1.0, 0.01, None, np.empty(0), np.empty(0), name))
+        images[name] = folder / name
+    rig = RigSpec(moving, COVER if covers else None) if given is None else given
+    spec = CameraSpec(None if scale_error is None else SCALE * (1 + scale_error))
+    return Specimen("a", folder, LENGTH, DIAMETER, spec, rig, tuple(steps), images)
+
+
+def lines(traces: Traces) -> list[Centerline]:
+    assert all(isinstance(photo, Centerline) for photo in traces.photos), traces.photos
+    return [photo for photo in traces.photos if isinstance(photo, Centerline)]
+
+
+def codes(traces: Traces) -> set[str]:
+    return {finding.code for finding in traces.findings if finding.level != "info"}
+
+
+def test_chords_and_lengths_of_a_series_are_true(tmp_path: Path) -> None:
+    traces = trace_series(series(tmp_path), SETTINGS)
+    for line, curve in zip(lines(traces), CURVES, strict=True):
+        # five sigma of two axes, each some hundredths of a pixel at 5.5 px/mm
+        assert line.chord_m == pytest.approx(curve.chord, abs=5 * line.chord_std_m)
+        assert line.chord_std_m < 2e-5
+        assert line.traced_length_m == pytest.approx(LENGTH, rel=1e-3)
+        assert line.preview is not None and line.preview.strip is not None
+    assert not codes(traces)
+    assert traces.scale.source == "number given in specimen.toml"
+
+
+def test_scale_follows_from_the_displacement_log(tmp_path: Path) -> None:
+    traces = trace_series(series(tmp_path, scale_error=None), SETTINGS)
+    assert "displacement log" in traces.scale.source
+    assert abs(traces.scale.px_per_m / SCALE - 1) < 4 * traces.scale.std_relative < 0.01
+    assert [f.code for f in traces.findings if f.level == "info"] == ["scale/source"]
+    assert len(lines(traces)) == 3
+
+
+def test_wrong_scale_is_found_by_covers_and_length(tmp_path: Path) -> None:
+    # a travel of a few millimetres tells less: covers of the wrong size make the axes uncertain
+    traces = trace_series(series(tmp_path, scale_error=0.03), SETTINGS)
+    assert {"scale/covers", "scale/length"} <= codes(traces)
+
+
+def test_bearing_that_moves_is_told_from_the_fixed_one(tmp_path: Path) -> None:
+    specimen = series(tmp_path, moving="right")
+    assert not codes(trace_series(specimen, SETTINGS))
+    claimed = replace(specimen, rig=replace(specimen.rig, moving_bearing="left"))
+    traces = trace_series(claimed, SETTINGS)
+    assert codes(traces) == {"rig/moving-bearing"}
+    assert len(lines(traces)) == 3
+
+
+@pytest.mark.parametrize("quarter", [1, -1])
+def test_upright_series_is_named_by_the_bearing_that_moves(tmp_path: Path, quarter: int) -> None:
+    upright = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022)).turned(quarter)
+    traces = trace_series(series(tmp_path, camera=upright), SETTINGS)
+    assert not codes(traces)
+    left = np.array([line.left_px for line in lines(traces)])
+    right = np.array([line.right_px for line in lines(traces)])
+    assert np.ptp(left, axis=0).max() > 10.0
+    assert np.ptp(right, axis=0).max() < 0.5
+    # turned clockwise the left bearing is up, turned back it is down
+    assert (right - left)[0, 1] * quarter > 0
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_bow_is_positive_on_either_side(tmp_path: Path, mirrored: bool) -> None:
+    camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022), roll_rad=0.04, mirrored=mirrored)
+    for line in lines(trace_series(series(tmp_path, camera=camera), SETTINGS)):
+        assert line.mirrored == mirrored
+        assert np.median(line.shape.kappa) > 0
+        assert line.shape.y.max() > 0
+
+
+def test_camera_that_moved_is_a_finding(tmp_path: Path) -> None:
+    assert "photo/camera-moved" in codes(trace_series(series(tmp_path, drift_m=1.5e-3), SETTINGS))
+
+
+def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
+    camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022))
+    (u0, u1), (v0, v1) = camera.project(np.array([0.0, CURVES[0].chord]), np.zeros(2))
+    given = RigSpec("left", None, ((float(u0), float(v0)), (float(u1), float(v1))))
+    traces = trace_series(series(tmp_path, given=given, covers=False, camera=camera), SETTINGS)
+    for line, curve in zip(lines(traces), CURVES, strict=True):
+        assert line.chord_m == pytest.approx(curve.chord, abs=1e-5)
+        assert line.axis_std_px == pytest.approx(SETTINGS.bearings.given_std_px, rel=0.2)
+
+
+def test_bad_photos_are_refused_and_the_others_measured(tmp_path: Path) -> None:
+    specimen = series(tmp_path)
+    (tmp_path / "step_01.png").write_bytes(b"")
+    del specimen.images["step_02.png"]
+    traces = trace_series(specimen, SETTINGS)
+    assert [type(photo) for photo in traces.photos] == [Centerline, Rejected]
+    assert isinstance(traces.photos[1], Rejected) and traces.photos[1].code == "photo/empty"
+
+
+def test_series_without_any_usable_photo_says_so(tmp_path: Path) -> None:
+    specimen = series(tmp_path, scale_error=None)
+    for path in specimen.images.values():
+        assert cv2.imwrite(str(path), np.full((300, 500), 128, np.uint8))
+    traces = trace_series(specimen, SETTINGS)
+    assert all(isinstance(photo, Rejected) and photo.preview is not None for photo in traces.photos)
+    assert traces.scale.source.startswith("none")
+
+
+def test_preview_is_a_reduced_photo_and_a_straight_strip(tmp_path: Path) -> None:
+    line = lines(trace_series(series(tmp_path), SETTINGS))[2]
+    assert line.preview is not None and line.preview.strip is not None
+    small = cv2.imdecode(np.frombuffer(line.preview.jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert small.shape == (line.preview.height, line.preview.width)
+    assert line.preview.width * line.preview.reduction == pytest.approx(1150, abs=1)
+    strip = cv2.imdecode(np.frombuffer(line.preview.strip, np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
+    seen = strip[:, int(0.1 * strip.shape[1]) : int(0.9 * strip.shape[1])]
+    rows = np.arange(len(strip))
+    dark = np.clip(np.median(seen) + 40 - seen, 0, None)
+    middle = (dark * rows[:, None]).sum(axis=0) / dark.sum(axis=0)
+    # a band that bends by less than a twentieth of the cable: the strip shows two widths over its height
+    assert np.ptp(middle) < 0.05 * len(strip)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", ["bench-a", "bench-b", "bench-c"])
+def test_axes_and_path_of_the_bench(name: str, shared_data: Path) -> None:
+    traces = trace_series(read_specimen(shared_data / "bench" / name, IntakeSettings()), SETTINGS)
+    truth = json.loads((shared_data / "bench" / name / "truth.json").read_text())
+    assert not codes(traces)
+    for line, step in zip(lines(traces), truth["steps"], strict=True):
+        path = np.array(step["px"])
+        assert np.hypot(*np.subtract(line.left_px, path[0])) < 0.1
+        assert np.hypot(*np.subtract(line.right_px, path[-1])) < 0.1
+        assert 1e3 * line.chord_m == pytest.approx(step["chord_mm"], abs=0.01)
+        dense = np.column_stack([np.interp(np.linspace(0, 100, 20_001), np.arange(101), column) for column in path.T])
+        distance, _ = cKDTree(dense).query(np.column_stack([line.u_px, line.v_px])[line.shape.seen])
+        # the truth's 101 points, 20 px apart, are joined by chords: 0.05 px
+        assert np.sqrt(np.mean(distance**2)) < 0.3
+
+
+@pytest.mark.shared
+def test_real_cable_is_followed_from_clamp_to_clamp(shared_data: Path) -> None:
+    folder = shared_data / "real" / "loop"
+    line = trace_photo(folder / "black0.jpg")
+    assert isinstance(line, Centerline)
+    hand = np.loadtxt(folder / "black0_handpoints.csv", delimiter=",", skiprows=1)[:, :2]
+    path = np.column_stack([line.u_px, line.v_px])
+    distance, _ = cKDTree(path).query(hand[1:-1])
+    # The hand points lie 3.7 px rms off a good trace; the outermost lie on the clamps themselves.
+    assert np.sqrt(np.mean(distance**2)) < 6.0
+    clamps = np.sort(np.array([np.hypot(*(path[i] - hand[j])) for i in (0, -1) for j in (0, -1)]))[:2]
+    assert clamps.max() < 60.0
+    # 1.5 m of cable, 4 mm thick
+    assert 300 < line.traced_length_m / line.width_m < 420
+    assert line.width_std_m < 0.05 * line.width_m
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(("name", "code"), [("blackcrit", "photo/crossing"), ("white0", "photo/contrast")])
+def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data: Path) -> None:
+    outcome = trace_photo(shared_data / "real" / "loop" / f"{name}.jpg")
+    assert isinstance(outcome, Rejected)
+    assert outcome.code == code
+    assert outcome.figure
+    assert outcome.preview is not None
