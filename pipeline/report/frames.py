@@ -58,11 +58,9 @@ def forces_frame(result: Result) -> pd.DataFrame:
 
 def photos_frame(result: Result) -> pd.DataFrame:
     """Outcome of every photo with its lengths."""
-    names = ("image", "step", "status", "reason", "chord_m", "chord_std_m", "traced_length_m", "traced_length_std_m")
-    names += ("width_m", "width_std_m")
-    return pd.DataFrame(
-        [{name: getattr(photo, name) for name in names} for photo in result.photos], columns=list(names)
-    )
+    lengths = [f"{name}{end}" for name in ("chord", "traced_length", "width") for end in ("_m", "_std_m")]
+    names = ["image", "step", "status", "reason", *lengths]
+    return pd.DataFrame([{name: getattr(photo, name) for name in names} for photo in result.photos], columns=names)
 
 
 def causes_frame(result: Result) -> pd.DataFrame:

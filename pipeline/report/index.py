@@ -7,6 +7,7 @@ over each other, repeat specimens of a type pooled. A failed specimen is a row w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,12 +107,19 @@ def _shapes(result: Result) -> str:
 
 def read_results(folder: Path) -> Iterator[tuple[Result, str]]:
     """Results below a folder one by one, each with its folder relative to it; an unreadable one counts as failed."""
-    for path in sorted(folder.glob("*/**/result.json")):
-        name = path.parent.relative_to(folder).as_posix()
+    names = (path.parent.relative_to(folder).as_posix() for path in folder.glob("*/**/result.json"))
+    for name in sorted((name for name in names if not re.search(r"(^|/)\.", name)), key=natural):
+        path = folder / name / "result.json"
         try:
             yield from_json(path.read_text(encoding="utf-8")), name
         except (ValueError, OSError) as error:
             yield unreadable(path, name, error), name
+
+
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """Order of names as people count: cable-2 before cable-10."""
+    parts = re.findall(r"\d+|\D+", name)
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part.casefold()) for part in parts]
 
 
 def unreadable(path: Path, name: str, error: Exception) -> Result:

@@ -56,9 +56,7 @@ def failed_result():
     """A specimen of which nothing could be measured."""
     return Result(
         status="failed",
-        specimen=SpecimenPart(
-            id="cable-13", length_m=0.18, diameter_m=0.0046, folder="b/cable-13", moving_bearing="left"
-        ),
+        specimen=SpecimenPart(id="cable-13", folder="b/cable-13"),
         findings=[
             FindingPart(code="log/empty", level="error", message="force.csv: the log is empty; export it again.")
         ],

@@ -84,3 +84,9 @@ def test_german_index(batch, tmp_path):
     page = write_index(batch, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
     assert "4 Proben: 2 vermessen, 1 teilweise, 1 gescheitert." in page
     assert "20,00 ± 0,13" in page
+
+
+def test_rows_stand_in_the_order_people_count_and_hidden_folders_stay_out(failed_result, tmp_path):
+    for name in ("cable-10", "cable-2", "Cable-1", ".half/cable-3"):
+        write_result(named(failed_result, name), tmp_path / name)
+    assert list(pd.read_csv(write_index(tmp_path, tmp_path)[1]).id) == ["Cable-1", "cable-2", "cable-10"]
