@@ -112,6 +112,11 @@ class Rod:
         return np.asarray(np.cumsum(self.edges[:-1]))
 
     @cached_property
+    def length_beyond(self) -> Array:
+        """Length to the right of each edge's middle, (n + 2,) m."""
+        return np.asarray(0.5 * self.edges + (self.length - np.cumsum(self.edges)))
+
+    @cached_property
     def stiffness_scale(self) -> float:
         """Typical bending stiffness, N m^2: size of the law times the largest profile value."""
         profile = self.section.profile

@@ -211,9 +211,8 @@ def _explicit(
 
 def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
     """Change of the dead load to the right of each edge, one component, (q, n + 1) N."""
-    h, load = step.rod.edges, step.rod.load[axis]
-    share = 0.5 * h + (step.rod.length - np.cumsum(h))
-    change = moves.scalar("load_y" if axis else "load_x")[:, None] * share
+    load = step.rod.load[axis]
+    change = moves.scalar("load_y" if axis else "load_x")[:, None] * step.rod.length_beyond
     if load and moves.geometric:
         after = np.cumsum(moves.edges[:, ::-1], axis=1)[:, ::-1] - moves.edges
         change += load * (0.5 * moves.edges + after)

@@ -138,10 +138,11 @@ def test_every_parameter_along_a_path_with_memory(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["pre_curvature", "length", "rigid_ends", "bearing_friction", "load_y"])
 def test_with_imposed_chords(name: str) -> None:
-    # From 1.5 mm on: at exactly the mounted chord a change of K0 decides whether the set begins to grow, a kink.
-    chords = EVERYTHING.zero_chord - DISPLACEMENTS - 1.5e-3
+    # Without friction elements: each of the four shifted paths would slip at other joints than the middle one.
+    test = replace(EVERYTHING, friction=None, plastic_rate=0.0)
+    chords = test.zero_chord - DISPLACEMENTS - 1e-3
     vary, h = VARIATIONS[name]
-    assert worst_error(EVERYTHING, name, vary, h, lambda t, s: simulate(t, chords=chords, starts=s)) < 1e-6
+    assert worst_error(test, name, vary, h, lambda t, s: simulate(t, chords=chords, starts=s)) < 1e-6
 
 
 @pytest.mark.parametrize("zero", ["length", 0.198])
