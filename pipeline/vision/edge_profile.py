@@ -112,11 +112,8 @@ def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: f
         start, linear = _variable_projection(pooled, start, ramps=True)
         # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
         usual = _running_median(np.column_stack([start[:, 1], linear]))
-        place, blurs, *parts = (a[:, None].astype(np.float32) for a in (start[:, 0], *usual.T))
-        cumulative, ramp_in, ramp_out, _ = profile(offset, place, blurs)
-        residual = np.abs(value - parts[0] - parts[1] * cumulative - parts[2] * ramp_in - parts[3] * ramp_out)
-        noise = 1.4826 * np.median(residual, axis=1)
-        limit = np.maximum(4.0 * np.median(noise), _PLAIN_STEP * parts[1])
+        residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
+        limit = np.maximum(4.0 * np.median(_scatter(residual)), _PLAIN_STEP * usual[:, 2:3])
         pooled = _pool(offset, value, cell, residual < limit, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
@@ -124,6 +121,7 @@ def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: f
     step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
     shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
     by_side = shape.T.reshape(5, 2, count)
+    noise = _scatter(_misfit(offset, value, np.column_stack([used, linear])))
     return Profiles(
         s=s[chosen].reshape(count, each).mean(axis=1),
         place=used[:, 0].reshape(2, count),
@@ -133,8 +131,20 @@ def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: f
         inside=by_side[3],
         outside=by_side[4],
         shift=(full[:, 0] - plain[:, 0]).reshape(2, count),
-        noise=noise.reshape(2, count).astype(np.float64),
+        noise=noise.reshape(2, count),
     )
+
+
+def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:
+    """Absolute residuals of pixels ``(k, m)`` for profiles ``(k, 6)``: place, blur, level, step and ramps."""
+    place, blur, level, step, inside, outside = (a[:, None].astype(np.float32) for a in profiles.T)
+    cumulative, ramp_in, ramp_out, _ = profile(offset, place, blur)
+    return np.asarray(np.abs(value - level - step * cumulative - inside * ramp_in - outside * ramp_out))
+
+
+def _scatter(residual: Float32) -> Array:
+    """Robust standard deviation of each row of absolute residuals."""
+    return 1.4826 * np.median(residual, axis=1).astype(np.float64)
 
 
 @dataclass(frozen=True)

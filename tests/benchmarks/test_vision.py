@@ -1,0 +1,43 @@
+"""Time of the sub-pixel measurement, as a ratio to decoding the same photo in the same run."""
+
+from __future__ import annotations
+
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.records import Centerline
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.centerline import measure_centerline
+from pipeline.vision.plane import PlaneMap
+from pipeline.vision.render import render
+from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, rough_cable
+
+
+def best(call, repeats=5):
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        call()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+@pytest.mark.parametrize("px_per_mm", [12.0, 24.0], ids=["2.4 Mpx", "12 Mpx"])
+def test_measuring_takes_a_few_times_the_decoding(benchmark, px_per_mm):
+    """Half of the stage's allowance of five decodings; the other half is for finding the cable."""
+    rng = np.random.default_rng(0)
+    height = int(px_per_mm / 12.0 * 980) if px_per_mm == 12.0 else 2450
+    scene = bow_scene(rng, px_per_mm=px_per_mm, camera={"height": height}, noise=0.02)
+    picture = render(scene)
+    rough, plane = rough_cable(scene, picture, rng), PlaneMap.from_scale(scene.camera.px_per_m)
+    data = cv2.imencode(".png", picture.pixels)[1]
+
+    def measure():
+        return measure_centerline(rough, plane=plane, diameter_m=DIAMETER, settings=VisionSettings())
+
+    assert isinstance(benchmark(measure), Centerline)
+    if benchmark.enabled:
+        assert best(measure) < 2.5 * best(lambda: cv2.imdecode(data, cv2.IMREAD_UNCHANGED))

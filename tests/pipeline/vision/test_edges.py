@@ -1,0 +1,144 @@
+"""Sub-pixel edges: the profile's derivatives, bias and scatter on drawn edges, and what must not mislead the search."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from pipeline.settings.vision_curve import CurveSettings
+from pipeline.vision.curvature import PlaneCurve, make_frame
+from pipeline.vision.edge_profile import Pixels, fit_edges, fit_profiles, profile
+from pipeline.vision.edges import Ground, in_picture, search_edges, straighten
+from pipeline.vision.midline import Cover, free_of_covers
+
+BLUR, DARK, STEP = 0.9, 0.2, 0.6
+ACROSS = np.arange(-8.0, 7.0)
+
+
+def pixels_of(place, rng, *, noise, sections=240, rows=4, inside=0.0, outside=0.0, letters=0.0) -> Pixels:
+    """Pixels about two edges at ``place`` ``(2, n)``; ramps in grey per px; white letters on a share of some rows."""
+    offset = np.tile(ACROSS, (2, sections, rows, 1)) + rng.uniform(-0.5, 0.5, (2, sections, rows, 1))
+    u = offset - np.broadcast_to(place, (2, sections))[..., None, None]
+    z = u / BLUR
+    bent = BLUR * (z * norm.cdf(z) + norm.pdf(z))
+    value = DARK + STEP * norm.cdf(z) + outside * bent + inside * (u - bent)
+    if letters:
+        written = (np.arange(sections) % 40 < 10)[:, None] & (rng.random((sections, rows)) < letters)
+        value = np.where(written[None, ..., None] & (u < -4.0), 0.9, value)
+    value = value + noise * rng.standard_normal(value.shape)
+    shape = (2, sections, -1)
+    return Pixels(offset.reshape(shape).astype(np.float32), value.reshape(shape).astype(np.float32), len(ACROSS))
+
+
+def fitted(pixels, *, ramps=True):
+    s = np.arange(pixels.value.shape[1]) * 8.0
+    profiles = fit_profiles(pixels, s, windows=16, ramps=ramps, blur=0.8)
+    return profiles, fit_edges(pixels, s, profiles)
+
+
+@pytest.mark.parametrize("u", [-2.3, -0.4, 0.0, 1.1])
+def test_ramps_are_blurred_straight_lines(u):
+    """R_out is max(t, 0) and R_in is min(t, 0), convolved with the Gaussian blur."""
+    _, inside, outside, density = profile(np.array([u]), np.array([0.0]), np.array([BLUR]))
+    for found, ramp in ((outside, lambda t: max(t, 0.0)), (inside, lambda t: min(t, 0.0))):
+        exact = quad(lambda t, ramp=ramp: ramp(t) * norm.pdf(u - t, scale=BLUR), -12.0, 12.0, points=[0.0])[0]
+        assert_allclose(found[0], exact, atol=1e-9)
+    assert_allclose(density[0], norm.pdf(u, scale=BLUR))
+
+
+@pytest.mark.parametrize("ramps", [False, True])
+def test_edges_of_a_plain_step_reach_the_theoretical_limit(ramps):
+    """Unbiased, and scattered by no more than (n/A) sqrt(2 sqrt(pi) w) per row, the limit with level and step free."""
+    rng = np.random.default_rng(0)
+    place = rng.uniform(-0.1, 0.1, (2, 240))  # as far as the path may be off
+    noise, rows = 0.012, 4
+    _, edges = fitted(pixels_of(place, rng, noise=noise, rows=rows), ramps=ramps)
+    error = edges.place - place
+    limit = noise / STEP * np.sqrt(2.0 * np.sqrt(np.pi) * BLUR) / np.sqrt(rows)
+    assert abs(error.mean()) < 4.0 * limit / np.sqrt(error.size)
+    # Place alone would reach the limit; level and step cost a third, robust weights a twentieth more.
+    assert limit < error.std() < 1.45 * limit
+    assert_allclose(np.median(edges.std), error.std(), rtol=0.1)
+
+
+def test_shadow_and_shading_do_not_move_the_edge_with_ramps():
+    """A soft shadow outside and shading inside: with ramps the place is right, the plain error function is off."""
+    rng = np.random.default_rng(1)
+    pixels = pixels_of(np.zeros((2, 240)), rng, noise=0.005, inside=0.012, outside=0.02)
+    profiles, edges = fitted(pixels)
+    assert abs(np.median(edges.place)) < 0.01
+    plain = fitted(pixels, ramps=False)[1]
+    assert abs(np.median(plain.place)) > 0.03
+    # The difference of the two models is what the systematic error is judged by.
+    assert_allclose(np.median(profiles.shift), -np.median(plain.place), atol=0.02)
+    assert_allclose(np.median(profiles.outside), 0.02 / STEP, rtol=0.1)
+    assert_allclose(np.median(profiles.inside), 0.012 / STEP, rtol=0.1)
+    assert_allclose(np.median(profiles.blur), BLUR, rtol=0.03)
+
+
+def test_letters_on_the_sheath_do_not_move_the_edge():
+    rng = np.random.default_rng(2)
+    _, edges = fitted(pixels_of(np.zeros((2, 240)), rng, noise=0.005, letters=0.4))
+    written = np.arange(240) % 40 < 10
+    assert abs(np.nanmedian(edges.place[:, written])) < 0.01
+    assert np.nanmax(np.abs(edges.place)) < 0.1
+
+
+def test_section_without_an_edge_is_reported_as_lost():
+    rng = np.random.default_rng(3)
+    pixels = pixels_of(np.zeros((2, 240)), rng, noise=0.01)
+    pixels.value[0, 100:104] = DARK  # a dark object beside the cable: no ground there
+    _, edges = fitted(pixels)
+    gone = ~np.isfinite(edges.place[0]) | (np.abs(edges.place[0]) > 1.0) | (edges.step[0] < 0.1 * STEP)
+    assert np.all(gone[100:104])
+    assert np.all(np.isfinite(edges.place[1]))
+
+
+def straight(length=400.0, v=60.0) -> PlaneCurve:
+    frame = make_frame(0.0, length, intervals=16, order=3)
+    return PlaneCurve(frame, np.zeros(frame.size - 2), np.array([frame.grid[frame.anchor] + 20.0, v]), 0.0)
+
+
+def strip_picture(*, half=24.0, middle=60.0, highlight=True) -> Ground:
+    """A dark cable along u with a highlight wider than either dark strip beside it, and lines on the ground."""
+    v = np.arange(120.0)[:, None] * np.ones((1, 440))
+    grey = np.where(np.abs(v - middle) < half, 0.2, 0.8)
+    if highlight:
+        grey = np.where(np.abs(v - middle + 4.0) < 10.0, 0.7, grey)
+    grey = np.where((v == 18.0) | (v == 110.0), 0.1, grey)
+    return Ground(grey.astype(np.float32), (0, 0))
+
+
+@pytest.mark.parametrize("lead", [-6.0, 0.0, 6.0])
+def test_search_finds_the_sheath_and_not_the_highlight(lead):
+    found = search_edges(
+        strip_picture(),
+        straight(v=60.0 + lead),
+        span=(10.0, 390.0),
+        half_width=24.0,
+        tolerance=0.15,
+        settings=CurveSettings(),
+    )
+    assert np.all(found.usable)
+    assert_allclose(found.edges + lead, np.tile([-24.0, 24.0], (len(found.edges), 1)), atol=1.0)
+
+
+def test_straightened_strip_is_the_picture_along_the_path():
+    u, v = np.meshgrid(np.arange(440.0), np.arange(120.0))
+    ground = Ground((0.001 * u + 0.005 * v).astype(np.float32), (0, 0))
+    s, t = np.linspace(50.0, 300.0, 7), np.array([-10.0, 0.0, 10.0])
+    exact = 0.001 * (s[:, None] + 20.0) + 0.005 * (60.0 + t)
+    assert_allclose(straighten(ground, straight(), s, t), exact, atol=2e-4)  # remap rounds to 1/32 px
+
+
+def test_sections_beside_the_picture_or_under_a_cover_are_left_out():
+    s = np.linspace(0.0, 400.0, 401)
+    inside = in_picture(strip_picture(), straight(v=20.0), s, 25.0)
+    assert not inside.any()
+    assert in_picture(strip_picture(), straight(), s, 25.0)[10:390].all()
+    free = free_of_covers(straight(), s, 15.0, (Cover((20.0, 60.0), 40.0),))
+    hidden = np.hypot(s, 15.0) <= 40.0
+    assert np.array_equal(free, ~hidden)
