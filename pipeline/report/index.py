@@ -37,7 +37,7 @@ class IndexRow:
     """What the index keeps of a specimen; SI units."""
 
     id: str
-    folder: str
+    report: str
     type: str
     status: str
     verdict: str
@@ -53,13 +53,13 @@ class IndexRow:
     shapes: str
 
 
-def index_row(result: Result, folder: str, settings: ReportSettings) -> IndexRow:
-    """Row of one result; ``folder`` is the folder of its report, relative to the index."""
+def index_row(result: Result, report: str, settings: ReportSettings) -> IndexRow:
+    """Row of one result; ``report`` is the path of its report relative to the index, empty if there is none."""
     known = pre_curvatures(result)
     troubles = [f for f in result.findings if f.level == "error"] + [f for f in result.findings if f.level == "warning"]
     return IndexRow(
         id=result.specimen.id,
-        folder=folder,
+        report=report,
         type=result.specimen.description.get("type", ""),
         status=result.status,
         verdict=result.diagnosis.verdict if result.diagnosis else "none",
@@ -152,9 +152,15 @@ def write_index(
     """
     settings, out = settings or ReportSettings(), Path(out)
     pairs = read_results(Path(results)) if isinstance(results, str | Path) else ((r, r.specimen.id) for r in results)
-    rows = [index_row(result, folder, settings) for result, folder in pairs]
+    rows = [index_row(result, _report(result, folder, out), settings) for result, folder in pairs]
     page = write_atomic(out / "index.html", index_html(rows, settings))
     return page, write_atomic(out / "summary.csv", csv_text(summary_frame(rows)))
+
+
+def _report(result: Result, folder: str, out: Path) -> str:
+    """Path of a report relative to the index; a failed specimen may have none."""
+    path = f"{folder}/report.html"
+    return path if result.status != "failed" or (out / path).exists() else ""
 
 
 def summary_frame(rows: list[IndexRow]) -> pd.DataFrame:
@@ -170,9 +176,7 @@ def summary_frame(rows: list[IndexRow]) -> pd.DataFrame:
         )
         counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
         answers = (*ends, value, std, row.rms_relative, row.compatible)
-        table.append(
-            [row.id, row.type, row.status, row.verdict, *answers, *counts, row.reason, f"{row.folder}/report.html"]
-        )
+        table.append([row.id, row.type, row.status, row.verdict, *answers, *counts, row.reason, row.report])
     names = ["id", "type", "status", "verdict"]
     names += [f"{end}_{name}" for end in ("low", "high") for name in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2")]
     names += ["pre_curvature_per_m", "pre_curvature_std_per_m", "agreement_rms_relative", "compatible"]
@@ -216,7 +220,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> dict[str, object]:
     rms = None if row.rms_relative is None else 100.0 * row.rms_relative
     return {
         "id": row.id,
-        "href": f"{quote(row.folder)}/report.html",
+        "href": quote(row.report),
         "type": row.type,
         "status": row.status,
         "verdict": row.verdict,

@@ -6,6 +6,7 @@ import re
 import pandas as pd
 import pytest
 
+from pipeline.report.document import write_report
 from pipeline.report.index import write_index
 from pipeline.report.tables import write_result
 from pipeline.settings import ReportSettings
@@ -90,3 +91,9 @@ def test_rows_stand_in_the_order_people_count_and_hidden_folders_stay_out(failed
     for name in ("cable-10", "cable-2", "Cable-1", ".half/cable-3"):
         write_result(named(failed_result, name), tmp_path / name)
     assert list(pd.read_csv(write_index(tmp_path, tmp_path)[1]).id) == ["Cable-1", "cable-2", "cable-10"]
+
+
+def test_failed_specimen_is_linked_only_if_it_has_a_report(failed_result, tmp_path):
+    assert "<a href" not in write_index([failed_result], tmp_path)[0].read_text(encoding="utf-8")
+    write_report(failed_result, tmp_path / failed_result.specimen.id)
+    assert 'href="cable-13/report.html"' in write_index([failed_result], tmp_path)[0].read_text(encoding="utf-8")
