@@ -10,7 +10,7 @@ import click
 from pipeline.errors import InputError
 
 # command -> module of this room; each module has a function of the command's name
-COMMANDS = ("run", "check", "init", "report")
+COMMANDS = ("run", "check", "init", "report", "paper")
 INTERRUPTED = 130
 
 

@@ -21,11 +21,12 @@ from matplotlib.axes import Axes
 from pipeline.report.canvas import Area, Drawing, drawing
 from pipeline.report.document import TEMPLATES, environment, palette_css
 from pipeline.report.files import write_atomic
-from pipeline.report.paper_figures import draw_shapes, draw_evolution, draw_iterates, draw_straight, draw_difference
+from pipeline.report.paper_figures import draw_difference, draw_evolution, draw_iterates, draw_shapes, draw_straight
 from rod.bending_test import TABLE_1, TABLE_1_ORDINATES
 from rod.characteristic import Reading
 from rod.paper import (
     READINGS,
+    Conditions,
     Difference,
     IterationCost,
     TableOne,
@@ -38,6 +39,10 @@ from rod.paper import (
 from rod.paper_fit import PaperFit
 
 REACHED = 1e-3  # relative error at which the paper's fit counts as converged: three digits of Table 1
+CONDITIONS = (
+    f"K0(s) varying by {Conditions.varying} 1/m over one wave, centerlines scattered by "
+    f"{1e3 * Conditions.position_noise} mm and differentiated over {1e3 * Conditions.window:.0f} mm"
+)
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,7 @@ def statements(paper: Paper) -> list[Statement]:
         Statement(
             "Sec. 5, Fig. 7",
             "inverse problem and balance equations differ qualitatively: topic of current research",
-            f"{causes}; all together {100 * paper.causes[-1].rms:.0f} % rms",
+            f"{causes}; all together {100 * paper.causes[-1].rms:.0f} % rms, for {CONDITIONS}",
         ),
         Statement(
             "Sec. 2.3",

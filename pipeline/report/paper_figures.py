@@ -22,7 +22,7 @@ def draw_shapes(experiment: TableOne, figure: Area) -> Axes:
     """Fig. 3: the cable at the three steps, in the chord frame with the same scale on both axes."""
     axes = plot_area(figure, top=ONE_ROW)
     for number, (step, colour) in enumerate(zip(experiment.steps, step_colours(3), strict=True), start=1):
-        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=f"{number} steps: {step.force:.4f} N")
+        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=f"{number}: {step.force:.4f} N")
     axes.set_aspect("equal", adjustable="datalim")
     return finish(axes, x="x [mm]", y="y [mm]", decimal=".", legend=3)
 

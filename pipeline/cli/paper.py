@@ -1,0 +1,18 @@
+"""``cablebend paper``: the source paper's virtual experiments, as numbers and figures beside its statements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
+def paper(out: Path) -> None:
+    """Compute everything of the paper that needs no real cable: paper.json, paper.html and figures."""
+    from pipeline.report.paper import statements, write_paper
+
+    for statement in statements(write_paper(out)):
+        click.echo(f"{statement.where}\n  paper: {statement.paper}\n  here:  {statement.here}")
+    click.echo(out / "paper.html")

@@ -1,0 +1,36 @@
+"""``paper.json`` as the contract names it, and a page that needs nothing else."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from pipeline.report.paper import write_paper
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("paper")
+    write_paper(out)
+    return out
+
+
+def test_numbers_have_the_contracts_names(folder):
+    numbers = json.loads((folder / "paper.json").read_text(encoding="utf-8"))
+    for reading in ("secant", "tangent"):
+        assert len(numbers["table1"][reading]["force_N"]) == len(numbers["table1"][reading]["kappa_max_per_m"]) == 3
+    assert numbers["inverse"]["iterations_to_1e-3"] <= 10
+    assert len(numbers["inverse"]["history"]) == numbers["inverse"]["iterations"] + 1
+    assert numbers["inverse"]["pre_curvature_per_m"] == pytest.approx(2.0)
+    assert numbers["forced_straight"]["ordinates_Nm2"][0] < 0.0
+    assert sum(row["share"] for row in numbers["disagreement"] if row["share"] is not None) == pytest.approx(1.0)
+
+
+def test_figures_stand_alone_and_on_the_page(folder):
+    page = (folder / "paper.html").read_text(encoding="utf-8")
+    assert "http://" not in page.replace("http://www.w3.org/", "") and "https://" not in page
+    figures = sorted(path.stem for path in folder.glob("*.svg"))
+    assert figures == ["fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "fig7d"]
+    for name in figures:
+        assert ElementTree.fromstring((folder / f"{name}.svg").read_text(encoding="utf-8")).tag.endswith("svg")
+        assert f'id="{name}"' in page
