@@ -121,3 +121,11 @@ def test_plastic_set_leaves_the_unloaded_cable_more_bent() -> None:
 def test_friction_refuses_nonsense(wrong: tuple[float, float, int]) -> None:
     with pytest.raises(ValueError, match="half_width"):
         InternalFriction(*wrong)
+
+
+def test_groups_of_elements_add_up() -> None:
+    early, late = InternalFriction(2e-4, 1.0, elements=1), InternalFriction(3e-4, 4.0, elements=2)
+    path = np.array([2.5, 3.5, 6.5, 4.0, 2.0, 5.0])
+    both = history(section(replace(early, beside=late)), path)
+    plain = 1e-3 * (path - 2.0)
+    assert np.allclose(both, history(section(early), path) + history(section(late), path) - plain, atol=1e-15)
