@@ -135,7 +135,7 @@ def read_off(
         return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0)))
 
     rest = tuple(name for name in found.blocks if _is_rest(model, name))
-    loaded = averaged(model, found, taus=options.tau, without=rest) if rest else posterior
+    loaded = averaged(model, found, taus=options.tau, without=rest) if rest else replace(posterior, mean=u)
     return Estimate(
         outcome=outcome,
         characteristic=law,

@@ -117,34 +117,25 @@ def _turned(x: Array, y: Array, pose: Pose, chord: float) -> tuple[Array, Array]
 def _feet(shape: Simulated, guess: Array, px: Array, py: Array) -> tuple[Array, Array, Array, Array]:
     """Distance of points (px, py) from the curve, arc length of their feet, and the normal there."""
     s = np.clip(guess, shape.s[0], shape.s[-1])
+    state = np.column_stack([shape.x, shape.y, shape.theta])
+    slope = np.column_stack([np.cos(shape.theta), np.sin(shape.theta), -shape.kappa])
     for _ in range(FEET):
-        x, y, theta = _on_curve(shape, s)
+        x, y, theta = _between(shape.s, s, state, slope).T
         along = np.cos(theta) * (px - x) + np.sin(theta) * (py - y)
         across = -np.sin(theta) * (px - x) + np.cos(theta) * (py - y)
         # theta falls by kappa ds, so a point off the curve by `across` sees the arc length stretched.
         s = s + along / np.maximum(1.0 + np.interp(s, shape.s, shape.kappa) * across, 0.2)
-    x, y, theta = _on_curve(shape, s)
+    x, y, theta = _between(shape.s, s, state, slope).T
     nx, ny = -np.sin(theta), np.cos(theta)
     return nx * (px - x) + ny * (py - y), s, nx, ny
 
 
 def _between(grid: Array, s: Array, value: Array, slope: Array) -> Array:
-    """Cubic Hermite interpolation of values and slopes (n,) or (n, q) on a grid (n,) at s (b,)."""
+    """Cubic Hermite interpolation of values and slopes (n, q) on a grid (n,) at s (b,), to (b, q)."""
     cell = np.clip(np.searchsorted(grid, s) - 1, 0, grid.size - 2)
     h = grid[cell + 1] - grid[cell]
-    t = (s - grid[cell]) / h
-    if value.ndim == 2:
-        t, h = t[:, None], h[:, None]
+    t, h = ((s - grid[cell]) / h)[:, None], h[:, None]
     start, end = value[cell], value[cell + 1]
     rise = t**2 * (3.0 - 2.0 * t)
     curve = t * (1.0 - t) * h * ((1.0 - t) * slope[cell] - t * slope[cell + 1])
     return np.asarray(start + rise * (end - start) + curve)
-
-
-def _on_curve(shape: Simulated, s: Array) -> tuple[Array, Array, Array]:
-    """Position and direction at s; theta' = -kappa."""
-    return (
-        _between(shape.s, s, shape.x, np.cos(shape.theta)),
-        _between(shape.s, s, shape.y, np.sin(shape.theta)),
-        _between(shape.s, s, shape.theta, -shape.kappa),
-    )

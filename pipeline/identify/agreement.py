@@ -3,7 +3,11 @@
 Both ways read the same photos and forces, so their errors are correlated; each way states how its log f answers to
 every source of error (curve of each photo, each force, the scale), and the covariance of the difference follows:
 
-    V = C_1 + C_2 - X - X^T,   X = sum over sources G_1 S G_2^T
+    V = N_1 + N_2 - X - X^T + (1 - common) (R_1 + R_2),   N_i = sum G_i S G_i^T,  X = sum G_1 S G_2^T,  R_i = C_i - N_i
+
+over the sources of error with covariance S and gains G. What remains of each band, R, is mostly what no data tell about
+the form of the law; both ways smooth the same law, so a part ``common`` of it is the same error in both (measured with
+the accuracy study: 0.6; with none the test would never reject).
 
 The test looks at the mean of the log ratio over each third of the common range: three numbers that a stretched, bent
 or tilted curve moves, with a covariance that is far from singular.
@@ -93,8 +97,10 @@ class Agreement:
     hints: tuple[str, ...] = ()
 
 
-def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
-    """Compare both ways; None if they visited no common curvature."""
+def compare(
+    test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float, common: float
+) -> Agreement | None:
+    """Compare both ways; None if they visited no common curvature. `common`: see the module."""
     one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
     grid = one.common_grid(two)
     if grid is None:
@@ -103,7 +109,12 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
     first, second = one.contraction(grid), two.contraction(grid)
     difference = first @ np.log(one.tangent) - second @ np.log(two.tangent)
     shared = first @ cross_covariance(test, one.gains, two.gains) @ second.T
-    covariance = first @ one.log_covariance @ first.T + second @ two.log_covariance @ second.T - shared - shared.T
+    noises = (
+        first @ cross_covariance(test, one.gains, one.gains) @ first.T,
+        second @ cross_covariance(test, two.gains, two.gains) @ second.T,
+    )
+    bands = first @ one.log_covariance @ first.T, second @ two.log_covariance @ second.T
+    covariance = common * sum(noises) + (1.0 - common) * sum(bands) - shared - shared.T
     values, vectors = np.linalg.eigh(covariance)
     # Directions in which both ways answer alike have no variance to judge by: a thousandth of the largest at least.
     values = np.maximum(values, 1e-3 * values[-1])

@@ -90,7 +90,8 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
         rest=rest_curvature(test),
     )
     if inverse.characteristic is not None and graph.measured:
-        found = replace(found, agreement=compare(test, inverse, graph, level=settings.agreement_level))
+        agreement = compare(test, inverse, graph, level=settings.agreement_level, common=settings.agreement_common_form)
+        found = replace(found, agreement=agreement)
     return replace(found, findings=identification_findings(found, settings))
 
 

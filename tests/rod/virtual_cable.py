@@ -38,6 +38,44 @@ class StickSlip:
 
 
 @dataclass(frozen=True)
+class Fading:
+    """Law f = EI1 + (EI0 - EI1) exp(-D/kc), D = K - K0 >= 0: steepest at rest, so not even about K0. Not a spline."""
+
+    EI0: float
+    EI1: float
+    kc: float
+    K0: float
+
+    def tangent(self, K):
+        return self.EI1 + (self.EI0 - self.EI1) * np.exp(-(K - self.K0) / self.kc)
+
+    def moment(self, K):
+        D = K - self.K0
+        return self.EI1 * D - (self.EI0 - self.EI1) * self.kc * np.expm1(-D / self.kc)
+
+    def energy(self, K):
+        D = K - self.K0
+        return 0.5 * self.EI1 * D**2 + (self.EI0 - self.EI1) * self.kc * (D + self.kc * np.expm1(-D / self.kc))
+
+
+@dataclass(frozen=True)
+class SplineLaw:
+    """A characteristic of the project with its K0, as a law: for laws that are splines, such as Table 1."""
+
+    characteristic: object
+    K0: float
+
+    def tangent(self, K):
+        return self.characteristic.tangent(K, self.K0)
+
+    def moment(self, K):
+        return self.characteristic.moment(K, self.K0)
+
+    def energy(self, K):
+        return self.characteristic.energy(K, self.K0)
+
+
+@dataclass(frozen=True)
 class TrueShape:
     """Exact equilibrium at `chord`: arc length, position, tangent angle, curvature at n nodes, and the force."""
 
@@ -89,8 +127,8 @@ def equilibrium(law, length, chord, *, panels=160):
         return halves(np.exp(log_P), theta_end)[1].sum() - length / 2
 
     angle = brentq(lambda t: np.sin(t) / t - chord / length, 1e-3, 3.0)
-    guess = np.log(np.pi**2 * law.EI0 / length**2)
-    start = brentq(short, guess - 7, guess + 4, args=(angle,))
+    guess = np.log(np.pi**2 * law.tangent(law.K0) / length**2)
+    start = brentq(short, guess - 7, guess + 0.7, args=(angle,))  # no pinned cable carries twice its buckling load
 
     def gap(unknown):
         theta, ds = halves(np.exp(unknown[0]), unknown[1])

@@ -74,6 +74,13 @@ def columns(shape, s, coefficients):
     return normal, turn, np.hstack([np.zeros((len(s), 2)), bend(s)])
 
 
+def axes_covariance(shape, std):
+    """Axes at fault shift and turn the chord frame: covariance of start offset and start angle of the curve in it."""
+    lift, turn = -np.cos(shape.theta[0]) * np.array([1.0, 0.0]), np.array([1.0, -1.0]) / shape.chord
+    by_axes = np.stack([lift, turn])
+    return std**2 * by_axes @ by_axes.T
+
+
 def photograph(shape, camera, rng, *, scale=0.0, points=181):
     """MeasuredShape, chord and its std of a true shape on a photo with errors; `scale` is the common error."""
     length = shape.s[-1]
@@ -93,6 +100,7 @@ def photograph(shape, camera, rng, *, scale=0.0, points=181):
     weighted = cho_solve((factor, True), at_sections)
     covariance = np.linalg.inv(at_sections.T @ weighted)
     dq = covariance @ (weighted.T @ error)
+    covariance[:2, :2] += axes_covariance(shape, camera.axis_px * camera.px)
     normal, turn, bend = columns(shape, grid, camera.coefficients)
 
     left, right = axes[0], np.array([shape.chord, 0.0]) + axes[1]
@@ -125,11 +133,11 @@ def photograph(shape, camera, rng, *, scale=0.0, points=181):
     return measured, shrink * np.hypot(*(right - left)), np.sqrt(2) * camera.axis_px * camera.px
 
 
-def random_cable(rng):
-    """Stick-slip law, length and chords of a random test: EI from 1e-5 to 1 N m^2, three to eight loading steps."""
+def random_cable(rng, *, law=StickSlip):
+    """Law, length and chords of a random test: EI from 1e-5 to 1 N m^2, EI0/EI1 from 1 to 6, three to eight steps."""
     length = rng.uniform(0.15, 0.25)
     EI0 = 10 ** rng.uniform(-5, 0)
-    law = StickSlip(EI0, EI0 / rng.uniform(1, 6), rng.uniform(0.5, 1.2) * 1.0 / length, rng.uniform(0.05, 0.6) / length)
+    law = law(EI0, EI0 / rng.uniform(1, 6), rng.uniform(0.5, 1.2) * 1.0 / length, rng.uniform(0.05, 0.6) / length)
     steps, reach = rng.integers(3, 9), rng.uniform(0.04, 0.12) * length
     natural = 2 / law.K0 * np.sin(law.K0 * length / 2)
     return law, length, natural - reach * np.arange(1, steps + 1) / steps

@@ -1,6 +1,6 @@
 """Accuracy of both ways over random cables with known truth: errors, coverage of the bands, false alarms.
 
-    python -m tests.pipeline.identify.accuracy_study --cables 200 --seed 1
+    python -m tests.pipeline.identify.accuracy_study --cables 200 --seed 1 [--law fading]
 
 Cables: stick-slip laws that are not splines, EI0 from 1e-5 to 1 N m^2, EI0/EI1 from 1 to 6, three to eight loading
 steps, every second test with a force-free photo. Data: exact quadrature, photos with 0.05 px at 11 px/mm correlated
@@ -16,7 +16,10 @@ import numpy as np
 
 from pipeline.identify import identify_test
 from pipeline.settings import IdentifySettings
+from tests.rod.virtual_cable import Fading, StickSlip
 from tests.rod.virtual_photo import bending_test, random_cable
+
+LAWS = {"stick-slip": StickSlip, "fading": Fading}
 
 
 @dataclass(frozen=True)
@@ -57,10 +60,10 @@ class Case:
     alarms: tuple[str, ...]
 
 
-def case(seed, number):
+def case(seed, number, *, kind="stick-slip"):
     """Cable `number` of the study with this seed; every second one has a force-free photo."""
     rng = np.random.default_rng([seed, number])
-    law, length, chords = random_cable(rng)
+    law, length, chords = random_cable(rng, law=LAWS[kind])
     mounted = number % 2 == 0
     test, _ = bending_test(law, length, chords, rng, mounted=mounted)
     found = identify_test(test, IdentifySettings())
@@ -115,9 +118,10 @@ def main(write):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cables", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--law", choices=sorted(LAWS), default="stick-slip")
     parser.add_argument("--first", type=int, default=0)
     asked = parser.parse_args()
-    cases = [case(asked.seed, number) for number in range(asked.first, asked.first + asked.cables)]
+    cases = [case(asked.seed, number, kind=asked.law) for number in range(asked.first, asked.first + asked.cables)]
     for line in lines(cases):
         write(line + "\n")
 

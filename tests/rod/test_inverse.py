@@ -1,0 +1,173 @@
+"""The inverse problem against exact quadrature; the data maker shares no code with the simulated rod."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rod.characteristic import Characteristic
+from rod.inverse import InverseOutcome, estimate
+from rod.measurement import MeasuredTest
+from rod.options import InverseOptions
+from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
+from tests.rod.virtual_photo import Camera, bending_test
+
+LENGTH = 0.2
+LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
+CHORDS = force_free(LAW, LENGTH).chord - np.array([5e-3, 10e-3, 15e-3])
+SHARP = Camera(section_px=2e-3, axis_px=2e-3, scale=1e-6, length=1e-8)
+QUICK = InverseOptions(elements=80, blocks=80)
+
+
+def measured(seed=1, law=LAW, chords=CHORDS, **kind):
+    return bending_test(law, LENGTH, chords, np.random.default_rng(seed), **kind)[0]
+
+
+def rms(result, law):
+    return float(np.sqrt(np.mean((result.tangent / law.tangent(result.kappa) - 1) ** 2)))
+
+
+def test_sharp_photos_give_the_law_back():
+    result = estimate(measured(camera=SHARP, force_noise=1e-5))
+    assert result.outcome is InverseOutcome.CONVERGED
+    # Eight control points follow this law within 0.3 %, and 100 elements the force within 1e-4.
+    assert rms(result, LAW) < 4e-3
+    assert result.pre_curvature == pytest.approx(LAW.K0, abs=2e-3)
+
+
+def test_a_spline_law_is_found_with_its_knots_few():
+    law = SplineLaw(Characteristic.from_ordinates((0, 8, 16), (5e-3, 3e-3, 2e-3)), 2.0)
+    result = estimate(measured(law=law))
+    assert rms(result, law) < 0.012
+    assert result.pre_curvature == pytest.approx(2.0, abs=0.01)
+    # Three control points suffice; more gain no evidence worth the name.
+    assert result.evidence[3] > -2.0
+
+
+def test_evidence_asks_for_more_control_points_where_the_law_bends():
+    chords = force_free(LAW, LENGTH).chord - np.arange(1, 7) * 4e-3
+    strong = replace(LAW, EI1=0.7e-3, kc=2.5)
+    assert estimate(measured(law=strong, chords=chords), options=QUICK).evidence[3] < -20.0
+
+
+@pytest.mark.parametrize(
+    ("EI0", "factor", "shift"), [(1e-5, 10.0, 3.0), (1e-5, 0.1, -3.0), (1.0, 0.1, 3.0), (1.0, 10.0, -3.0)]
+)
+def test_far_starts_find_the_same_optimum(EI0, factor, shift):
+    law = replace(LAW, EI0=EI0, EI1=0.3 * EI0)
+    test = measured(law=law)
+    far = estimate(test, start=(factor * EI0, law.K0 + shift), options=QUICK)
+    near = estimate(test, options=QUICK)
+    assert far.pre_curvature == pytest.approx(near.pre_curvature, abs=0.05 * near.pre_curvature_std)
+    assert np.all(np.abs(far.tangent - near.tangent) < 0.05 * near.tangent_std)
+
+
+def test_results_scale_with_the_stiffness():
+    unit = estimate(measured(), options=QUICK)
+    other = estimate(measured(law=replace(LAW, EI0=1.0, EI1=0.3)), options=QUICK)
+    # The fit stops within a thousandth of a standard deviation, not at the last digit.
+    assert np.all(np.abs(other.tangent * 5e-3 - unit.tangent) < 0.01 * unit.tangent_std)
+    assert np.allclose(other.tangent_std * 5e-3, unit.tangent_std, rtol=1e-3)
+    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.01 * unit.pre_curvature_std)
+
+
+def test_finer_rods_change_nothing_beyond_a_tenth_of_the_band():
+    test = measured()
+    coarse, fine = estimate(test), estimate(test, options=InverseOptions(elements=240))
+    at = np.interp(coarse.kappa, fine.kappa, fine.tangent)
+    assert np.all(np.abs(at - coarse.tangent) < 0.1 * coarse.tangent_std)
+    assert abs(fine.pre_curvature - coarse.pre_curvature) < 0.1 * coarse.pre_curvature_std
+
+
+def test_without_the_force_free_photo_the_pre_curvature_is_still_found():
+    test = measured(mounted=False)
+    result = estimate(test)
+    assert abs(result.pre_curvature - LAW.K0) < 3 * result.pre_curvature_std
+    assert 0.005 < result.pre_curvature_std < 0.3
+    assert result.loaded_pre_curvature == pytest.approx(result.pre_curvature)
+
+
+def test_the_force_free_photo_sharpens_the_pre_curvature_and_is_left_out_of_the_loaded_one():
+    result = estimate(measured())
+    assert result.pre_curvature_std < 0.2 * result.loaded_pre_curvature_std
+    assert abs(result.loaded_pre_curvature - LAW.K0) < 3.5 * result.loaded_pre_curvature_std
+
+
+def test_a_step_without_photo_counts_by_its_force():
+    test = measured(seed=3)
+    blind = (*test.steps[:2], replace(test.steps[2], shape=None, chord=None, chord_std=None), test.steps[3])
+    result = estimate(replace(test, steps=blind))
+    assert "force/2" in result.evaluation.blocks
+    assert "shape/2" not in result.evaluation.blocks
+    assert "zero" in result.model.nuisances
+    assert rms(result, LAW) < 0.02
+
+
+def test_gains_tell_how_a_force_moves_the_estimate():
+    test = measured()
+    result = estimate(test, options=QUICK)
+    step = test.steps[2]
+    pushed = replace(step, force=step.force * 1.002)
+    moved = estimate(replace(test, steps=(*test.steps[:2], pushed, *test.steps[3:])), options=QUICK)
+    told = result.gains["force", 2][:, 0] * 2e-3 * step.force
+    seen = np.log(np.interp(result.kappa, moved.kappa, moved.tangent) / result.tangent)
+    # A gain holds the sizes of the priors; their own answer to the data is a fifth of it here.
+    assert np.allclose(seen[3:-3], told[3:-3], atol=0.25 * np.abs(told).max())
+
+
+def test_forces_scale_the_stiffness_only():
+    test = measured()
+    doubled = replace(test, steps=tuple(replace(s, force=2 * s.force, force_std=2 * s.force_std) for s in test.steps))
+    one, two = estimate(test, options=QUICK), estimate(doubled, options=QUICK)
+    assert np.allclose(two.tangent, 2 * one.tangent, rtol=1e-5)
+    assert two.pre_curvature == pytest.approx(one.pre_curvature, rel=1e-6)
+
+
+def test_what_the_model_cannot_follow_widens_the_bands_and_bends_no_nuisance():
+    test = measured()
+    steps = tuple(
+        replace(s, branch="unloading", force=0.7 * s.force, step=s.step + 10)
+        for s in test.steps
+        if s.branch == "loading"
+    )
+    whole = replace(test, steps=test.steps + steps)
+    good, bad = estimate(test), estimate(whole)
+    assert bad.outcome is not InverseOutcome.NO_EQUILIBRIUM
+    assert bad.model.blur[1] > 3.0
+    assert np.median(bad.tangent_std) > 3.0 * np.median(good.tangent_std)
+    assert all(abs(bad.unknowns[bad.model.index(name)]) < 3.0 for name in ("length", "scale"))
+    # Residuals are reported in the noise as stated, not in the blurred one.
+    assert bad.evaluation.chi2("force")[0] / 6 > 100.0
+
+
+def test_a_wrong_length_ends_in_an_outcome():
+    test = measured()
+    short = estimate(replace(test, length=0.17, length_std=1e-5), options=QUICK)
+    assert short.outcome in (InverseOutcome.NO_EQUILIBRIUM, InverseOutcome.LIMIT_POINT) or short.model.blur[0] > 3.0
+
+
+def test_without_any_photo_the_outcome_says_what_to_do():
+    test = measured()
+    blind = MeasuredTest(
+        LENGTH, 1e-4, 1e-3, tuple(replace(s, shape=None, chord=None, chord_std=None) for s in test.steps)
+    )
+    result = estimate(blind)
+    assert result.outcome is InverseOutcome.NO_DATA
+    assert "photo" in result.outcome.value
+    assert result.characteristic is None
+
+
+def test_one_hardly_bent_step_leaves_parameters_invisible():
+    chords = force_free(LAW, LENGTH).chord - np.array([2e-4])
+    vague = Camera(section_px=2.0, axis_px=2.0)
+    result = estimate(measured(chords=chords, mounted=False, camera=vague, force_noise=0.3))
+    assert result.outcome is not InverseOutcome.CONVERGED
+
+
+def test_bands_grow_where_no_photo_bends():
+    result = estimate(measured())
+    relative = result.tangent_std / result.tangent
+    middle = relative[len(relative) // 2]
+    assert relative[0] > 1.5 * middle
+    assert np.all(result.tangent > 0)
+    assert result.kappa[0] == pytest.approx(result.pre_curvature, abs=1e-6)

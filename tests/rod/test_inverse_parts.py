@@ -1,0 +1,161 @@
+"""Parts of the inverse problem: jacobian, distances, knots, whitening, linearised posterior."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
+
+from rod.control_points import fit
+from rod.evaluation import evaluate
+from rod.fit_model import fit_model, step_data, zero_of_displacement
+from rod.knots import first_slope, place_knots, roughness
+from rod.smoothness import averaged, evidence_of_knots
+from rod.whitening import block_covariance, midline
+from tests.rod.virtual_cable import StickSlip, force_free
+from tests.rod.virtual_photo import Camera, bending_test
+
+LENGTH = 0.2
+LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
+CHORDS = force_free(LAW, LENGTH).chord - np.array([5e-3, 10e-3, 15e-3])
+
+
+def measured(**kind):
+    return bending_test(LAW, LENGTH, CHORDS, np.random.default_rng(2), **kind)[0]
+
+
+def model_of(test, count=5, **kind):
+    return replace(
+        fit_model(test, step_data(test, blocks=60), place_knots(2.0, 9.2, count), tau=6.0, elements=80), **kind
+    )
+
+
+@pytest.mark.parametrize("blind", [False, True])
+def test_jacobian_against_central_differences(blind):
+    test = measured()
+    if blind:
+        test = replace(test, steps=(*test.steps[:3], replace(test.steps[3], shape=None, chord=None, chord_std=None)))
+    model = model_of(test)
+    rng = np.random.default_rng(0)
+    u = (
+        model.start(LAW.tangent(model.knots), LAW.K0)
+        + rng.normal(0, 1, model.size) * np.r_[np.full(model.laws, 0.01), np.ones(model.size - model.laws)]
+    )
+    here = evaluate(model, u)
+    assert here.failure is None
+    for place in range(model.size):
+        # Steps of the size at which truncation and the rod's own tolerance (1e-9) are equally small.
+        h = np.eye(model.size)[place] * (1e-4 if place < model.laws else 1e-2)
+        ahead, behind = (evaluate(model, u + sign * h, starts=here.equilibria).value for sign in (1, -1))
+        slope = (ahead - behind) / (2 * h[place])
+        assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * np.abs(slope).max()), place
+
+
+def test_residuals_are_white_at_the_truth():
+    test = measured(camera=Camera(axis_px=1e-6, scale=1e-9, length=1e-9))
+    model = model_of(test, count=8)
+    found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
+    chi2, count = found.evaluation.chi2("shape")
+    # Five standard deviations of chi2.
+    assert abs(chi2 - count) < 5 * np.sqrt(2 * count)
+
+
+def test_infinite_residuals_where_no_equilibrium_exists():
+    model = model_of(measured())
+    u = model.start(np.array([5e-3, 1e-6, 5e-3, 1e-6, 5e-3]), 2.0)
+    there = evaluate(model, u)
+    assert there.failure is not None
+    assert np.all(np.isinf(there.value))
+
+
+def test_roughness_is_the_integral_of_the_squared_bend():
+    knots, z = place_knots(1.0, 9.0, 6), np.array([0.3, -0.1, 0.4, 0.2, 0.9, 0.0])
+    t = (knots - knots[0]) / np.ptp(knots)
+    spline = CubicSpline(t, z, bc_type="natural")
+    integral = sum(quad(lambda x: spline(x, 2) ** 2, a, b)[0] for a, b in pairwise(t))
+    assert z @ roughness(knots) @ z == pytest.approx(integral, rel=1e-9)
+    assert first_slope(knots) @ z == pytest.approx(float(spline(0.0, 1)), rel=1e-12)
+
+
+def test_straight_lines_have_no_roughness():
+    knots = place_knots(0.0, 5.0, 7)
+    assert knots @ roughness(knots) @ knots == pytest.approx(0.0, abs=1e-9)
+
+
+def test_knots_need_a_range():
+    with pytest.raises(ValueError, match="at least three"):
+        place_knots(0.0, 5.0, 2)
+    with pytest.raises(ValueError, match="not empty"):
+        place_knots(5.0, 5.0, 3)
+
+
+def test_block_covariance_is_that_of_the_means():
+    rng = np.random.default_rng(4)
+    s, std = np.sort(rng.uniform(0, 10, 60)), rng.uniform(0.5, 2, 60)
+    full = np.outer(std, std) * np.exp(-np.abs(s[:, None] - s[None, :]) / 1.7)
+    first = np.array([0, 7, 20, 21, 45])
+    sections = np.diff(np.r_[first, 60])
+    average = np.zeros((5, 60))
+    for k, (i, n) in enumerate(zip(first, sections, strict=True)):
+        average[k, i : i + n] = 1 / n
+    assert np.allclose(block_covariance(s, std, first, sections, 1.7), average @ full @ average.T, rtol=1e-12)
+
+
+def test_blocks_lose_next_to_nothing():
+    """A constant push of all sections is known as well from the blocks as from every section."""
+    shape = measured().steps[1].shape
+    blocks = midline(shape)
+    known = np.sum((blocks.whitener @ np.ones(blocks.s.size)) ** 2)
+    gap = np.diff(shape.section_s)
+    rho = np.exp(-gap / shape.correlation_length)
+    # Information on a constant in a Markov process, section by section.
+    exact = 1 / shape.section_std[0] ** 2 + np.sum((1 - rho) ** 2 / (1 - rho**2)) / shape.section_std[0] ** 2
+    assert known == pytest.approx(exact, rel=0.02)
+
+
+def test_block_means_lie_on_the_curve_not_inside_it():
+    shape = measured(camera=Camera(section_px=1e-6, axis_px=1e-9, scale=1e-9)).steps[3].shape
+    blocks = midline(shape, blocks=20)
+    x, y = np.interp(blocks.s, shape.s, shape.x), np.interp(blocks.s, shape.s, shape.y)
+    # Linear interpolation of the curve itself is the limit here: h^2 K / 8 = 1e-6 m.
+    assert np.abs(-np.sin(blocks.theta) * (blocks.x - x) + np.cos(blocks.theta) * (blocks.y - y)).max() < 2e-6
+
+
+def test_whitener_needs_sections():
+    shape = measured().steps[1].shape
+    few = replace(shape, section_s=shape.section_s[:4], section_x=shape.section_x[:4], section_y=shape.section_y[:4])
+    with pytest.raises(ValueError, match="do not make a shape"):
+        midline(replace(few, section_std=shape.section_std[:4]))
+
+
+def test_evidence_by_projection_is_that_of_a_fit():
+    model = model_of(measured(), count=8)
+    rich = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
+    few = replace(model, knots=place_knots(2.0, 9.2, 5))
+    fitted = fit(few, few.start(LAW.tangent(few.knots), LAW.K0))
+    told = evidence_of_knots(rich.model, rich.evaluation, few.knots, taus=(0.05, 60.0))
+    exact = averaged(fitted.model, fitted.evaluation, taus=(0.05, 60.0)).log_evidence
+    assert told == pytest.approx(exact, abs=1.0)
+
+
+def test_posterior_is_the_normal_equations_where_the_priors_are_weak():
+    model = model_of(measured(), count=4)
+    found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
+    keep = np.ones(found.evaluation.value.size, dtype=bool)
+    keep[found.evaluation.blocks["smoothness"]] = False
+    J = found.evaluation.jacobian[keep]
+    wide = averaged(model, found.evaluation, taus=(1e4, 1e5))
+    narrow = averaged(model, found.evaluation, taus=(0.05, 60.0))
+    free = np.linalg.inv(J.T @ J)
+    # Only the prior of the slope at K0 is left, which sharpens the first control point.
+    assert np.allclose(np.diag(wide.covariance)[2:], np.diag(free)[2:], rtol=0.2)
+    assert np.all(np.diag(narrow.response) <= np.diag(free) * (1 + 1e-9))
+
+
+def test_zero_of_displacement_is_that_of_the_photos():
+    test = measured()
+    value, std = zero_of_displacement(step_data(test))
+    assert value == pytest.approx(force_free(LAW, LENGTH).chord, abs=4 * std)
+    assert zero_of_displacement(()) is None

@@ -1,0 +1,84 @@
+"""The paper's inverse problem on its own virtual experiment (Table 1), and what goes wrong with K0 = 0 (Fig. 6)."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES, simulate, table_1
+from rod.elastica import uniform_equilibrium
+from rod.paper_fit import Virtual, paper_fit
+
+STEPS = 5e-3 * np.arange(1, 4)
+TRUTH = np.r_[TABLE_1_ORDINATES, TABLE_1["pre_curvature"]]
+
+
+def virtual(reading, *, curvatures=True, elements=100):
+    steps = simulate(table_1(reading, elements=elements), STEPS)
+    kappas = np.array([step.kappa for step in steps]) if curvatures else None
+    return Virtual(TABLE_1["length"], STEPS, np.array([step.force for step in steps]), kappas)
+
+
+@pytest.mark.parametrize("reading", ["secant", "tangent"])
+def test_table_1_is_found_within_ten_iterations(reading):
+    fitted = paper_fit(virtual(reading), TABLE_1_KNOTS, reading=reading)
+    errors = [np.abs(np.r_[h.ordinates, h.pre_curvature] / TRUTH - 1).max() for h in fitted.history]
+    assert min(errors[:11]) < 1e-3
+    assert errors[-1] < 1e-8
+    assert fitted.converged
+    assert fitted.outcome is None
+    assert fitted.history[0].pre_curvature == 1.0
+    assert np.all(fitted.history[0].ordinates == 0.01)
+
+
+def test_history_goes_downhill():
+    objectives = [h.objective for h in paper_fit(virtual("tangent"), TABLE_1_KNOTS, reading="tangent").history]
+    assert all(after <= before for before, after in pairwise(objectives))
+
+
+def test_truth_from_quadrature_is_found_to_the_error_of_the_grid():
+    test = table_1("tangent")
+    exact = [
+        uniform_equilibrium(
+            test.characteristic,
+            length=0.2,
+            chord=test.zero_chord - d,
+            pre_curvature=2.0,
+            points=np.linspace(0, 0.2, 101),
+        )
+        for d in STEPS
+    ]
+    data = Virtual(0.2, STEPS, np.array([e.force for e in exact]), np.array([e.kappa for e in exact]))
+    fitted = paper_fit(data, TABLE_1_KNOTS, reading="tangent")
+    # 100 elements are within 1e-4 of the force; the control points, ill-conditioned at K = 0, within 1e-2.
+    assert fitted.pre_curvature == pytest.approx(2.0, abs=2e-3)
+    assert fitted.characteristic.ordinates == pytest.approx(TABLE_1_ORDINATES, rel=1e-2)
+
+
+def test_forces_alone_with_no_pre_curvature_fit_exactly_with_wrong_values():
+    """Eq. (6): three forces, three control points."""
+    fitted = paper_fit(virtual("secant", curvatures=False), TABLE_1_KNOTS, pre_curvature=0.0)
+    assert np.sqrt(fitted.objective) < 1e-8
+    assert np.abs(fitted.characteristic.ordinates / TABLE_1_ORDINATES - 1).max() > 0.2
+
+
+def test_forcing_the_cable_straight_makes_the_stiffness_negative():
+    """Fig. 6: with the curvature term and K0 = 0, f at low curvature falls below zero; the others as in physics."""
+    fitted = paper_fit(virtual("secant"), TABLE_1_KNOTS, pre_curvature=0.0)
+    assert fitted.characteristic.ordinates[0] < 0.0
+    assert fitted.characteristic.ordinates[1:] == pytest.approx([1.73e-3, 1.61e-3], rel=0.05)
+    assert fitted.objective > 1e-2
+
+
+def test_the_zero_of_displacement_may_be_the_length():
+    test = table_1("secant")
+    steps = simulate(test, chords=0.2 - STEPS)
+    data = Virtual(0.2, STEPS, np.array([s.force for s in steps]), np.array([s.kappa for s in steps]))
+    fitted = paper_fit(data, TABLE_1_KNOTS, zero="length")
+    assert np.r_[fitted.characteristic.ordinates, fitted.pre_curvature] == pytest.approx(TRUTH, rel=1e-8)
+
+
+def test_too_few_data_are_a_mistake():
+    one = virtual("secant", curvatures=False)
+    with pytest.raises(ValueError, match="do not determine"):
+        paper_fit(one, TABLE_1_KNOTS)
