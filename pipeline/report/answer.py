@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.report.curves import best, curves
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import DiagnosisPart, Result
 from pipeline.settings import ReportSettings
 
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
@@ -125,13 +125,22 @@ def _agreement(result: Result, words: Words) -> str:
 def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
     """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
     if result.diagnosis is not None:
-        return result.diagnosis.headline, result.diagnosis.verdict == "adequate"
+        return _diagnosed(result.diagnosis, words), result.diagnosis.verdict == "adequate"
     misfit = result.inverse.misfit if result.inverse else None
     if misfit is None or misfit.degrees_of_freedom <= 0:
         return words("model_unknown"), False
     ratio, std = misfit.chi2 / misfit.degrees_of_freedom, math.sqrt(2.0 / misfit.degrees_of_freedom)
     good = ratio < 1.0 + settings.misfit_sigma * std
     return words("model_ok" if good else "model_bad", chi2=words.number(ratio), std=words.number(std, 2)), good
+
+
+def _diagnosed(diagnosis: DiagnosisPart, words: Words) -> str:
+    """Headline of the diagnosis, which is English; in another language the verdict with the causes it names."""
+    if words.language == "en":
+        return diagnosis.headline
+    names = ", ".join(words.cause(cause.name) for cause in diagnosis.causes)
+    verdict = words(f"verdict_{diagnosis.verdict}")
+    return f"{verdict[:1].upper()}{verdict[1:]}{': ' + names if names else ''}."
 
 
 def _advice(result: Result, words: Words) -> str:

@@ -54,7 +54,7 @@ def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> Di
         ],
         next_what=following.what if following else "",
         next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
-        leftover=_sentences(part.leftover),
+        leftover=_sentences(part.leftover) if part.verdict != "adequate" else [],
         figures=_figures(part, words, settings),
     )
 
@@ -153,27 +153,11 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
             title=words("fig_cosines"),
             description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
         )
-    for key, values in (("before", part.residuals_before), ("after", part.residuals_after)):
-        residuals = residual_map(values)
-        if residuals is not None and residuals.steps:
-            drawn[key] = drawing(
-                f"map-{key}",
-                partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
-                size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
-                title=words(f"fig_map_{key}"),
-                description=words("fig_map_alt", rms=map_rms(residuals, words)),
-            )
     before, after = residual_map(part.residuals_before), residual_map(part.residuals_after)
-    if before is not None and any(value is not None for value in before.force_sigma):
-        drawn["force_rest"] = drawing(
-            "force-rest",
-            lambda f: maps.draw_force_rest(f, before, after, words, settings),
-            size=(400.0, 240.0),
-            title=words("fig_force_rest"),
-            description=words("fig_force_rest_alt", values=_force_texts(before, after, words)),
-        )
+    if before is not None and after is not None:
+        drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
-    if pattern.get("shape_m") and pattern.get("s_m"):
+    if part.verdict != "adequate" and pattern.get("shape_m") and pattern.get("s_m"):
         drawn["leftover"] = drawing(
             "leftover",
             lambda f: maps.draw_leftover(f, pattern["s_m"], pattern["shape_m"], words),
@@ -184,11 +168,35 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
     return drawn
 
 
-def _force_texts(before: ResidualMap, after: ResidualMap | None, words: Words) -> str:
+def _before_and_after(
+    before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
+) -> dict[str, Drawing]:
+    """What the extension did to shapes and forces; without an extension the map of the fit says it all."""
+    drawn: dict[str, Drawing] = {}
+    for key, residuals in (("before", before), ("after", after)):
+        drawn[key] = drawing(
+            f"map-{key}",
+            partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
+            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            title=words(f"fig_map_{key}"),
+            description=words("fig_map_alt", rms=map_rms(residuals, words)),
+        )
+    if any(value is not None for value in before.force_sigma):
+        drawn["force_rest"] = drawing(
+            "force-rest",
+            lambda f: maps.draw_force_rest(f, before, after, words, settings),
+            size=(400.0, 240.0),
+            title=words("fig_force_rest"),
+            description=words("fig_force_rest_alt", values=_force_texts(before, after, words)),
+        )
+    return drawn
+
+
+def _force_texts(before: ResidualMap, after: ResidualMap, words: Words) -> str:
     """Forces left over by step, before and after, as text."""
     parts = []
     for residuals in (before, after):
-        values = residuals.force_sigma if residuals else []
+        values = residuals.force_sigma
         parts.append(", ".join("–" if value is None else words.number(value, 2) for value in values))
     return " → ".join(part for part in parts if part)
 

@@ -80,14 +80,14 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: Repor
 
 
 def draw_force_rest(
-    figure: Area, before: ResidualMap, after: ResidualMap | None, words: Words, settings: ReportSettings
+    figure: Area, before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
 ) -> Axes:
     """Draw forces left over by step in sigma, before and after the extension."""
     axes, noise = plot_area(figure, top=ONE_ROW), settings.residual_noise_sigma
     axes.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     for residuals, role, marker, label in ((before, "alarm", "x", "before"), (after, "extended", "o", "after")):
-        if residuals is not None and residuals.force_sigma:
+        if residuals.force_sigma:
             values = _numbers(residuals.force_sigma)
             axes.plot(range(values.size), values, color=LIGHT[role], marker=marker, lw=0.8, label=words(label))
     finish(axes, x=words("step"), y=words("axis_sigma"), decimal=words.decimal, legend=2)

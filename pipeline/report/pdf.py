@@ -281,11 +281,10 @@ def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings
         height = min(ranking.ranking_height(part, settings), 280.0)
         ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
     before, after = (residual_map(values) for values in (part.residuals_before, part.residuals_after))
-    for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
-        if residuals is not None and residuals.steps:
+    if before is not None and after is not None:
+        for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
             area = sheet.part(165.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
             maps.draw_map(area, residuals, words, settings, title=words(title))
-    if before is not None or after is not None:
         sheet.y += 170.0
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]
