@@ -33,7 +33,7 @@ from rod.paper_fit import PaperFit, Virtual, paper_fit
 
 Array = NDArray[np.float64]
 
-STEPS = TABLE_1["step"] * np.arange(1, 4)
+STEPS: Array = TABLE_1["step"] * np.arange(1.0, 4.0)
 READINGS: tuple[Reading, Reading] = ("secant", "tangent")
 
 
@@ -140,7 +140,7 @@ def virtual_data(test: BendingTest, *, from_length: bool = False, elements: int 
     steps = simulate(test, displacements=STEPS)
     grid = np.linspace(0.0, test.length, elements + 1)
     curvatures = np.array([np.interp(grid, step.s, step.kappa) for step in steps])
-    travel: Array = test.length - np.array([step.chord for step in steps]) if from_length else STEPS
+    travel = np.array([test.length - step.chord for step in steps]) if from_length else STEPS
     return Virtual(test.length, travel, np.array([step.force for step in steps]), curvatures)
 
 

@@ -1,4 +1,4 @@
-"""Where the shared specimens lie; tests that read them are left out, and counted as such, where they do not lie there."""
+"""Where the shared specimens lie; tests that read them are left out, and counted as such, where there are none."""
 
 import os
 from pathlib import Path
