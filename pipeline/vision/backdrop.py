@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
 _MAD_TO_STD = 1.4826  # standard deviation of a normal distribution by its median absolute deviation
@@ -83,13 +83,8 @@ def stand_out(
     u0, v0, u1, v1 = window if window is not None else (0, 0, width, height)
     columns, rows = (u1 - u0) // reduction, (v1 - v0) // reduction
     part = photo.pixels[v0 : v0 + rows * reduction, u0 : u0 + columns * reduction]
-    # Halving twice by whole pixels is five times faster than one reduction by four, and the same mean.
-    step = reduction
-    while step % 2 == 0 and part.dtype == np.uint8:
-        part, step = cv2.resize(part, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), step // 2
-    if step > 1:
-        part = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
-    small = part.astype(np.float32)
+    # Averages of 8 bits are kept in 8 bits: the rounding, 0.3 levels, is less than half of ``min_ground_std``.
+    small = reduce_area(part, (columns, rows)).astype(np.float32)
     small = small[..., None] if small.ndim == 2 else small
     small *= np.float32(1.0 / photo.full_scale)
     residual = small - _ground(small)

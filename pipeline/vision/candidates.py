@@ -134,11 +134,17 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
     above = picture > level
     if above.mean() > settings.max_covered_share:
         return
-    widths = [wanted.width] if wanted.width is not None else _guess_widths(above, settings)
-    for width in widths:
+    widths = [(wanted.width, np.inf)] if wanted.width is not None else _guess_widths(above, settings)
+    largest = 0.0
+    for width, length in widths:
+        if width * length < largest:
+            continue  # the largest strip will speak for the photo; these are all smaller together
         reading = _read(above, width, level, wanted, settings)
         merged = _split_by_highlight(reading) if wanted.width is None else None
-        yield reading if merged is None else _read(above, merged, level, wanted, settings)
+        reading = reading if merged is None else _read(above, merged, level, wanted, settings)
+        if reading.longest >= wanted.least_length:
+            largest = max(largest, reading.longest * reading.width)
+        yield reading
 
 
 def _read(above: Array, width: float, level: float, wanted: Wanted, settings: SegmentationSettings) -> Reading:
@@ -152,13 +158,16 @@ def _read(above: Array, width: float, level: float, wanted: Wanted, settings: Se
     return Reading(tuple(strips), mask, thick, width, level)
 
 
-def _guess_widths(above: Array, settings: SegmentationSettings) -> list[float]:
-    """Widths of strips in the mask as it is, and once gaps of the narrowest strips' size are closed."""
+def _guess_widths(above: Array, settings: SegmentationSettings) -> list[tuple[float, float]]:
+    """Widths and lengths of strips in the mask as it is, and once gaps of a highlight's size are closed.
+
+    Those that may be largest in area come first.
+    """
     mask = above.astype(np.uint8)
     widths = ridge_widths(mask, settings)
-    closed = ridge_widths(strip_mask(above, widths[0], settings), settings) if widths else []
-    new = [width for width in closed if all(abs(np.log(width / known)) > 0.2 for known in widths)]
-    return widths + new
+    closed = ridge_widths(strip_mask(above, widths[0][0], settings), settings) if widths else []
+    new = [guess for guess in closed if all(abs(np.log(guess[0] / known)) > 0.2 for known, _ in widths)]
+    return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
 
 
 def _split_by_highlight(reading: Reading) -> float | None:

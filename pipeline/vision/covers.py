@@ -130,7 +130,7 @@ def _best_circle(
 
 @dataclass(frozen=True)
 class _Window:
-    """Square piece of the photo, reduced so that the circle keeps a few tens of cells."""
+    """Square piece of the photo, reduced so that the circle keeps 16 to 32 cells."""
 
     grey: NDArray[np.float32]
     origin: Array
@@ -142,7 +142,7 @@ class _Window:
         high = np.minimum(np.ceil(middle + half).astype(int) + 1, photo.size)
         if (high - low < radius).any():
             return None
-        reduction = max(1, int(radius / 24.0))
+        reduction = max(1, int(radius / 16.0))
         size = tuple(int(side) // reduction for side in high - low)
         part = photo.pixels[low[1] : high[1], low[0] : high[0]][: size[1] * reduction, : size[0] * reduction]
         small = cv2.resize(part, size, interpolation=cv2.INTER_AREA).astype(np.float32) / np.float32(photo.full_scale)
@@ -200,16 +200,16 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingS
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, settings.search_radii * radius)
     parameters = np.array([*center, radius])
-    for span_now in (span, max(3.0, 0.5 * span)):
-        edge = _radial_edges(photo, parameters, ray, span_now, settings)
-        fitted = _robust_circle(parameters, ray, edge, span_now, expected)
+    for span_now in (span, max(3.0, 0.5 * span), max(3.0, 0.5 * span)):
+        edge, trust = _radial_edges(photo, parameters, ray, span_now, settings)
+        fitted = _robust_circle(parameters, ray, edge, trust, span_now, expected)
         if fitted is None:
             return None
         parameters, covariance = fitted
     off = np.hypot(*(parameters[:2] - center))
     if off > 0.5 * radius or abs(parameters[2] - radius) > max(4.0 * expected.std * radius, 1.0):
         return None
-    edge = _radial_edges(photo, parameters, ray, span, settings)
+    edge, _ = _radial_edges(photo, parameters, ray, span, settings)
     rim = float(np.mean(np.abs(edge) < max(0.75, settings.rim_tolerance * radius)))
     # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
     excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
@@ -220,15 +220,21 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingS
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
 
-def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float, settings: BearingSettings) -> Array:
-    """Radius of the edge in each direction relative to the circle, NaN where none stands out."""
+def _radial_edges(
+    photo: Photo, parameters: Array, ray: Array, span: float, settings: BearingSettings
+) -> tuple[Array, Array]:
+    """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
+
+    The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
+    else pass for the rim.
+    """
     # The outer halves of the rays tell what is no edge: sheen, texture and noise.
     offsets = np.arange(-2.0 * span, 2.0 * span + 0.25, 0.5)
     points = parameters[:2] + (parameters[2] + offsets)[None, :, None] * ray[:, None, :]
     low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 2, 0)
     high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 3, photo.size)
     if (high - low < 4).any():
-        return np.full(len(ray), np.nan)
+        return np.full(len(ray), np.nan), np.zeros(len(ray))
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
     u, v = (points[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
     profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
@@ -244,11 +250,13 @@ def _radial_edges(photo: Photo, parameters: Array, ray: Array, span: float, sett
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(ray)), place]
-    return np.where(seen & (peak > settings.rim_over_texture * float(np.median(strength[:, ~inner]))), edge, np.nan)
+    found = seen & (peak > settings.rim_over_texture * float(np.median(strength[:, ~inner])))
+    usual = float(np.percentile(peak[found], 75)) if found.any() else 1.0
+    return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
 
 def _robust_circle(
-    parameters: Array, ray: Array, edge: Array, span: float, expected: Radius
+    parameters: Array, ray: Array, edge: Array, trust: Array, span: float, expected: Radius
 ) -> tuple[Array, Array] | None:
     found = np.isfinite(edge)
     if found.sum() < 12:
@@ -259,10 +267,11 @@ def _robust_circle(
         arm = points - fit[:2]
         distance = np.hypot(*arm.T)
         residual = distance - fit[2]
-        tukey = np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
+        tukey = trust[found] * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
         design = np.column_stack([arm / distance[:, None], np.ones(len(points))])
         normal = design.T @ (tukey[:, None] * design)
-        if np.linalg.det(normal) < 1e-4 * len(points) ** 3 * 1e-2:  # less than an eighth of the rim: no centre
+        # A whole rim has the determinant W^3 / 4 (W the sum of weights), an eighth of it a thousandth of that.
+        if np.linalg.det(normal) < 2.5e-4 * tukey.sum() ** 3 or not tukey.any():
             return None
         gradient = design.T @ (tukey * residual)
         prior = (scale / (expected.std * expected.px)) ** 2

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision_stages import PreviewSettings
 from pipeline.vision.crosscut import path_normals
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, reduce_area
 from pipeline.vision.rough import RoughCable
 
 # Okabe and Ito's orange and sky blue (blue, green, red): told apart by colour-blind readers and on dark and bright.
@@ -26,7 +26,7 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
     """The photo at the size of a report's column, as JPEG; levels stretched to the range it uses."""
     factor = max(1.0, max(photo.size) / settings.long_side_px)
     size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
-    small = cv2.resize(photo.pixels, size, interpolation=cv2.INTER_AREA)
+    small = reduce_area(photo.pixels, size)
     if small.dtype != np.uint8:
         small = np.clip(small.astype(np.float32) * np.float32(255.0 / photo.full_scale), 0, 255).astype(np.uint8)
     return Preview(_jpeg(small, settings), size[0], size[1], photo.size[0] / size[0])

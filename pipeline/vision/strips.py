@@ -91,8 +91,8 @@ def find_strips(mask: Mask, thick: Mask, width: float, settings: SegmentationSet
     return sorted(strips, key=lambda strip: -strip.length)
 
 
-def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[float]:
-    """Widths (cells) that strips in the mask have, the one with the greatest length first.
+def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[tuple[float, float]]:
+    """Widths (cells) that strips in the mask have and about how long they are in all, the longest first.
 
     The distance transform at the ridge is half the width; long strips of constant width pile up in its histogram.
     """
@@ -104,7 +104,8 @@ def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[float]:
     # A ridge is up to as thick as the strip's cells allow; neighbouring bins belong to the same strip.
     pooled = np.convolve(counts, [0.5, 1.0, 0.5], mode="same")
     order = [i for i in np.argsort(pooled)[::-1] if pooled[i] >= max(pooled[max(i - 1, 0) : i + 2])]
-    return [float(np.sqrt(edges[i] * edges[i + 1])) for i in order[: settings.max_width_guesses] if pooled[i] > 0]
+    best = [i for i in order[: settings.max_width_guesses] if pooled[i] > 0]
+    return [(float(np.sqrt(edges[i] * edges[i + 1])), float(pooled[i])) for i in best]
 
 
 def join_strips(
