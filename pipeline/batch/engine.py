@@ -2,7 +2,7 @@
 
 Specimens are handed out a few at a time and only short outcomes come back, so the memory of this process does not
 depend on the size of the batch. A worker that dies is replaced and its specimen tried once more (see `specimen`).
-A single specimen is measured in this process: starting another takes 1.5 s and protects nothing.
+A single specimen is measured in this process, unless its time is limited: starting another takes 1.5 s.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Generator, Iterator, Sequence
 
 import dask
 from dask.system import CPU_COUNT
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from pipeline.batch.orders import Order
 from pipeline.batch.specimen import ONE_THREAD, Outcome, Stages, measure_order, store_failure
@@ -34,9 +34,10 @@ LOCAL = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.profile.enabled": False,
+    "distributed.worker.preload": ["pipeline.batch.worker"],
     "distributed.admin.low-level-log-length": 0,
 }
-CONNECT_S = 10.0  # to a scheduler given by its address; those that answer do so within a second
+CONNECT_S = 5.0  # to a scheduler given by its address; those that answer do so within a second
 
 
 def measure_all(
@@ -56,8 +57,10 @@ def measure_all(
     InputError
         ``batch/no-scheduler`` if nobody answers at the address.
     """
-    if len(orders) == 1 and scheduler is None and "timeout_s" not in settings.model_fields_set:
-        yield measure_order(orders[0], stages, guarded=False)
+    alone = len(orders) == 1 and "timeout_s" not in settings.model_fields_set
+    if scheduler is None and (alone or settings.in_process):
+        for order in orders:
+            yield measure_order(order, stages, guarded=False)
         return
     with _client(len(orders), settings, scheduler) as client:
         yield from _stream(client, orders, settings, stages)
@@ -87,7 +90,7 @@ def _client(count: int, settings: BatchSettings, scheduler: str | None) -> Itera
             threads_per_worker=1,
             processes=True,
             memory_limit=limit,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # any free port: two batches may run, and nobody else looks in
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
@@ -96,12 +99,16 @@ def _client(count: int, settings: BatchSettings, scheduler: str | None) -> Itera
 
 
 def _stream(client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages) -> Iterator[Outcome]:
-    """Keep a few orders per worker under way."""
-    doing: dict[str, tuple[Order, float]] = {}
+    """Keep a few orders per worker under way.
 
-    def hand_out(order: Order) -> Future[Outcome]:
+    Where the scheduler blames an order for workers that died around it, it is handed out again: whether it is to blame
+    the order itself knows, by the notes of its attempts.
+    """
+    doing: dict[str, tuple[Order, float, int]] = {}
+
+    def hand_out(order: Order, again: int = 0) -> Future[Outcome]:
         future = client.submit(measure_order, order, stages, key=f"specimen-{uuid.uuid4().hex}", pure=False)
-        doing[str(future.key)] = order, time.monotonic()
+        doing[str(future.key)] = order, time.monotonic(), again
         return future
 
     workers = max(1, sum(client.ncores().values()))
@@ -109,13 +116,16 @@ def _stream(client: Client, orders: Sequence[Order], settings: BatchSettings, st
     first = itertools.islice(waiting, workers * settings.waiting_per_worker)
     finished = as_completed([hand_out(order) for order in first], loop=client.loop)
     for future in finished:
-        order, started = doing.pop(str(future.key))
+        order, started, again = doing.pop(str(future.key))
+        trouble = None if future.status == "finished" else future.exception()
+        if isinstance(trouble, KilledWorker) and again < settings.attempts:
+            finished.add(hand_out(order, again + 1))
+            continue
         following = next(waiting, None)
         if following is not None:
             finished.add(hand_out(following))
-        if future.status == "finished":
+        if trouble is None:
             yield future.result()
-        else:  # the scheduler gave up: too many workers died around it, or the workers cannot run this program
-            trouble = f"{type(future.exception()).__name__}: {str(future.exception())[:300]}"
-            finding = FindingPart(code="specimen/worker-died", level="error", message=f"its worker failed, {trouble}")
-            yield store_failure(order, finding, started)
+        else:
+            told = f"its worker failed ({type(trouble).__name__}: {' '.join(str(trouble).split())[:300]})"
+            yield store_failure(order, FindingPart(code="specimen/worker-died", level="error", message=told), started)

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.metadata
 import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline import __version__
 from pipeline.batch.store import OWN_FILES
 from pipeline.errors import InputError
 from pipeline.intake.specimenfile import folder_name, plain_name, read_specimen_file
@@ -104,13 +104,9 @@ def fingerprint(specimen: Specimen, order: Order) -> str:
 @functools.cache
 def code_version() -> str:
     """Version of the program: that of the distribution, and a digest of its source, so that a changed copy counts."""
-    try:
-        version = importlib.metadata.version("cablebend")
-    except importlib.metadata.PackageNotFoundError:
-        version = "not installed"
     digest = hashlib.sha256()
     root = Path(__file__).resolve().parents[2]
     for path in sorted((*(root / "rod").rglob("*.py"), *(root / "pipeline").rglob("*.py"))):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
-    return f"{version}+{digest.hexdigest()[:12]}"
+    return f"{__version__}+{digest.hexdigest()[:12]}"

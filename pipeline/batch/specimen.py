@@ -11,6 +11,7 @@ import contextlib
 import os
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,12 +109,13 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
         finding = FindingPart(code=error.code, level="error", message=error.sentence)
         return store_failure(order, finding, started)
     except Exception as error:
-        return store_failure(order, _refusal(error), started)
+        return store_failure(order, _refusal(error), started, trace=traceback.format_exc())
 
 
 def _refusal(error: Exception) -> FindingPart:
     """What a reader of the index is told about an error nobody foresaw."""
-    code, message = "specimen/program-error", f"the program failed: {type(error).__name__}: {str(error)[:500]}"
+    told = " ".join(str(error).split())[:300]
+    code, message = "specimen/program-error", f"the program failed ({type(error).__name__}: {told}); please report it"
     if isinstance(error, MemoryError):
         code, message = "specimen/memory", "there was not enough memory for this specimen"
     elif isinstance(error, OSError):
@@ -154,6 +156,7 @@ def _measured(store: Store, order: Order, stages: Stages, started: float) -> Out
     """Read, compare with what is stored, measure, store."""
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)  # for workers that were started by others; before the libraries load
+    store.place(order.name)  # refuses before the work, not after it
     specimen = read_specimen(order.folder, order.settings.intake)
     mark = fingerprint(specimen, order)
     stored = store.entry(order.name)
@@ -182,16 +185,18 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
     }
 
 
-def store_failure(order: Order, finding: FindingPart, started: float) -> Outcome:
+def store_failure(order: Order, finding: FindingPart, started: float, *, trace: str | None = None) -> Outcome:
     """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
 
     Parameters
     ----------
     started : float
         s, `time.monotonic` when the specimen was begun.
+    trace : str, optional
+        Where in the program it failed, kept in the provenance.
     """
     store = Store(order.out)
-    result = failed_result(order, finding)
+    result = failed_result(order, finding, trace)
     entry = _entry(order, result, "")
     unstored: dict[str, Any] | None = entry
     with contextlib.suppress(OSError, InputError), store.staging() as staged:
@@ -203,12 +208,13 @@ def store_failure(order: Order, finding: FindingPart, started: float) -> Outcome
     return Outcome(order.name, "failed", finding.message, False, time.monotonic() - started, unstored)
 
 
-def failed_result(order: Order, finding: FindingPart) -> Result:
+def failed_result(order: Order, finding: FindingPart, trace: str | None = None) -> Result:
     """The result of a specimen that could not be measured."""
+    provenance = {"command": order.command, "version": order.version}
     return Result(
         status="failed",
         headline=finding.message,
         specimen=SpecimenPart(id=order.name, folder=str(order.folder).encode("utf-8", "replace").decode()),
         findings=[finding],
-        provenance={"command": order.command, "version": order.version},
+        provenance=provenance if trace is None else provenance | {"traceback": trace},
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -85,8 +86,8 @@ class Store:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def install(self, staged: Path, name: str) -> None:
-        """Put a finished folder into its place; an earlier result there is replaced.
+    def place(self, name: str) -> Path:
+        """Where a result goes.
 
         Raises
         ------
@@ -94,14 +95,19 @@ class Store:
             ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
         """
         place = self.out / name
+        if os.path.lexists(place) and not (place / ENTRY).is_file():
+            raise InputError(
+                "is in the way of a result and none itself",
+                path=place,
+                code="out/foreign-folder",
+                remedy="move it or choose another -o",
+            )
+        return place
+
+    def install(self, staged: Path, name: str) -> None:
+        """Put a finished folder into its place; an earlier result there is replaced. Raises as `place` does."""
+        place = self.place(name)
         if place.exists():
-            if not (place / ENTRY).is_file():
-                raise InputError(
-                    "is in the way of a result and none itself",
-                    path=place,
-                    code="out/foreign-folder",
-                    remedy="move it or choose another -o",
-                )
             old = self._work("staging") / uuid.uuid4().hex
             place.rename(old)
             staged.rename(place)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from pipeline.cli.options import settings_options
-from pipeline.cli.run import found
+from pipeline.cli.run import found, nothing_found
 from pipeline.errors import InputError
 
 
@@ -30,6 +30,8 @@ def check(
 
     settings = read_settings(settings_file, assignments)
     specimens, refused = found(folders, settings.intake)
+    if not specimens:
+        ctx.exit(nothing_found(refused))
     rows = [checked(folder, settings.intake) for folder in specimens]
     failed = sum(row["status"] == "error" for row in rows)
     if as_json:

@@ -44,8 +44,16 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
             path=file,
             line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
             code="settings/wrong-value",
-            remedy=f"give a value as `cablebend init --settings` describes it ({first['msg'].lower()})",
+            remedy=f"the default is {_default(place)}, and `cablebend init --settings` says what it means",
         ) from error
+
+
+def _default(place: Sequence[str]) -> str:
+    """Default of a setting as TOML, for a message."""
+    value: Any = Settings()
+    for name in place:
+        value = getattr(value, name, value)  # a place inside a list ends at the list
+    return "a table" if isinstance(value, BaseModel) else _toml(value)
 
 
 def _check_names(

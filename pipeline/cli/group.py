@@ -7,10 +7,11 @@ from typing import Any
 
 import click
 
+from pipeline import __version__
 from pipeline.errors import InputError
 
 # command -> module of this room; each module has a function of the command's name
-COMMANDS = ("run", "check", "init", "report", "paper")
+COMMANDS = ("run", "check", "init", "report", "demo", "simulate", "explain", "paper")
 INTERRUPTED = 130
 
 
@@ -41,7 +42,7 @@ class Commands(click.Group):
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="cablebend", prog_name="cablebend")
+@click.version_option(__version__, prog_name="cablebend")
 def main() -> None:
     """Bending stiffness characteristic of cables from photos and forces.
 

@@ -53,7 +53,7 @@ def run(
     settings = read_settings(settings_file, (*assignments, *limits))
     specimens, refused = found(folders, settings.intake)
     if not specimens:
-        ctx.exit(3)
+        ctx.exit(nothing_found(refused))
     with progress(len(specimens)) as show:
         tally = run_batch(specimens, out, settings, scheduler=scheduler, options=options, on_outcome=show)
     for sentence in tally.trouble:
@@ -63,22 +63,27 @@ def run(
         echo_json(entries, tally, out)
     else:
         echo_table(entries, tally, out)
-    ctx.exit(exit_code(tally, refused))
+    ctx.exit(exit_code(tally, len(refused)))
 
 
-def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], int]:
-    """Specimens in all folders, and how many folders were refused, each with a sentence on stderr."""
+def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[InputError]]:
+    """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.intake.folder import find_specimens
 
     specimens: dict[Path, None] = {}
-    refused = 0
+    refused = []
     for folder in folders:
         try:
             specimens.update(dict.fromkeys(find_specimens([folder], settings)))
         except InputError as error:
-            refused += 1
+            refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
     return list(specimens), refused
+
+
+def nothing_found(refused: list[InputError]) -> int:
+    """Exit code without any specimen: 2 if a folder does not exist, 3 if there is nothing in it."""
+    return 2 if any(error.code == "folder/missing" for error in refused) else 3
 
 
 def exit_code(tally: Tally, refused: int = 0) -> int:

@@ -11,6 +11,9 @@ class BatchSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     workers: int = Field(0, ge=0, description="processes on this machine; 0: one a core, each with one thread")
+    in_process: bool = Field(
+        False, description="measure in this process, one after the other and without timeout: for debugging"
+    )
     timeout_s: float = Field(
         900.0,
         gt=0,

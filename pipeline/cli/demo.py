@@ -1,0 +1,108 @@
+"""``cablebend demo``: a specimen with known truth, measured as any other, and laid beside its truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pipeline.cli.options import settings_options
+
+if TYPE_CHECKING:
+    from pipeline.result import Curve, Result
+
+COMPARED = 5  # places along the visited range at which f_EI is laid beside the truth
+
+
+@click.command()
+@click.option(
+    "-o", "--out", default="cablebend-demo", type=click.Path(path_type=Path, file_okay=False), show_default=True,
+    help="Folder for the specimen, its truth and the results.",
+)  # fmt: skip
+@click.option("--seed", default=0, show_default=True, help="Chooses the cable, the camera and the noise.")
+@settings_options
+@click.pass_context
+def demo(ctx: click.Context, out: Path, seed: int, settings_file: Path | None, assignments: tuple[str, ...]) -> None:
+    """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
+    from pipeline.batch import run_batch
+    from pipeline.cli.configuration import as_options, read_settings
+    from pipeline.cli.progress import progress
+    from pipeline.cli.run import exit_code
+    from pipeline.result import from_json
+    from pipeline.simulate import demo_specimen
+
+    settings = read_settings(settings_file, assignments)
+    specimen = out / "specimen" / f"demo-{seed}"
+    specimen.mkdir(parents=True, exist_ok=True)
+    click.echo("simulating and photographing the specimen", err=True)
+    truth = demo_specimen(specimen, seed, truth_file=out / f"demo-{seed}.truth.json").truth
+    click.echo("measuring it", err=True)
+    results = out / "results"
+    with progress(1) as show:
+        tally = run_batch(
+            [specimen], results, settings, options=as_options(settings_file, assignments), on_outcome=show
+        )
+    if tally.measured:
+        (name,) = tally.names
+        result = from_json((results / name / "result.json").read_text(encoding="utf-8"))
+        echo_comparison(result, truth)
+        click.echo(f"\n{result.headline}\n{results / name / 'report.html'}")
+    ctx.exit(exit_code(tally))
+
+
+def echo_comparison(result: Result, truth: dict[str, Any]) -> None:
+    """Print f_EI, K0 and forces, measured and true, with standard deviations and the difference in these."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("quantity", "measured", "truth", "off by"):
+        table.add_column(heading, justify="left" if heading == "quantity" else "right")
+    for label, value, std, true in compared(result, truth):
+        table.add_row(Text(label), *_shown(value, std, true))
+    Console(width=100).print(table)
+
+
+def compared(result: Result, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
+    """Label, measured value, standard deviation and truth of everything the demo knows."""
+    rows: list[tuple[str, float, float, float]] = []
+    inverse, balance = result.inverse, result.balance
+    ways = {"inverse": inverse.curve if inverse else None, "balance": balance.curve if balance else None}
+    for way, curve in ways.items():
+        if curve is not None:
+            rows += _stiffness(way, curve, truth)
+    for way, part in (("inverse", inverse), ("balance", balance)):
+        if part is not None and part.pre_curvature_per_m is not None and part.pre_curvature_std_per_m is not None:
+            rows.append((f"K0, {way} [1/m]", part.pre_curvature_per_m, part.pre_curvature_std_per_m, truth["K0"]))
+    for step, true in zip(result.steps, truth["steps"], strict=True):
+        at = f"{step.displacement_m * 1e3:.2f} mm"
+        rows.append((f"force, {at} [N]", step.force_N, step.force_std_N, true["F"]))
+    return rows
+
+
+def _stiffness(way: str, curve: Curve, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
+    """f_EI (tangent) at a few curvatures of the visited range."""
+    import numpy as np
+
+    seen = np.flatnonzero(curve.supported)
+    law = truth["law"]
+    rows = []
+    for place in np.unique(np.linspace(0, len(seen) - 1, COMPARED).round().astype(int)):
+        at = int(seen[place])
+        kappa = curve.kappa_per_m[at]
+        true = float(np.interp(kappa - truth["K0"], law["excess_per_m"], law["tangent_Nm2"]))
+        label = f"f_EI({kappa:.2f} 1/m), {way} [mN m²]"
+        rows.append((label, 1e3 * curve.tangent_Nm2[at], 1e3 * curve.tangent_std_Nm2[at], 1e3 * true))
+    return rows
+
+
+def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
+    """Cells of a row: the measured value with its uncertainty, the truth to the same place, the difference in std."""
+    from pipeline.rounding import rounded
+
+    text = rounded(value, std)
+    places = len(text.partition(" ")[0].partition(".")[2])
+    return text, f"{true:.{places}f}", f"{(value - true) / std:+.1f} std" if std > 0.0 else ""

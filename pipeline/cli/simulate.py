@@ -1,0 +1,67 @@
+"""``cablebend simulate``: a virtual experiment as a specimen folder, with any cause hidden in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Any]:
+    """Causes to hide, by name."""
+    from pipeline.simulate import parse_effect
+
+    try:
+        return dict(parse_effect(text) for text in texts)
+    except ValueError as error:
+        raise click.BadParameter(f"{error}.") from error
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--hide", "effects", multiple=True, metavar="NAME=VALUE", callback=effect,
+    help="Hide a cause, as `cablebend explain` names them; repeatable.",
+)  # fmt: skip
+@click.option("--length-mm", default=181.0, show_default=True, help="Cable length between the bearing axes.")
+@click.option("--diameter-mm", default=4.6, show_default=True, help="Diameter of the cable.")
+@click.option("--ei-rest", "EI0", default=0.018, show_default=True, help="Bending stiffness at rest, N m^2.")
+@click.option("--ei-far", "EI1", default=0.0075, show_default=True, help="Bending stiffness far from rest, N m^2.")
+@click.option("--kc", default=4.5, show_default=True, help="Curvature at which it changes from one to the other, 1/m.")
+@click.option("--k0", "K0", default=2.0, show_default=True, help="Pre-curvature, 1/m.")
+@click.option(
+    "--protocol", "plan", default="loading", show_default=True, type=click.Choice(["three", "loading", "unloading"]),
+    help="Loading steps only; mounted and loading; these and back.",
+)  # fmt: skip
+@click.option("--steps", default=6, show_default=True, type=click.IntRange(1, 200), help="Loading steps.")
+@click.option("--step-mm", default=2.3, show_default=True, help="Displacement of a step.")
+@click.option("--seed", default=0, show_default=True, help="Chooses the noise.")
+def simulate(
+    folder: Path,
+    effects: dict[str, Any],
+    length_mm: float,
+    diameter_mm: float,
+    plan: Any,
+    steps: int,
+    step_mm: float,
+    seed: int,
+    **cable: float,
+) -> None:
+    """Bend a virtual cable, photograph it, and write a specimen FOLDER; the truth goes beside it, not into it."""
+    from pipeline.simulate import Experiment, protocol, simulate_specimen
+
+    try:
+        experiment = Experiment(
+            id=folder.name,
+            length_m=length_mm * 1e-3,
+            diameter_m=diameter_mm * 1e-3,
+            displacements_m=protocol(plan, steps, step_mm * 1e-3),
+            effects=effects,
+            seed=seed,
+            **cable,
+        )
+        written = simulate_specimen(folder, experiment)
+    except ValueError as error:
+        raise click.UsageError(f"{error}.") from error
+    click.echo(f"{written.folder} (truth: {written.truth_file})")
