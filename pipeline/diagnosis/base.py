@@ -5,8 +5,10 @@ before the diagnosis), on ideal bearings, the displacement counted from the moun
 one and the same law. Beside them, with the prior knowledge the measurement states: the scale of the photos and the length
 of the cable. Every candidate cause is an addition to this.
 
-Parameters, in this order: the ordinates (relative to a reference stiffness), K0 (1/m), relative error of the stated px/mm,
-relative error of the stated length.
+Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0 (1/m),
+relative error of the stated px/mm, relative error of the stated length. A weak prior keeps the law smooth,
+``int (d^2 log f / dt^2)^2 dt / tau^2`` with t from 0 to 1 over the control points (see `rod.knots`): without a photo of
+the force-free cable, K0 and the stiffness near K0 are else free to run away together.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from pipeline.diagnosis.causes.camera import scaled
 from pipeline.diagnosis.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
-from rod.knots import place_knots
+from rod.knots import place_knots, roughness
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -41,6 +43,10 @@ class Base:
     scale_std, length_std : relative
         Prior knowledge.
     elements : int
+    roughness : float
+        tau of the prior on the law.
+    first : 1/m
+        K0 of the first guess.
     straight : bool
         K0 is held at zero (where the machinery starts from the poorest model).
     """
@@ -51,6 +57,8 @@ class Base:
     scale_std: float
     length_std: float
     elements: int
+    roughness: float
+    first: float = 0.0
     straight: bool = False
 
     @property
@@ -65,15 +73,26 @@ class Base:
         return None if self.straight else len(self.knots)
 
     @property
-    def prior_std(self) -> Array:
-        """Standard deviation (p,) of the prior of each parameter; infinite where nothing is known."""
-        free = len(self.knots) + (0 if self.straight else 1)
-        return np.r_[np.full(free, np.inf), self.scale_std, self.length_std]
+    def prior(self) -> Array:
+        """Prior knowledge as rows (m, p) of unit variance: scale, length, and smoothness of the law; all centred at zero."""
+        count, size = len(self.knots), len(self.names)
+        rows = [np.eye(size)[-2] / self.scale_std, np.eye(size)[-1] / self.length_std]
+        if count > 2:
+            weight, mode = np.linalg.eigh(roughness(self.knots))
+            kept = weight > 1e-9 * weight[-1]
+            bend = np.sqrt(weight[kept])[:, None] * mode.T[kept] / self.roughness
+            rows.extend(np.hstack([bend, np.zeros((len(bend), size - count))]))
+        return np.array(rows)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
         return np.r_[np.full(len(self.knots), 1e-4), bend, 1e-6, 1e-6]
+
+    def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
+        """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m) to go with it."""
+        rest = [] if self.straight else [self.first + bend]
+        return np.r_[np.full(len(self.knots), np.log(stiffness)), rest, 0.0, 0.0]
 
     def pre_curvature(self, vector: Array) -> float:
         """K0, 1/m."""
@@ -81,7 +100,7 @@ class Base:
 
     def characteristic(self, vector: Array) -> Characteristic:
         """f_EI over the excess curvature."""
-        ordinates = self.stiffness * vector[: len(self.knots)]
+        ordinates = self.stiffness * np.exp(vector[: len(self.knots)])
         return Characteristic.from_ordinates(self.knots, ordinates, reading="tangent", abscissa="excess")
 
     def model(self, vector: Array) -> Model:
@@ -98,19 +117,20 @@ class Base:
         """First observer of every model: the camera with its scale."""
         return scaled(float(vector[len(self.names) - 2]))
 
-    def ordinate_shares(self, knots: Array) -> Array:
-        """Value (k, p) of the cardinal splines of the base's control points at ``knots`` (k,)."""
-        return np.column_stack(
-            [Characteristic.from_ordinates(self.knots, unit).f(knots) for unit in np.eye(len(self.knots))]
-        )
+    def law_directions(self, vector: Array, knots: Array) -> Array:
+        """Change (k, p) of the law at ``knots`` (k,) per unit of the first p parameters, N m^2."""
+        cardinal = [Characteristic.from_ordinates(self.knots, unit).f(knots) for unit in np.eye(len(self.knots))]
+        return np.column_stack(cardinal) * self.stiffness * np.exp(vector[: len(self.knots)])
 
     def admissible(self, vector: Array) -> bool:
-        """Whether the stiffness is positive at every control point and nothing is absurd."""
-        ordinates = vector[: len(self.knots)]
-        return bool(np.all(ordinates > 0.0) and np.all(np.isfinite(vector)) and np.all(np.abs(vector[-2:]) < 0.3))
+        """Whether nothing is absurd: stiffness within e^12 of the reference, scale and length within 30 %."""
+        law = np.abs(vector[: len(self.knots)])
+        return bool(np.all(law < 12.0) and np.all(np.isfinite(vector)) and np.all(np.abs(vector[-2:]) < 0.3))
 
 
-def start(test: MeasuredTest, facts: Facts, *, knots: int, elements: int, straight: bool = False) -> tuple[Base, Array]:
+def start(
+    test: MeasuredTest, facts: Facts, *, knots: int, elements: int, smoothness: float, straight: bool = False
+) -> tuple[Base, Array]:
     """Base model and first guess: a constant stiffness by regression of the photographed curvature on the moment P y.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
@@ -133,14 +153,14 @@ def start(test: MeasuredTest, facts: Facts, *, knots: int, elements: int, straig
     if not slope > 0.0:  # a straight, force-free cable or a force of the wrong sign: any positive stiffness will do
         slope, rest = np.ptp(K) / max(float(np.max(np.abs(m))), 1e-30), 0.0
     reach = max(float(np.quantile(K, 0.995)) - rest, 0.2 * facts.curvature_scale)
-    base = Base(
+    return Base(
         knots=place_knots(0.0, reach, knots) if knots > 2 else np.linspace(0.0, reach, knots),
         stiffness=float(1.0 / slope),
         length=test.length,
         scale_std=max(test.scale_std, 1e-7),
         length_std=max(test.length_std / test.length, 1e-7),
         elements=elements,
+        roughness=smoothness,
+        first=float(rest),
         straight=straight,
     )
-    vector = np.r_[np.ones(max(knots, 1)), [] if straight else [rest], 0.0, 0.0]
-    return base, vector

@@ -18,6 +18,7 @@ from pipeline.diagnosis.presentation import present
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.verdict import credible_set, probabilities
 from pipeline.diagnosis.workbench import Workbench, prepare, scored, with_finer_law
+from pipeline.identify import Identification
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -53,15 +54,15 @@ class Conclusion:
 
 
 def diagnose(
-    test: MeasuredTest, identification: Any, settings: DiagnosisSettings | None = None
+    test: MeasuredTest, identification: Identification | None, settings: DiagnosisSettings | None = None
 ) -> tuple[DiagnosisPart, tuple[Finding, ...]]:
     """Diagnose a measured test.
 
     Parameters
     ----------
     test : MeasuredTest
-    identification : pipeline.identify.Identification or None
-        Its estimate chose the number of control points.
+    identification : Identification or None
+        Its inverse estimate chose the number of control points.
     settings : DiagnosisSettings or None
 
     Returns
@@ -87,11 +88,10 @@ def diagnose(
     return present(bench, conclusion, settings), faults.findings
 
 
-def chosen_knots(identification: Any, settings: DiagnosisSettings) -> int:
-    """Number of control points the identification chose, or the default."""
-    law = getattr(getattr(identification, "estimate", None), "characteristic", None)
-    count = settings.knots if law is None else len(law.knots)
-    return int(np.clip(count, 3, settings.knots_most))
+def chosen_knots(identification: Identification | None, settings: DiagnosisSettings) -> int:
+    """Number of control points: that of the identification, within what leaves causes visible, or the default."""
+    law = None if identification is None else identification.inverse.characteristic
+    return settings.knots if law is None else int(np.clip(len(law.knots), 3, settings.knots + 1))
 
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
@@ -99,11 +99,7 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     if bench.largest <= bench.limit:
         left = _left_over(bench, bench.base, settings)
         return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
-    refitted = [
-        refit_one(bench.observation, bench.base, bench.suspicion, cause, settings)
-        for cause in candidates(bench.suspicion, settings)
-    ]
-    singles = sorted((e for e in refitted if e is not None and e.gain > 0.0), key=lambda e: -e.gain)
+    singles = _refitted(bench, settings)
     if not singles:
         return Conclusion([], [], 0, None, _left_over(bench, bench.base, settings), True)
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
@@ -120,6 +116,17 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     left = _left_over(bench, accepted.fitted, settings)
     alien = left.p_value < settings.alien_false_alarm and left.excess > settings.explained_share * accepted.gain
     return Conclusion(singles, chance, len(members), accepted, left, alien)
+
+
+def _refitted(bench: Workbench, settings: DiagnosisSettings) -> list[Explanation]:
+    """All suspects refitted that remove anything, the best first."""
+    found: list[Explanation] = []
+    for cause in candidates(bench.suspicion, settings):
+        rival = min((e.fitted.chi2 for e in found), default=np.inf)
+        explanation = refit_one(bench.observation, bench.base, bench.suspicion, cause, settings, rival=rival)
+        if explanation is not None and explanation.gain > 0.0:
+            found.append(explanation)
+    return sorted(found, key=lambda e: -e.gain)
 
 
 def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:

@@ -59,21 +59,33 @@ def candidates(suspicion: Suspicion, settings: DiagnosisSettings) -> list[int]:
 
 
 def refit_one(
-    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, settings: DiagnosisSettings
+    observation: Observation,
+    base: Fit,
+    suspicion: Suspicion,
+    cause: int,
+    settings: DiagnosisSettings,
+    *,
+    rival: float = np.inf,
 ) -> Explanation | None:
-    """Fit the model with one cause in it; None where it cannot be simulated or has no admissible amount."""
+    """Fit the model with one cause in it; None where it cannot be simulated or has no admissible amount.
+
+    ``rival`` is the chi-square another cause has reached: one that stays far above it after its first fit is not tried
+    from other starts and with further forms.
+    """
+    hopeless = rival + settings.refit_least + settings.hopeless * base.chi2
     own = suspicion.of(cause)
     ranked = own[np.argsort(-suspicion.statistic[own], kind="stable")]
     best: Fit | None = None
     for direction in ranked[:2]:
-        if best is not None and suspicion.statistic[direction] < 0.8 * suspicion.statistic[ranked[0]]:
+        weaker = suspicion.statistic[direction] < 0.8 * suspicion.statistic[ranked[0]]
+        if best is not None and (weaker or best.chi2 > hopeless):
             break
-        found = _fit_terms(observation, base, suspicion, (int(direction),), settings)
+        found = _fit_terms(observation, base, suspicion, (int(direction),), settings, hopeless=hopeless)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
         return None
-    if suspicion.causes[cause].combines:
+    if suspicion.causes[cause].combines and best.chi2 < hopeless:
         best = _with_more_forms(observation, best, suspicion.causes[cause].name, suspicion, settings)
     return _explanation((cause,), base, best, suspicion)
 
@@ -128,36 +140,46 @@ def _fit_terms(
     settings: DiagnosisSettings,
     *,
     amounts: tuple[float, ...] | None = None,
+    hopeless: float = np.inf,
 ) -> Fit | None:
     """Fit with the given directions as terms, from the linear estimate, or from less of it where that fails."""
     terms = tuple(suspicion.terms[k] for k in directions)
     extension = Extension(base.extension.base, base.extension.facts, (*base.extension.terms, *terms))
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
-    for share in (1.0, 0.3, 0.05):
-        tried = []
-        for term, amount in zip(terms, amounts, strict=True):
-            limit = 5.0 * term.cause.plausible(base.extension.facts)
-            value = float(np.clip(share * amount, -limit, limit))
-            tried.append(max(value, 0.0) if term.cause.sign > 0 else value)
+    best: Fit | None = None
+    freedom = len(base.residual) - extension.size
+    # without a photo of the force-free cable K0 has a second, false valley: further starts lie on both sides of it
+    shift = 0.1 * base.extension.facts.curvature_scale
+    guesses = [base.extension.base.neutral(bend=bend) for bend in (shift, -shift)]
+    starts = [(1.0, base.vector), (0.3, base.vector)]
+    starts += [(1.0, guess) for guess in guesses if len(guess) == len(base.vector)]
+    for share, vector in starts:
+        if best is not None and (share < 1.0 or not settings.fits * freedom <= best.chi2 < hopeless):
+            continue  # a further start is worth its time only where the first did not end at the noise
         found = fit(
             observation,
             extension,
-            _extended_start(base, extension, tuple(tried)),
+            _start(extension, vector, terms, amounts, share),
             iterations=settings.iterations,
             tolerance=settings.tolerance,
             near=base.run,
         )
-        if found.run.prediction is not None:
-            return found
-    return None
+        if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
+            best = found
+    return best
 
 
-def _extended_start(base: Fit, extension: Extension, amounts: tuple[float, ...]) -> np.ndarray:
-    """Vector of ``extension``, which adds terms to the fitted model ``base``."""
-    parts = [base.vector]
-    for term, amount in zip(extension.terms[len(base.extension.terms) :], amounts, strict=True):
-        parts.append(np.r_[amount, [getattr(term.variant, name) for name in term.variant.tuned]])
+def _start(
+    extension: Extension, vector: np.ndarray, added: tuple[Term, ...], amounts: tuple[float, ...], share: float
+) -> np.ndarray:
+    """Start vector: that of the fitted model, then the added terms with a share of their amounts, held to sane sizes."""
+    parts = [vector]
+    for term, amount in zip(added, amounts, strict=True):
+        limit = 5.0 * term.cause.plausible(extension.facts)
+        value = float(np.clip(share * amount, -limit, limit))
+        value = max(value, 0.0) if term.cause.sign > 0 else value
+        parts.append(np.r_[value, [getattr(term.variant, name) for name in term.variant.tuned]])
     return np.concatenate(parts)
 
 

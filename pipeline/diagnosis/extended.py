@@ -30,8 +30,8 @@ def curve(fitted: Fit, *, points: int) -> Curve:
     low, high = visited(fitted)
     K = np.linspace(max(low, K0), high, points)
     count = len(law.knots)
-    by_tangent = base.stiffness * law.tangent_by_ordinates(K, K0)
-    by_moment = base.stiffness * law.moment_by_ordinates(K, K0)
+    by_tangent = law.tangent_by_ordinates(K, K0) * law.ordinates  # the parameters are logarithms
+    by_moment = law.moment_by_ordinates(K, K0) * law.ordinates
     used = list(range(count))
     if (bend := base.pre_curvature_index) is not None:
         step = 1e-5 * (high - K0)

@@ -9,6 +9,7 @@ that cannot start says so in ``Fit.advice``.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -54,10 +55,11 @@ class Extension:
         """Number of parameters."""
         return len(self.base.names) + sum(1 + len(term.variant.tuned) for term in self.terms)
 
-    @property
-    def prior_std(self) -> Array:
-        """Standard deviations (p,) of the priors."""
-        return np.r_[self.base.prior_std, np.full(self.size - len(self.base.names), np.inf)]
+    @cached_property
+    def prior(self) -> Array:
+        """Rows (m, p) of prior knowledge, of unit variance."""
+        rows = self.base.prior
+        return np.hstack([rows, np.zeros((len(rows), self.size - rows.shape[1]))])
 
     @property
     def steps(self) -> Array:
@@ -147,17 +149,13 @@ class Fit:
         return float(self.vector[at]), float(np.sqrt(self.covariance[at, at]))
 
 
-def prior_rows(vector: Array, std: Array) -> Array:
-    """Residual rows of the parameters with prior knowledge (all priors are centred at zero)."""
-    known = np.isfinite(std)
-    return -vector[known] / std[known]
-
-
-def whole_residual(observation: Observation, prediction: Prediction | None, vector: Array, std: Array) -> Array | None:
-    """Residual with prior rows; None where the model has no equilibrium."""
+def whole_residual(
+    observation: Observation, prediction: Prediction | None, vector: Array, prior: Array
+) -> Array | None:
+    """Residual with the rows of prior knowledge at the end; None where the model has no equilibrium."""
     if prediction is None:
         return None
-    return np.r_[residual(observation, prediction), prior_rows(vector, std)]
+    return np.r_[residual(observation, prediction), -prior @ vector]
 
 
 def sensitivities(observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run) -> Array:
@@ -167,8 +165,8 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     causes by difference quotients with warm starts; a quotient that runs into a model without equilibrium is taken to
     the other side.
     """
-    std = extension.prior_std
-    at_here = whole_residual(observation, here.prediction, vector, std)
+    prior = extension.prior
+    at_here = whole_residual(observation, here.prediction, vector, prior)
     assert at_here is not None and here.bare is not None
     columns = _base_columns(observation, extension, vector, here, at_here)
     first = len(columns)
@@ -180,7 +178,7 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
             if not extension.admissible(trial):
                 continue
             there = run(extension.model(trial, of=base_model), extension.facts, near=here)
-            value = whole_residual(observation, there.prediction, trial, std)
+            value = whole_residual(observation, there.prediction, trial, prior)
             if value is not None:
                 column = (at_here - value) / signed
                 break
@@ -198,7 +196,7 @@ def _base_columns(
     by = base_derivatives(here, facts, names)
     law = model.bending.characteristic
     # where a cause has put further control points into the law, a base ordinate moves them along the base spline
-    share = base.stiffness * base.ordinate_shares(law.knots)
+    share = base.law_directions(vector, law.knots)
     count = share.shape[0]
     change = np.zeros((count + (0 if base.straight else 1) + 1, len(base.names) - 1))
     change[:count, : share.shape[1]] = share
@@ -207,7 +205,7 @@ def _base_columns(
     change[-1, -1] = -model.bending.length / (1.0 + vector[len(base.names) - 1])
     by = tuple(_combined(d, change) for d in by)
     columns = []
-    std, steps = extension.prior_std, extension.steps
+    prior, steps = extension.prior, extension.steps
     for j in range(len(base.names)):
         trial = vector.copy()
         trial[j] += steps[j]
@@ -215,7 +213,7 @@ def _base_columns(
             shown = observed(bare, replace(model, observers=(base.observer(trial), *model.observers[1:])), facts)
         else:
             shown = observed(moved(bare, by, j if base.names[j] != "length" else -1, float(steps[j])), model, facts)
-        value = whole_residual(observation, shown, trial, std)
+        value = whole_residual(observation, shown, trial, prior)
         assert value is not None
         columns.append((at_here - value) / steps[j])
     return columns
@@ -260,52 +258,64 @@ def fit(
     Fit
         ``converged`` is False if the iterations ran out or the start has no equilibrium.
     """
-    std = extension.prior_std
+    prior = extension.prior
     vector = np.asarray(start, dtype=float)
     base_model = extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), extension.facts, near=near)
-    value = whole_residual(observation, here.prediction, vector, std)
+    value = whole_residual(observation, here.prediction, vector, prior)
     if value is None:
         empty = np.zeros((0, extension.size))
         return Fit(extension, vector, here, np.zeros(0), empty, False, here.advice)
     jacobian = sensitivities(observation, extension, vector, base_model, here)
-    converged = False
+    converged, damping = False, 0.0
     for _ in range(iterations):
-        step, expected = _step(jacobian, value, cutoff)
-        if expected < tolerance:
+        scaled = _Scaled(jacobian, value, cutoff)
+        if scaled.expected < tolerance:
             converged = True
             break
         accepted = None
-        for _ in range(8):
-            trial = _inside(extension, vector, vector + step)
+        for _ in range(7):
+            trial = _inside(extension, vector, vector + scaled.step(damping))
             trial_base = extension.base_model(trial)
             there = run(extension.model(trial, of=trial_base), extension.facts, near=here)
-            found = whole_residual(observation, there.prediction, trial, std)
-            if found is not None and found @ found < value @ value:
+            found = whole_residual(observation, there.prediction, trial, prior)
+            if found is not None and found @ found < value @ value and extension.admissible(trial):
                 accepted = (trial, there, found, trial_base)
                 break
-            step = 0.4 * step
+            damping = max(10.0 * damping, 1e-4)
         if accepted is None:
-            converged = expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
+            converged = scaled.expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
         fall = float(value @ value - accepted[2] @ accepted[2])
         vector, here, value, base_model = accepted
         jacobian = sensitivities(observation, extension, vector, base_model, here)
-        if fall < tolerance:
+        if fall < tolerance and damping == 0.0:
             converged = True
             break
+        damping = 0.1 * damping if damping > 1e-4 else 0.0
     return Fit(extension, vector, here, value, jacobian, converged, "" if converged else "the fit did not settle")
 
 
-def _step(jacobian: Array, value: Array, cutoff: float) -> tuple[Array, float]:
-    """Gauss-Newton step and the fall of chi-square the linear model expects of it."""
-    size = np.linalg.norm(jacobian, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    left, weight, right = np.linalg.svd(jacobian / size, full_matrices=False)
-    kept = weight > cutoff * weight[0]
-    along = left.T[kept] @ value
-    step = right.T[:, kept] @ (along / weight[kept])
-    return step / size, float(along @ along)
+class _Scaled:
+    """Levenberg-Marquardt steps from one linearisation; columns of unit length, so ``damping`` is a pure number."""
+
+    def __init__(self, jacobian: Array, value: Array, cutoff: float) -> None:
+        size = np.linalg.norm(jacobian, axis=0)
+        self.size = np.where(size > 0.0, size, 1.0)
+        left, weight, self.right = np.linalg.svd(jacobian / self.size, full_matrices=False)
+        self.kept = weight > cutoff * weight[0]
+        self.weight, self.along = weight, np.where(self.kept, left.T @ value, 0.0)
+
+    @property
+    def expected(self) -> float:
+        """Fall of chi-square the linear model promises for the whole step."""
+        return float(self.along @ self.along)
+
+    def step(self, damping: float) -> Array:
+        """Step, held back where the data hardly tell the direction (relative weight below ``damping``)."""
+        weight = np.where(self.kept, self.weight, 1.0)
+        filtered = weight / (weight**2 + (damping * self.weight[0]) ** 2)
+        return np.asarray(self.right.T @ (filtered * self.along) / self.size)
 
 
 def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
@@ -317,5 +327,5 @@ def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
         for j, name in enumerate(term.variant.tuned):
             clipped[at + 1 + j] = np.clip(clipped[at + 1 + j], *term.variant.range(name))
     count = len(extension.base.knots)
-    clipped[:count] = np.maximum(clipped[:count], 0.2 * vector[:count])
+    clipped[:count] = np.clip(clipped[:count], vector[:count] - 1.5, vector[:count] + 1.5)
     return clipped

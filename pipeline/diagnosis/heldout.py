@@ -72,7 +72,7 @@ def _refit(inside: Observation, model: Fit, settings: DiagnosisSettings) -> Fit:
 def _fold(observation: Observation, group: list[int], before: Fit, after: Fit) -> Fold:
     rows = np.isin(observation.rows.step, group)
     residuals = [
-        whole_residual(observation, model.run.prediction, model.vector, model.extension.prior_std)
+        whole_residual(observation, model.run.prediction, model.vector, model.extension.prior)
         for model in (before, after)
     ]
     jacobian = sensitivities(

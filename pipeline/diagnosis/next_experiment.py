@@ -89,7 +89,7 @@ def _separation(bench: Workbench, probable: Fit, rival: Fit, protocol: Protocol,
         other = replace(rival.extension, facts=facts, turned=turned)
         base_model = other.base_model(rival.vector)
         shown = run(other.model(rival.vector, of=base_model), facts)
-        value = whole_residual(observation, shown.prediction, rival.vector, other.prior_std)
+        value = whole_residual(observation, shown.prediction, rival.vector, other.prior)
         if value is None:
             return 0.0
         values.append(value)

@@ -113,7 +113,7 @@ def direction(observation: Observation, fitted: Fit, term: Term, *, amount: floa
     for step in trials:
         model = term.cause.apply(fitted.run.model, step, term.variant, facts)
         shown = run(model, facts, near=fitted.run).prediction
-        there = whole_residual(observation, shown, fitted.vector, fitted.extension.prior_std)
+        there = whole_residual(observation, shown, fitted.vector, fitted.extension.prior)
         if there is not None:
             return (fitted.residual - there) / step
     return np.zeros_like(fitted.residual)

@@ -92,8 +92,8 @@ def prepare(
     test = faults.test
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
-    base, vector = start(test, facts, knots=knots, elements=settings.grid, straight=straight)
-    fitted = _robust_fit(observation, base, facts, vector, settings)
+    base = start(test, facts, knots=knots, elements=settings.grid, smoothness=settings.roughness, straight=straight)
+    fitted = _robust_fit(observation, base, facts, settings)
     if fitted.run.prediction is None:
         return fitted.advice
     if observation.photos:
@@ -154,29 +154,24 @@ def _fit(
     )
 
 
-def _robust_fit(observation: Observation, base: Base, facts: Facts, vector: Array, settings: DiagnosisSettings) -> Fit:
+def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
     """The best of several starts: a base model that is wrong has false minima, and one start may have no equilibrium."""
     best: Fit | None = None
-    count = len(base.knots)
-    for stiffness, bend in ((1.0, 0.0), (1.0, 0.3), (0.5, 0.0), (2.0, -0.3)):
-        trial = vector.copy()
-        trial[:count] *= stiffness
-        if (index := base.pre_curvature_index) is not None:
-            trial[index] += bend * facts.curvature_scale
+    shift = 0.1 * facts.curvature_scale
+    freedom = len(observation.rows.kind) - len(base.names)
+    for stiffness, bend in ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift)):
         found = fit(
             observation,
             Extension(base, facts),
-            trial,
+            base.neutral(stiffness=stiffness, bend=bend),
             iterations=2 * settings.iterations,
             tolerance=settings.tolerance,
         )
-        good = found.run.prediction is not None
-        if best is None or (good and (best.run.prediction is None or found.chi2 < best.chi2)):
+        if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
-        if good and found.converged and stiffness == 1.0:
+        if best is not None and best.chi2 < settings.fits * freedom:
             break
-    assert best is not None
-    return best
+    return found if best is None else best
 
 
 def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> bool:
@@ -194,7 +189,7 @@ def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
     K0 = base.pre_curvature(fitted.vector)
     reach = max(float(step.kappa.max()) for step in fitted.run.steps) - K0
     knots = place_knots(0.0, reach, count)
-    ordinates = np.maximum(law.f(knots), 0.05 * float(np.max(law.ordinates))) / base.stiffness
+    ordinates = np.log(np.maximum(law.f(knots), 0.02 * float(np.max(law.ordinates))) / base.stiffness)
     extension = replace(fitted.extension, base=replace(base, knots=knots))
     return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]
 

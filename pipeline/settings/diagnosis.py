@@ -69,6 +69,9 @@ class DiagnosisSettings(BaseModel):
         30.0, description="chi-square a cause may always fall short of the best and still be refitted"
     )
     refit_most: int = Field(12, description="causes refitted at most, best linear scores first; time")
+    hopeless: float = Field(
+        0.02, description="share of the base chi-square a refit may lie above the best one and still be worked on; time"
+    )
     shapes_most: int = Field(3, description="directions of one cause that are combined in a refit at most")
     shape_gain: float = Field(
         16.0, description="chi-square by which a further direction of the same cause must pay (4 sigma)"
@@ -102,8 +105,16 @@ class DiagnosisSettings(BaseModel):
         16.0,
         description="chi-square that another control point must remove, beyond what any cause removes, to be taken",
     )
+    roughness: float = Field(
+        10.0,
+        description="prior size of d^2 log f / dt^2 over the control points; a law that falls sixfold by stick and slip has 8",
+    )
     grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
-    iterations: int = Field(12, description="Gauss-Newton steps at most; three to five are usual")
+    fits: float = Field(
+        1.4,
+        description="reduced chi-square; a refit above it is tried from a second start, a law of constant stiffness",
+    )
+    iterations: int = Field(15, description="Gauss-Newton steps at most; three to five are usual")
     tolerance: float = Field(1e-3, description="change of chi-square at which a fit is done; 1 is one sigma")
 
     # data faults

@@ -16,7 +16,6 @@ from pipeline.diagnosis.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
-
 ROUND = 8
 """Elements of a friction that slips gradually: the corner is then round to 1/8 of its width."""
 
