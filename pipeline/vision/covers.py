@@ -191,8 +191,8 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: B
 def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingSettings) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
-    Strategy: radial profiles, twice (the second time from the fitted centre and radius); the edge is the centroid of
-    the slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight.
+    Strategy: radial profiles, each time from the centre and radius fitted before; the edge is the centroid of the
+    slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight.
     """
     radius = expected.px
     count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
@@ -200,17 +200,19 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingS
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, settings.search_radii * radius)
     parameters = np.array([*center, radius])
-    for span_now in (span, max(3.0, 0.5 * span), max(3.0, 0.5 * span)):
-        edge, trust = _radial_edges(photo, parameters, ray, span_now, settings)
-        fitted = _robust_circle(parameters, ray, edge, trust, span_now, expected)
+    # A third of the rays finds the circle, all of them measure it, twice: the first guess may be some pixels off.
+    for span_now, every in ((span, 3), (0.5 * span, 1), (0.5 * span, 1)):
+        rays, reach = ray[::every], max(3.0, span_now)
+        edge, trust = _radial_edges(photo, parameters, rays, reach, settings)
+        fitted = _robust_circle(parameters, rays, edge, trust, reach, expected)
         if fitted is None:
             return None
-        parameters, covariance = fitted
+        before, (parameters, covariance) = parameters, fitted
     off = np.hypot(*(parameters[:2] - center))
     if off > 0.5 * radius or abs(parameters[2] - radius) > max(4.0 * expected.std * radius, 1.0):
         return None
-    edge, _ = _radial_edges(photo, parameters, ray, span, settings)
-    rim = float(np.mean(np.abs(edge) < max(0.75, settings.rim_tolerance * radius)))
+    miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
+    rim = float(np.mean(np.abs(miss) < max(0.75, settings.rim_tolerance * radius)))
     # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
     excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
     std = float(
