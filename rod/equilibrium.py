@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rod.branch import Branch, Start, bow_side, bowed_start
+from rod.branch import Branch, Start, bow, bow_side, bowed_start
 from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.newton import Outcome, Trial, followed, judged, newton
@@ -127,7 +127,8 @@ def _attempts(system: System, start: Start | Equilibrium | None, side: int, bran
     """Ways to the equilibrium, the cheapest first: warm start, bowed guess, path from the force-free shape or guess."""
     first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     if first is not None:
-        yield judged(system, newton(system, first), side)
+        # Where only the path can tell the side, a warm start may keep the one it has; otherwise it is followed.
+        yield judged(system, newton(system, first), side or int(np.sign(bow(system.rod, first.angles))))
     bowed = bowed_start(system, side) if side and system.hold.tip is None else None
     if bowed is not None:
         yield judged(system, newton(system, bowed), side)

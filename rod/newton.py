@@ -22,8 +22,8 @@ from rod.reduction import Balance, System
 STEP_TOLERANCE = 1e-7
 #: Largest residual accepted, relative to EI/L (moments) and L (gaps): rounding of 3200 elements stays below it.
 RESIDUAL_TOLERANCE = 1e-9
-#: Largest turn of an edge in one Newton step, rad; and over one accepted increment without trying shorter ones.
-STEP_LIMIT, INCREMENT_LIMIT = 0.8, 1.2
+#: Largest turn of an edge in one Newton step, and in one accepted increment of a path, rad.
+STEP_LIMIT, INCREMENT_LIMIT = 0.8, 0.8
 ITERATIONS = 25
 #: A path gives up below this share of the way, or after so many Newton steps; a shallow arch (K0 L = 0.002) needs 100.
 SMALLEST_INCREMENT, PATH_STEPS = 2.0**-12, 300
@@ -62,13 +62,14 @@ class Outcome(Enum):
 
 
 class Trial(NamedTuple):
-    """A state found by Newton's method, its residuals, the steps it took, and how that ended."""
+    """A state found by Newton's method, its residuals, the steps it took, how that ended, and the first step (rad)."""
 
     angles: Array
     R: Array
     balance: Balance
     steps: int
     outcome: Outcome
+    first_step: float = 0.0
 
     @property
     def found(self) -> bool:
@@ -83,12 +84,13 @@ def newton(
     angles, R = start.angles, system.hold.reaction(start.reaction)
     moment_scale, length = system.moment_scale, system.rod.length
     balance = _faded(system.balance(angles, R), residual, fade)
-    norm, step = _norm(balance, moment_scale, length), np.inf
+    norm, first_step = _norm(balance, moment_scale, length), 0.0
     for count in range(1, most + 1):
         dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
         step = float(np.abs(dalpha).max())
         if not np.isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
+        first_step = first_step or step
         share = min(1.0, STEP_LIMIT / step) if step else 1.0
         # Friction makes the residual piecewise linear: a step across a kink may overshoot and is then shortened.
         for _ in range(4):
@@ -102,7 +104,7 @@ def newton(
         if not np.isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
-            return Trial(angles, R, balance, count, Outcome.CONVERGED)
+            return Trial(angles, R, balance, count, Outcome.CONVERGED, first_step)
     localised = bool(np.any(balance.tangent <= 0.0))
     return Trial(angles, R, balance, count, Outcome.LIMIT_POINT if localised else Outcome.STALLED)
 
@@ -118,7 +120,9 @@ def followed(system: System, start: Start) -> Trial:
         goal = min(1.0, reached + increment)
         trial = newton(system, Start(here.angles, here.R), fade=1.0 - goal, residual=begin, most=12)
         steps += trial.steps
-        near = float(np.abs(trial.angles - here.angles).max()) < INCREMENT_LIMIT
+        turned = float(np.abs(trial.angles - here.angles).max())
+        # The first step is the tangent of the path: who ends far beyond it may have left the branch.
+        near = turned < min(INCREMENT_LIMIT, 2.0 * trial.first_step + STEP_TOLERANCE)
         if trial.found and near and system.excess_negatives(trial.balance) == 0:
             here, reached, increment = trial, goal, 2.0 * increment
         else:

@@ -89,6 +89,31 @@ def test_inertia_of_the_reduced_system_is_that_of_equation_4() -> None:
     assert negative >= 3
 
 
+@pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
+def test_turning_and_shifting_the_world_changes_nothing(turn: float) -> None:
+    V, q = state(simulate(PLAIN, [0.009])[-1])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    places = np.array([V.vertex_index, V.vertex_index + 1])
+    moved = q.copy()
+    moved[places] = rotation @ q[places] + np.array([[0.7], [-0.4]])
+    moved[V.angle_index] += turn
+    assert V.value(moved) == pytest.approx(V.value(q), rel=1e-11)
+    g, g_moved = V.gradient(q), V.gradient(moved)
+    assert np.allclose(g_moved[places], rotation @ g[places], atol=1e-9 * np.abs(g).max())
+    assert np.allclose(g_moved[V.angle_index], g[V.angle_index], atol=1e-9 * np.abs(g).max())
+    assert V.is_minimum(moved, V.free())
+
+
+def test_mirroring_the_world_mirrors_the_energy() -> None:
+    V, q = state(simulate(PLAIN, [0.009])[-1])
+    mirrored = Potential(replace(PLAIN, pre_curvature=-2.0).rod, replace(PLAIN, pre_curvature=-2.0).rod.virgin)
+    other = q.copy()
+    other[V.vertex_index + 1] *= -1.0
+    other[V.angle_index] *= -1.0
+    assert mirrored.value(other) == pytest.approx(V.value(q), rel=1e-12)
+    assert np.allclose(np.abs(mirrored.gradient(other)), np.abs(V.gradient(q)), atol=1e-12)
+
+
 def work(test: BendingTest, displacements: np.ndarray) -> tuple[list[Equilibrium], float]:
     """Equilibria of a path and the work that P does along it, by Simpson's rule on chords."""
     steps = simulate(test, displacements)

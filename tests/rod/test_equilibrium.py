@@ -12,6 +12,8 @@ from rod.discretisation import graded
 from rod.elastica import pinned_linear, uniform_equilibrium
 from rod.equilibrium import Outcome
 from rod.laws import StickSlip
+from rod.reduction import Hold
+from rod.support import Support
 
 #: Where the order of the grid is measured, elongation must stay below the errors of the finest grid.
 RIGID = {"axial_stiffness": 1e13, "shear_stiffness": 1e13}
@@ -202,3 +204,21 @@ def test_controls_are_checked() -> None:
         simulate(replace(test, length=0.0), [0.0])
     with pytest.raises(ValueError, match="no stiffness"):
         simulate(replace(test, characteristic=Characteristic.constant(0.0)), [0.0])
+
+
+def test_grids_and_rods_are_checked() -> None:
+    assert graded(10, 0.5).sum() == pytest.approx(1.0, rel=1e-14)
+    assert graded(11, 0.5)[5] / graded(11, 0.5)[0] == pytest.approx(0.5, rel=0.1)
+    with pytest.raises(ValueError, match="two elements"):
+        graded(1, 0.5)
+    test = table_1("tangent")
+    with pytest.raises(ValueError, match="two positive relative lengths"):
+        simulate(replace(test, elements=np.array([1.0, -0.5, 0.5])), [0.0])
+    with pytest.raises(ValueError, match="only the right end"):
+        simulate(replace(test, left=Support("free")), [0.0])
+    with pytest.raises(ValueError, match="stiffness must be positive"):
+        simulate(replace(test, axial_stiffness=0.0), [0.0])
+    with pytest.raises(ValueError, match="exactly one"):
+        Hold()
+    with pytest.raises(ValueError, match="compliance"):
+        Hold(chord=0.1, compliance=-1.0)

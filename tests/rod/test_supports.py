@@ -149,7 +149,7 @@ def test_imposed_force_against_collocation() -> None:
     held_against(BASE, lambda test: simulate(test, forces=[0.5])[0], force=0.5)
 
 
-@pytest.mark.parametrize("tip", [(0.0, 0.3), (0.4, -0.2), (-0.3, 0.1)])
+@pytest.mark.parametrize("tip", [(0.0, 0.3), (0.4, -0.2), (-0.2, -0.1)])
 def test_cantilever_against_collocation(tip: tuple[float, float]) -> None:
     test = replace(BASE, left=Support("clamp", angle=0.0), right=Support("free"))
     held_against(test, lambda t: solve(t.rod, Hold(tip=tip)), tip=tip)
