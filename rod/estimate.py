@@ -41,6 +41,10 @@ class InverseOutcome(Enum):
         "the data do not fix every parameter; the bands say which part of the characteristic is open: bend further, or "
         "add photos"
     )
+    OPPOSITE_FORCES = (
+        "the curvature falls where the moment P y grows, which no cable does; this usually means that the force log "
+        "counts compression as negative (set rig.force_sign) or that photos and forces are mixed up (check the column image)"
+    )
     NO_DATA = (
         "no loaded step has a photo, so pre-curvature and stiffness cannot be told apart; take photos of the steps"
     )

@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 PARAMETERS = ("ordinates", "pre_curvature", "length", "chord")
 """Of the simulated rod, in the order of the derivatives of `Simulated`."""
 
+LOG_RANGE = 60.0
+"""Of log f_EI, N m^2: what lies beyond, 26 orders of magnitude either way, is a fit on its way to nowhere."""
+
 CHORD_OF_ARC = 1e-2
 """How sharply the chord of a force-free photo is that of the arc, in standard deviations of an axis: almost exactly."""
 
@@ -98,6 +101,8 @@ class Evaluation:
 
 def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ()) -> Evaluation:
     """Residuals and jacobian at the unknowns `u`; `starts` are the equilibria of a neighbour."""
+    if np.any(np.abs(u[: model.knots.size]) > LOG_RANGE):
+        return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=Outcome.LIMIT_POINT)
     imposed = [_imposed_chord(model, u, d) for d in model.data]
     bent = [k for k, d in enumerate(model.data) if not d.at_rest]
     shapes = {k: _arc(model, u) for k, d in enumerate(model.data) if d.at_rest}

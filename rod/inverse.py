@@ -36,6 +36,9 @@ __all__ = ["Estimate", "InverseOptions", "InverseOutcome", "estimate"]
 
 Array = NDArray[np.float64]
 
+OPPOSITE = -0.5
+"""Correlation of curvature and moment below which forces contradict photos; noise brings it to zero, not below."""
+
 
 def estimate(
     test: MeasuredTest, *, start: tuple[float, float] | None = None, options: InverseOptions | None = None
@@ -59,7 +62,10 @@ def estimate(
     data = step_data(test, blocks=options.blocks)
     if not any(d.midline is not None and not d.at_rest for d in data):
         return Estimate(InverseOutcome.NO_DATA)
-    line = straight_line(data)
+    moments, curvatures = moments_and_curvatures(data)
+    if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
+        return Estimate(InverseOutcome.OPPOSITE_FORCES)
+    line = straight_line(moments, curvatures)
     fits: list[Fit] = []
     for begin in [line if start is None else start, *_further_starts(line, test.length)]:
         fits.append(first_fit(test, data, begin, line, options))
@@ -79,17 +85,21 @@ def estimate(
     return replace(result, evidence=evidence, iterations=evaluations + sum(f.evaluations for f in fits))
 
 
-def straight_line(data: tuple[StepData, ...]) -> tuple[float, float]:
-    """Constant EI (N m^2) and K0 (1/m) by a straight line of the photos' curvature over P y: a rough start only."""
+def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:
+    """P y (N m) and curvature (1/m) wherever a photo shows the cable: for a rough start only."""
     moments, curvatures = [], []
     for d in data:
         shape = d.step.shape
         if d.midline is not None and shape is not None:
             moments.append(np.zeros(int(shape.seen.sum())) if d.at_rest else d.step.force * shape.y[shape.seen])
             curvatures.append(shape.kappa[shape.seen])
-    m, K = np.concatenate(moments), np.concatenate(curvatures)
+    return np.concatenate(moments), np.concatenate(curvatures)
+
+
+def straight_line(m: Array, K: Array) -> tuple[float, float]:
+    """Constant EI (N m^2) and K0 (1/m) by a straight line of curvature over moment."""
     slope, K0 = np.polyfit(m / np.abs(m).max(), K, 1)
-    # Forces of the wrong sign give a negative slope; the size is still a start, and the misfit will tell.
+    # Noise alone may turn the slope around; its size is still a start.
     return float(np.abs(m).max() / max(abs(slope), 1e-3 * np.ptp(K))), float(K0)
 
 

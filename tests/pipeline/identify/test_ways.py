@@ -1,0 +1,180 @@
+"""Both ways side by side on a test with known truth: comparison, branches, parts of the result, findings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.identify import identification_parts, identify_test
+from pipeline.identify.agreement import Characterised, cross_covariance, rest_curvature
+from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
+from pipeline.result import Result, SpecimenPart, from_json, to_json
+from rod.inverse import InverseOutcome
+
+
+def with_steps(test, change):
+    return replace(test, steps=tuple(change(step) for step in test.steps))
+
+
+def codes(findings):
+    return {finding.code for finding in findings}
+
+
+def test_nothing_is_found_where_nothing_is_wrong(found):
+    assert found.findings == ()
+    assert found.agreement.compatible
+    assert found.agreement.hints == ()
+
+
+def test_three_sources_of_pre_curvature_agree_with_the_truth(found, law):
+    sources = pre_curvature_sources(found)
+    assert set(sources) == {"photo", "balance", "inverse"}
+    for value, std in sources.values():
+        assert abs(value - law.K0) < 4 * std
+    assert sources["photo"][1] < 0.01
+
+
+def test_both_ways_are_compared_on_the_range_both_visited(found):
+    low, high = found.agreement.range_per_m
+    assert low == pytest.approx(max(found.inverse.kappa[0], found.balance.kappa[0]))
+    assert high == pytest.approx(min(found.inverse.kappa[-1], found.balance.kappa[-1]))
+    assert 0 < found.agreement.rms_relative <= found.agreement.max_relative
+
+
+def test_shared_errors_explain_most_of_both_bands(found, measured):
+    one, two = Characterised.of_inverse(found.inverse), Characterised.of_balance(found.balance)
+    grid = one.common_grid(two)
+    first, second = one.contraction(grid), two.contraction(grid)
+    own = np.diag(first @ cross_covariance(measured, one.gains, one.gains) @ first.T)
+    assert np.all(own < 1.02 * np.diag(first @ one.log_covariance @ first.T))
+    both = np.diag(first @ cross_covariance(measured, one.gains, two.gains) @ second.T)
+    # Near the rest curvature the band is mostly what no data tell; in the other two thirds it is the data's noise.
+    assert np.all(both[1:] > 0.5 * own[1:])
+
+
+def test_a_second_measurement_of_the_force_scale_is_no_disagreement(measured, settings):
+    """Forces are common to both ways: wrong by 10 % throughout they do not make them differ."""
+    wrong = with_steps(measured, lambda s: replace(s, force=1.1 * s.force))
+    assert identify_test(wrong, settings).agreement.compatible
+
+
+def test_curvature_wrong_in_the_smooth_curve_alone_is_a_disagreement(measured, settings):
+    """Only the balance way reads the curvature; the inverse way reads the raw midline."""
+
+    def stiffer(step):
+        kappa = 2.0 + 0.93 * (step.shape.kappa - 2.0)
+        return replace(step, shape=replace(step.shape, kappa=kappa))
+
+    result = identify_test(with_steps(measured, stiffer), settings)
+    assert not result.agreement.compatible
+    assert len(result.agreement.hints) >= 3
+    assert "identify/agreement" in codes(result.findings)
+
+
+def test_branches_are_fitted_apart_and_together(found, law):
+    assert set(found.branches) == {"loading", "unloading"}
+    assert {d.step.branch for d in found.branches["loading"].model.data} == {"mounted", "loading"}
+    assert {d.step.branch for d in found.branches["unloading"].model.data} == {"unloading"}
+    assert found.branches_p > 1e-3
+    assert {d.step.branch for d in found.inverse.model.data} == {"mounted", "loading", "unloading"}
+
+
+def test_branches_that_differ_are_named(measured, settings):
+    lower = with_steps(measured, lambda s: replace(s, force=0.8 * s.force) if s.branch == "unloading" else s)
+    result = identify_test(lower, settings)
+    assert result.branches_p < 1e-6
+    assert "identify/branches" in codes(result.findings)
+
+
+def test_no_branches_without_unloading(measured, settings):
+    forth = replace(measured, steps=tuple(s for s in measured.steps if s.branch != "unloading"))
+    result = identify_test(forth, settings)
+    assert result.branches == {}
+    assert result.branches_p is None
+
+
+def test_photo_of_the_force_free_cable_gives_its_curvature(measured, law):
+    value, std = rest_curvature(measured)
+    assert abs(value - law.K0) < 4 * std
+    assert rest_curvature(replace(measured, steps=measured.steps[1:])) is None
+
+
+def test_chord_against_displacement(measured, settings):
+    assert list(chord_findings(measured, settings)) == []
+    short = with_steps(measured, lambda s: replace(s, displacement=1.02 * s.displacement))
+    (finding,) = chord_findings(short, settings)
+    assert finding.code == "identify/chord-displacement"
+    assert "97.9%" in finding.message or "98.0%" in finding.message  # 1 / 1.02 but for the photos' noise
+
+
+def test_wrong_zero_of_displacement_leaves_the_result_alone(measured, settings, found):
+    moved = with_steps(measured, lambda s: replace(s, displacement=s.displacement + 1e-3))
+    assert np.allclose(identify_test(moved, settings).inverse.tangent, found.inverse.tangent, rtol=1e-9)
+
+
+def test_tension_and_a_load_cell_off_zero_are_told(measured, settings):
+    pulled = with_steps(measured, lambda s: replace(s, force=-s.force))
+    assert "identify/force-sign" in codes(force_findings(pulled, settings))
+    off = with_steps(measured, lambda s: replace(s, force=s.force + 20 * s.force_std))
+    assert codes(force_findings(off, settings)) == {"identify/force-zero"}
+
+
+def test_tension_ends_in_outcomes_not_in_a_crash(measured, settings):
+    result = identify_test(with_steps(measured, lambda s: replace(s, force=-s.force)), settings)
+    assert {"identify/balance-no-moment", "identify/inverse-opposite-forces"} <= codes(result.findings)
+    assert "identify/force-sign" in codes(result.findings)
+    identification_parts(result)
+
+
+def test_without_photos_both_ways_say_what_to_do(measured, settings):
+    blind = with_steps(measured, lambda s: replace(s, shape=None, chord=None, chord_std=None))
+    result = identify_test(blind, settings)
+    assert result.inverse.outcome is InverseOutcome.NO_DATA
+    assert {"identify/inverse-no-data", "identify/balance-no-photo"} <= codes(result.findings)
+    parts = identification_parts(result)
+    assert not parts.inverse.converged
+    assert parts.inverse.curve is None
+    assert parts.agreement.compatible is None
+    assert len(parts.steps) == len(measured.steps)
+
+
+def test_parts_survive_the_way_through_json(found, measured):
+    parts = identification_parts(found)
+    result = Result(
+        status="measured",
+        specimen=SpecimenPart(id="x", length_m=0.2, diameter_m=4e-3, folder="x", moving_bearing="left"),
+        steps=parts.steps,
+        inverse=parts.inverse,
+        balance=parts.balance,
+        agreement=parts.agreement,
+    )
+    assert from_json(to_json(result)) == result
+    assert [s.force_N for s in parts.steps] == [s.force for s in measured.steps]
+    assert parts.steps[0].force_fit_N == 0.0
+
+
+def test_factor_of_the_band_gives_the_band(found):
+    curve = identification_parts(found).inverse.curve
+    factor = np.array(curve.tangent_factor_Nm2)
+    assert np.allclose(np.sqrt((factor**2).sum(axis=1)), curve.tangent_std_Nm2, rtol=2e-3)
+
+
+def test_residual_figures_are_those_of_the_noise(found, measured):
+    misfit = identification_parts(found).inverse.misfit
+    # Sections: 0.05 px at 11 px/mm, and a block mean of two correlation lengths keeps about two thirds of it.
+    assert 2e-6 < misfit.shape_rmse_m < 5e-6
+    assert misfit.force_rmse_N < 3 * max(s.force_std for s in measured.steps)
+    assert misfit.chi2 / misfit.degrees_of_freedom == pytest.approx(1.0, abs=0.25)
+    assert 0 < misfit.curvature_rmse_per_m < 1.0
+
+
+def test_photo_residuals_stand_at_the_points_of_the_centerline(found, measured):
+    photos = identification_parts(found).photos
+    for step in measured.steps:
+        residual = np.array(photos[step.step].shape_residual_m)
+        seen = step.shape.seen
+        assert residual.size == step.shape.s.size
+        z = residual[seen] / np.array(photos[step.step].shape_residual_std_m)[seen]
+        assert np.abs(z).max() < 6
+        fitted = np.array(photos[step.step].kappa_fit_per_m)
+        assert np.abs(fitted - step.shape.kappa)[step.shape.s.size // 2] < 0.2
