@@ -32,6 +32,34 @@ class CurveSettings(BaseModel):
         description="of the radius; part of the ground used for an edge: more brings more of the ground's texture"
         " (0.45 raised the error of kappa on brushed metal by half), less only more pixel noise",
     )
+    edge_window_blurs: float = Field(
+        2.5, gt=0, description="blurs; least part of sheath and ground on each side: beyond it the edge's tail is over"
+    )
+    pixel_outlier: float = Field(
+        4.0,
+        gt=0,
+        description="standard deviations from the profile of the neighbourhood: letters, dirt; Gaussian noise passes it"
+        " once in 16,000; at 1.5 times it a pixel of a section has no weight",
+    )
+    plain_step: float = Field(
+        0.1, ge=0, description="of the edge's step; differences up to it are texture or slow light, not letters"
+    )
+    least_pixel_share: float = Field(
+        0.5, gt=0, le=1, description="weight left on a section's pixels; with less there is something else than an edge"
+    )
+    edge_outlier: float = Field(
+        6.0, gt=0, description="robust standard deviations from the neighbouring edges; the other edge takes over"
+    )
+    least_sections: int = Field(
+        12, ge=8, description="found in the search or measured at all; fewer do not fix a curve that bends both ways"
+    )
+    cover_check_radii: float = Field(
+        0.6,
+        gt=0,
+        description="of the radius; a section counts where it is free of covers that far out on both sides: inside the"
+        " edges' windows",
+    )
+    least_seen_radii: float = Field(10.0, gt=0, description="of the radius; a shorter seen piece is no measurement")
     longest_side_px: float = Field(
         12.0, gt=3, description="px; more sheath or ground than this adds texture, not knowledge of the edge"
     )

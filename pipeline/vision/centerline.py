@@ -258,5 +258,5 @@ def _with_light(fit: CurveFit, std: float, length: float) -> Array:
 
 def _length_std(fit: CurveFit, s: Array, covariance: Array) -> float:
     """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
-    row = np.trapezoid(fit.curve.curvature(s)[:, None] * fit.curve.bases(s)[0], s, axis=0)
+    row = np.trapezoid(fit.curve.curvature(s)[:, None] * fit.curve.normal_basis(s), s, axis=0)
     return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

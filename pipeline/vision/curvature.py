@@ -161,6 +161,15 @@ class PlaneCurve:
     def bases(self, s: Array) -> tuple[Array, Array, Array]:
         """Derivatives ``(n, J + 2)`` of normal displacement, angle and curvature at ``s`` with respect to q."""
         frame = self.frame
+        inside = np.clip(s, frame.knots[0], frame.knots[-1])
+        spline = BSpline(frame.knots, np.eye(frame.size - 2), DEGREE)
+        turn = spline.antiderivative()(inside) - spline.antiderivative()(frame.grid[frame.anchor])
+        zero, one = np.zeros((len(inside), 1)), np.ones((len(inside), 1))
+        return self.normal_basis(s), np.column_stack([zero, one, turn]), np.column_stack([zero, zero, spline(inside)])
+
+    def normal_basis(self, s: Array) -> Array:
+        """Derivatives ``(n, J + 2)`` of the displacement along the normal at ``s`` with respect to q."""
+        frame = self.frame
         nodes, theta, tangent, _ = self._nodes
         turns = np.column_stack([np.ones(len(theta)), frame.integrals])  # of the angle, by turn and coefficients
         along_x = _integrate(-tangent[:, 1:] * turns, frame.grid, frame.anchor)
@@ -168,16 +177,15 @@ class PlaneCurve:
         inside = np.clip(s, nodes[0], nodes[-1])
         cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
         f = ((inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell]))[:, None]
-        _, angle = self.at(inside)
+        angle = self.at(inside)[1]
         sin, cos = np.sin(angle)[:, None], np.cos(angle)[:, None]
-        moved = [a[cell] * (1 - f) + a[cell + 1] * f for a in (along_x, along_y)]
-        anchored = np.cos(angle - theta[frame.anchor])[:, None]
-        normal = np.column_stack([anchored, -sin * moved[0] + cos * moved[1]])
-        zero = np.zeros((len(inside), 1))
-        spline = turns[::2][cell] * (1 - f) + turns[::2][cell + 1] * f
-        values = np.asarray(BSpline.design_matrix(inside, frame.knots, DEGREE).toarray())
-        normal[:, 1:] += (np.asarray(s) - inside)[:, None] * spline
-        return normal, np.column_stack([zero, spline]), np.column_stack([zero, zero, values])
+        moved_x, moved_y = (a[cell] * (1.0 - f) + a[cell + 1] * f for a in (along_x, along_y))
+        normal = -sin * moved_x + cos * moved_y
+        beyond = np.asarray(s) - inside
+        if beyond.any():
+            nearest = 2 * np.where(beyond < 0.0, 0, len(nodes) - 1)
+            normal += beyond[:, None] * turns[nearest]
+        return np.column_stack([np.cos(angle - theta[frame.anchor]), normal])
 
     def moved(self, step: Array) -> PlaneCurve:
         """The curve after a change ``(J + 2,)`` of q."""
@@ -329,7 +337,7 @@ def _settle(
 def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array, order: int) -> Problem:
     """Distances along the normal, linear in q; points without weight left out."""
     used = weight > 0.0
-    normal = curve.bases(s[used])[0]
+    normal = curve.normal_basis(s[used])
     return Problem(
         design=normal,
         data=residual[used] + normal[:, 2:] @ curve.coefficients,

@@ -21,12 +21,12 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
+from pipeline.settings.vision_curve import CurveSettings
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
 
 _BIN = 0.25  # px; pixels are pooled at this width of offset: widens the blur by 0.4 % at 0.8 px
-_PLAIN_STEP = 0.1  # of the step: differences up to it are texture or slow light, not letters
 _MIN_BLUR = 0.30  # px; the pixel's own box is 0.29
 
 
@@ -89,14 +89,14 @@ def profile(offset: Real, place: Real, blur: Real) -> tuple[Real, Real, Real, Re
     return cumulative, -inside, outside, density / blur
 
 
-def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: float) -> Profiles:
+def fit_profiles(pixels: Pixels, s: Array, *, ramps: bool, blur: float, settings: CurveSettings) -> Profiles:
     """Profiles in windows of neighbouring sections.
 
     Without ``ramps`` the places are those of the plain error function; the fit with ramps is made all the same, for
     the difference. Medians over the rows come first: letters cover less than half of any line along the cable, and a
     mean would take them for the sheath.
     """
-    count = min(windows, max(1, len(s) // 4))
+    count = min(settings.profile_windows, max(1, len(s) // 4))
     each = len(s) // count
     # Windows of one size make one array of all; at most one section of each window is passed over for it.
     chosen = ((np.arange(count * each) + 0.5) * (len(s) / (count * each))).astype(np.int64)
@@ -113,7 +113,7 @@ def fit_profiles(pixels: Pixels, s: Array, *, windows: int, ramps: bool, blur: f
         # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
         usual = _running_median(np.column_stack([start[:, 1], linear]))
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
-        limit = np.maximum(4.0 * np.median(_scatter(residual)), _PLAIN_STEP * usual[:, 2:3])
+        limit = np.maximum(settings.pixel_outlier * np.median(_scatter(residual)), settings.plain_step * usual[:, 2:3])
         pooled = _pool(offset, value, cell, residual < limit, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
@@ -230,7 +230,7 @@ class Edges:
     step: Array
 
 
-def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 5) -> Edges:
+def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSettings, iterations: int = 5) -> Edges:
     """Place, level and step of the edges on every section; blur and relative slopes come from the profiles."""
     shape, count = pixels.value.shape[:2], pixels.value.shape[2]
     offset, value = pixels.offset.reshape(-1, count), pixels.value.reshape(-1, count)
@@ -239,7 +239,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int =
         profiles.at(s, name).reshape(-1, 1).astype(np.float32) for name in ("blur", "inside", "outside")
     )
     noise = np.repeat(np.median(profiles.noise, axis=1), shape[1])
-    softness = (1.0 / (6.0 * noise + 1e-12)).astype(np.float32)[:, None]
+    softness = (1.0 / (1.5 * settings.pixel_outlier * noise + 1e-12)).astype(np.float32)[:, None]
     basis = np.ones((len(value), 3, count), np.float32)
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
     for _ in range(iterations):
@@ -263,5 +263,5 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int =
         if np.quantile(np.abs(shift), 0.98) < 2e-3:  # px; the rest are sections that will be outliers anyway
             break
     std = noise * np.sqrt(np.linalg.inv(gram)[:, 2, 2])
-    lost = (weight.sum(axis=1) < 0.5 * count) | (step <= 0.0)
+    lost = (weight.sum(axis=1) < settings.least_pixel_share * count) | (step <= 0.0)
     return Edges(np.where(lost, np.nan, place).reshape(shape), std.reshape(shape), step.reshape(shape))

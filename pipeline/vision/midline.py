@@ -106,17 +106,18 @@ def measure_sections(
     """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
     inside = min(settings.inside_radii * half_width, settings.longest_side_px)
     outside = min(settings.outside_radii * half_width, settings.longest_side_px)
-    window = (max(inside, 2.5 * blur + 0.5), max(outside, 2.5 * blur + 0.5))
+    least = settings.edge_window_blurs * blur + 0.5  # half a pixel for what the path may be off
+    window = (max(inside, least), max(outside, least))
     rows = max(1, int(np.median(np.diff(s))))
     ramps = half_width >= settings.small_radius_px
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    profiles = fit_profiles(pixels, s, windows=settings.profile_windows, ramps=ramps, blur=max(blur, 0.5))
-    edges = fit_edges(pixels, s, profiles)
+    profiles = fit_profiles(pixels, s, ramps=ramps, blur=max(blur, 0.5), settings=settings)
+    edges = fit_edges(pixels, s, profiles, settings=settings)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
-    if np.count_nonzero(good.any(axis=1)) < 20 or good.sum(axis=0).min() < 10:
+    if good.sum(axis=0).min() < settings.least_sections:
         return None
-    place, std, good = _consistent(place, std, good)
+    place, std, good = _consistent(place, std, good, settings.edge_outlier)
     keep = good.any(axis=1)
     s, place, std = s[keep], place[keep], std[keep]
     where, angle = curve.at(s)
@@ -148,13 +149,15 @@ def _running_median(values: Array, size: int = 15) -> Array:
     return np.asarray(median_filter(values, size=min(size, len(values)), mode="nearest"))
 
 
-def _consistent(place: Array, std: Array, good: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _consistent(
+    place: Array, std: Array, good: NDArray[np.bool_], outlier: float
+) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Edges that contradict their neighbours replaced by the other edge and the local width."""
     index = np.arange(len(place))
     filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
     local = np.column_stack([_running_median(p) for p in filled.T])
     off = np.abs(filled - local)
-    limit = 6.0 * 1.4826 * np.median(off, axis=0) + 0.02  # px; a floor for pictures without noise
+    limit = outlier * 1.4826 * np.median(off, axis=0) + 0.02  # px; a floor for pictures without noise
     good = good & (off < limit)
     width = local.sum(axis=1)
     out, spread = filled.copy(), std.copy()

@@ -87,7 +87,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
-    span = _span(path, (float(along[first]), float(along[last])), covers, half_width)
+    span = _span(path, (float(along[first]), float(along[last])), covers, half_width, settings)
     if span is None:
         return _lost(rough, 0.0)
     tolerance = settings.width_tolerance * (1.0 if known else 2.0)
@@ -95,7 +95,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = float(np.median(width[found.usable])) if found.usable.any() else np.nan
     usable = found.usable & (np.abs(width - middle) < settings.search_radii * half_width)
-    if np.count_nonzero(usable) < 12:
+    if np.count_nonzero(usable) < settings.least_sections:
         return _lost(rough, float(np.mean(usable)))
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
@@ -105,10 +105,10 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     count = min(max(count, settings.min_sections), settings.max_sections, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[
-        free_of_covers(path, s, 0.6 * half_width, covers)
+        free_of_covers(path, s, settings.cover_check_radii * half_width, covers)
         & in_picture(ground, path, s, 1.2 * half_width + 3.0 * rough.blur_px + 4.0)
     ]
-    if len(s) < 20:
+    if len(s) < settings.least_sections:
         return _lost(rough, 0.0)
     sections = measure_sections(
         ground,
@@ -129,12 +129,13 @@ def _cover(bearing: Bearing, blur: float) -> Cover:
 
 
 def _span(
-    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float
+    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float, settings: CurveSettings
 ) -> tuple[float, float] | None:
     """Range of s in which the cable is seen and neither edge is hidden."""
     s = np.arange(seen[0], seen[1], 1.0)
-    free = s[free_of_covers(path, s, 0.6 * half_width, covers)] if len(s) else s
-    return (float(free[0]), float(free[-1])) if len(free) > 10.0 * half_width else None
+    free = s[free_of_covers(path, s, settings.cover_check_radii * half_width, covers)] if len(s) else s
+    enough = len(free) > settings.least_seen_radii * half_width
+    return (float(free[0]), float(free[-1])) if enough else None
 
 
 def _lost(rough: RoughCable, share: float) -> Rejected:

@@ -35,8 +35,8 @@ def pixels_of(place, rng, *, noise, sections=240, rows=4, inside=0.0, outside=0.
 
 def fitted(pixels, *, ramps=True):
     s = np.arange(pixels.value.shape[1]) * 8.0
-    profiles = fit_profiles(pixels, s, windows=16, ramps=ramps, blur=0.8)
-    return profiles, fit_edges(pixels, s, profiles)
+    profiles = fit_profiles(pixels, s, ramps=ramps, blur=0.8, settings=CurveSettings())
+    return profiles, fit_edges(pixels, s, profiles, settings=CurveSettings())
 
 
 @pytest.mark.parametrize("u", [-2.3, -0.4, 0.0, 1.1])
