@@ -118,7 +118,6 @@ class Section:
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
 
-    @cached_property
     def _elastic(self) -> Response:
         """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
         bound = self.law.bound(self.rest())
@@ -149,7 +148,7 @@ class Section:
 
     def response(self, memory: Memory) -> Response:
         """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
-        elastic = self._set_response(memory) if self.plastic_rate else self._elastic
+        elastic = self._set_response(memory) if self.plastic_rate else self._elastic()
         if self.friction is None:
             return elastic
         stick, slip, relaxed = self.friction.stick, self.friction.slip, memory.relaxed

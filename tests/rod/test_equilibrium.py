@@ -1,5 +1,6 @@
 """The discrete rod on ideal bearings against exact answers, its order, its symmetries and its scale law."""
 
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 
@@ -222,3 +223,11 @@ def test_grids_and_rods_are_checked() -> None:
         Hold()
     with pytest.raises(ValueError, match="compliance"):
         Hold(chord=0.1, compliance=-1.0)
+
+
+def test_equilibria_travel_between_processes() -> None:
+    test = table_1("tangent")
+    steps = simulate(test, STEPS)
+    again = pickle.loads(pickle.dumps(steps))
+    assert again[-1].outcome is Outcome.CONVERGED
+    assert simulate(test, STEPS, starts=again)[-1].iterations <= 2
