@@ -111,9 +111,11 @@ def curves(result: Result) -> dict[str, Visited]:
 
 
 def best(result: Result) -> Visited | None:
-    """The characteristic the report answers with: extended if there is one, else inverse, else balance."""
+    """The characteristic the report answers with: extended, else inverse if its fit converged, else balance."""
     parts = curves(result)
-    return next((parts[method] for method in ("extended", "inverse", "balance") if method in parts), None)
+    fitted = result.inverse is not None and result.inverse.converged
+    order = ("extended", "inverse", "balance") if fitted else ("extended", "balance", "inverse")
+    return next((parts[method] for method in order if method in parts), None)
 
 
 def equivalent(curve: Visited, bounds: tuple[float, float] | None = None) -> Equivalent | None:

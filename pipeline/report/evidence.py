@@ -196,7 +196,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
         rows.append(
             [
                 str(step.step),
-                words(f"branch_{step.branch}") if step.branch in figures.MARKERS else step.branch,
+                words.branch(step.branch),
                 words.number(1e3 * step.displacement_m, 5),
                 unit.number(step.force_N, step.force_std_N),
                 "–" if step.force_fit_N is None else words.number(unit.factor * step.force_fit_N, 5),

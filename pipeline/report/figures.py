@@ -158,7 +158,7 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
     for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
         low, high = (unit.factor * (curve.tangent + sign * half * curve.tangent_std) for sign in (-1.0, 1.0))
         axes.fill_between(curve.kappa, low, high, color=LIGHT[colour], alpha=0.2, lw=0.0)
-        label = words(f"branch_{name}") if name in MARKERS else name
+        label = words.branch(name)
         axes.plot(curve.kappa, unit.factor * curve.tangent, color=LIGHT[colour], ls=DASHES[colour], label=label)
     bottom, top = _limits(parts, half)
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
@@ -219,7 +219,7 @@ def _branch(axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Un
         yerr=[unit.factor * half * step.force_std_N for step in steps],
         capsize=3.0,
         elinewidth=1.2,
-        label=words(f"branch_{branch}"),
+        label=words.branch(branch),
         **look,
     )
     left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]

@@ -70,9 +70,7 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: Repor
     every = max(1, len(residuals.steps) // 12)
     axes.set_yticks(
         range(0, len(residuals.steps), every),
-        [f"{step} {words(f'branch_{b}') if b else ''}" for step, b in zip(residuals.steps, branches, strict=True)][
-            ::every
-        ],
+        [f"{step} {words.branch(b)}" for step, b in zip(residuals.steps, branches, strict=True)][::every],
     )
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)

@@ -63,6 +63,11 @@ class Words:
         row = _table()["causes"].get(name)
         return row[LANGUAGES[self.language][0]] if row else name.replace("_", " ")
 
+    def branch(self, name: str) -> str:
+        """Branch of the test; a name the table does not have stays as it is."""
+        row = _table()["words"].get(f"branch_{name}")
+        return row[LANGUAGES[self.language][0]] if row else name
+
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""
         return plain(value, digits, decimal=self.decimal)

@@ -64,6 +64,8 @@ def test_extended_model_answers_first(diagnosed, full_result):
     assert best(diagnosed("named")).method == "extended"
     assert best(full_result).method == "inverse"
     assert best(full_result.model_copy(update={"inverse": None})).method == "balance"
+    stuck = full_result.inverse.model_copy(update={"converged": False})
+    assert best(full_result.model_copy(update={"inverse": stuck})).method == "balance"
     assert best(full_result.model_copy(update={"inverse": None, "balance": None})) is None
     assert set(curves(diagnosed("named"))) == {"inverse", "balance", "extended"}
 

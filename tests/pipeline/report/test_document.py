@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, write_report
+from pipeline.report.pdf import pdf_bytes
 from pipeline.settings import ReportSettings
 
 VOID = {"meta", "link", "img", "input", "br", "hr"}
@@ -216,3 +217,38 @@ def test_answer_of_an_extended_model_speaks_of_its_own_pre_curvature(diagnosed):
     heading = re.search(r"<h1>(.*?)</h1>", report_html(diagnosed("named")), re.DOTALL)[1]
     assert "K0 = 2.001 ± 0.006 1/m" in heading
     assert "Before the extension: The two independent ways agree" in report_html(diagnosed("named"))
+
+
+def without(*names):
+    empty = {"photos": [], "steps": [], "provenance": {}}
+    return {name: empty.get(name) for name in names}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        without("inverse"),
+        without("balance"),
+        without("inverse", "balance", "agreement"),
+        without("photos"),
+        without("steps", "scale", "provenance"),
+    ],
+    ids=lambda changes: "no " + ", ".join(changes),
+)
+def test_what_is_missing_is_left_out(diagnosed, changes):
+    result = diagnosed("adequate").model_copy(update=changes)
+    page = Page(report_html(result))
+    names = [a["id"] for a in page.attributes if "id" in a]
+    assert ("forces" in names) == bool(result.steps)
+    assert ("characteristic" in names) == bool(result.inverse or result.balance)
+    assert ("kappa-0" in names) == bool(result.photos)
+    assert 2 <= len(re.findall(rb"/Type /Page\b", pdf_bytes(result))) <= 4
+
+
+def test_photo_without_fit_preview_or_visible_cable_is_shown_as_far_as_it_goes(full_result):
+    bare = {"kappa_fit_per_m": [], "shape_residual_m": [], "shape_residual_std_m": [], "preview": None}
+    photos = [full_result.photos[0].model_copy(update=bare)]
+    photos.append(full_result.photos[1].model_copy(update={"seen": [False] * 201}))
+    page = report_html(full_result.model_copy(update={"photos": photos}))
+    assert "No preview was kept of this photo." in page
+    assert 'id="kappa-1"' in page
