@@ -55,8 +55,7 @@ def find_bearings(
         return _assign_given(ends, hints.given_px, settings)
     radius = hints.cover_radius(width_px)
     if radius is None:
-        first, second = (_visible_end(end, width_px, settings) for end in ends)
-        return first, second
+        return _visible_end(ends[0], width_px, settings), _visible_end(ends[1], width_px, settings)
     std = settings.radius_std if hints.cover_px is not None else settings.radius_std_by_cable
     circles = [find_cover(photo, end, Radius(radius, std), width_px, settings) for end in ends]
     first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
@@ -70,7 +69,8 @@ def _assign_given(
     straight = np.hypot(*(a - ends[0].place)) + np.hypot(*(b - ends[1].place))
     crossed = np.hypot(*(b - ends[0].place)) + np.hypot(*(a - ends[1].place))
     first, second = (a, b) if straight <= crossed else (b, a)
-    return tuple(Bearing((float(p[0]), float(p[1])), settings.given_std_px, kind="given") for p in (first, second))
+    bearings = [Bearing((float(p[0]), float(p[1])), settings.given_std_px, kind="given") for p in (first, second)]
+    return bearings[0], bearings[1]
 
 
 def _visible_end(end: CableEnd, width_px: float, settings: BearingSettings) -> Bearing:

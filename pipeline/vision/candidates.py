@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
@@ -147,7 +148,9 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
         yield reading
 
 
-def _read(above: Array, width: float, level: float, wanted: Wanted, settings: SegmentationSettings) -> Reading:
+def _read(
+    above: NDArray[np.bool_], width: float, level: float, wanted: Wanted, settings: SegmentationSettings
+) -> Reading:
     mask = strip_mask(above, width, settings)
     thick = thick_part(mask, width, settings)
     strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
@@ -158,7 +161,7 @@ def _read(above: Array, width: float, level: float, wanted: Wanted, settings: Se
     return Reading(tuple(strips), mask, thick, width, level)
 
 
-def _guess_widths(above: Array, settings: SegmentationSettings) -> list[tuple[float, float]]:
+def _guess_widths(above: NDArray[np.bool_], settings: SegmentationSettings) -> list[tuple[float, float]]:
     """Widths and lengths of strips in the mask as it is, and once gaps of a highlight's size are closed.
 
     Those that may be largest in area come first.

@@ -82,8 +82,10 @@ def _axes(
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
     cover = cable.bearings.cover_radius(width)
-    paths = (strip.path[::-1], strip.path)
-    ends = tuple(find_end(path, reading, standout, cover, settings.bearings) for path in paths)
+    ends = (
+        find_end(strip.path[::-1], reading, standout, cover, settings.bearings),
+        find_end(strip.path, reading, standout, cover, settings.bearings),
+    )
     hidden = cover is not None or cable.bearings.given_px is not None
     leaving = [end for end in ends if at_border(end, photo, width)]
     if leaving and not hidden:
