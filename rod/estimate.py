@@ -43,7 +43,8 @@ class InverseOutcome(Enum):
     )
     OPPOSITE_FORCES = (
         "the curvature falls where the moment P y grows, which no cable does; this usually means that the force log "
-        "counts compression as negative (set rig.force_sign) or that photos and forces are mixed up (check the column image)"
+        "counts compression as negative (set rig.force_sign) or that photos and forces are mixed up (check the column "
+        "image)"
     )
     NO_DATA = (
         "no loaded step has a photo, so pre-curvature and stiffness cannot be told apart; take photos of the steps"

@@ -88,7 +88,7 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
     k, size = knots.size, unknowns.size
     law, rest = slice(0, k + 1), slice(k + 1, size)
     A, pull, chi2 = J.T @ J, -J.T @ value, float(value @ value)
-    inner = np.linalg.inv(A[rest, rest])
+    inner = np.asarray(np.linalg.inv(A[rest, rest]), dtype=np.float64)
     back = -inner @ A[rest, law]
     schur, force = A[law, law] + A[law, rest] @ back, pull[law] + back.T @ pull[rest]
     chi2 -= float(pull[rest] @ inner @ pull[rest])
