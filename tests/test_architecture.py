@@ -30,6 +30,7 @@ ROD = [
     ("smoothness",),
     ("control_points", "estimate"),
     ("inverse", "balance", "paper_fit"),
+    ("paper",),
 ]
 PIPELINE = [
     ("errors",),
@@ -43,6 +44,7 @@ PIPELINE = [
     ("identify",),
     ("diagnosis",),
     ("report",),
+    ("assembly",),
     ("run",),
     ("batch",),
     ("cli",),
