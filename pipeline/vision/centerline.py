@@ -8,9 +8,9 @@ Chord frame: origin at the left bearing axis, x to the right axis, y toward the 
 is mirrored or not.
 
 Under the bearing covers nothing is seen; there the curve is continued by the spline's penalty, its uncertainty grows
-and the points are marked as not seen. That the cable passes through the bearing axis is not used, for a measured reason:
-known to 0.01 mm it leaves the error of kappa in the last 10 mm where it is (0.7 % of the maximum), and a cable that sits
-0.1 mm beside an axis so trusted gets an error of 8 %. The distance is a figure of quality instead.
+and the points are marked as not seen. That the cable passes through the bearing axis is not used, for a measured
+reason: known to 0.01 mm it leaves the error of kappa in the last 10 mm where it is (0.7 % of the maximum), and a cable
+that sits 0.1 mm beside an axis so trusted gets an error of 8 %. The distance is a figure of quality instead.
 """
 
 from __future__ import annotations
