@@ -38,8 +38,8 @@ class InverseOutcome(Enum):
         "that the photos belong to other steps"
     )
     NOT_VISIBLE = (
-        "the data do not fix every parameter; the bands say which part of the characteristic is open: bend further, or "
-        "add photos"
+        "the data do not fix every parameter (the combinations that stay open are named beside); bend further, add "
+        "steps, or add a photo of the force-free cable"
     )
     OPPOSITE_FORCES = (
         "the curvature falls where the moment P y grows, which no cable does; this usually means that the force log "
@@ -47,7 +47,8 @@ class InverseOutcome(Enum):
         "image)"
     )
     NO_DATA = (
-        "no loaded step has a photo, so pre-curvature and stiffness cannot be told apart; take photos of the steps"
+        "no loaded step has both a photo and a force, so pre-curvature and stiffness cannot be told apart; take photos "
+        "of the steps, and check why those there are were rejected"
     )
 
 
@@ -80,6 +81,8 @@ class Estimate:
     model, evaluation, unknowns, covariance
         The fit itself: unknowns (q,) with covariance (q, q); residuals and jacobian whitened by the noise as stated,
         whatever ``model.blur`` the bands were made with.
+    invisible : tuple of str
+        Combinations of parameters that the data leave open, in words.
     iterations : int
         Evaluations of the model, all fits together.
     """
@@ -105,6 +108,7 @@ class Estimate:
     evaluation: Evaluation | None = None
     unknowns: Array = field(default_factory=_none)
     covariance: Array = field(default_factory=_none)
+    invisible: tuple[str, ...] = ()
     iterations: int = 0
 
     @property
@@ -122,7 +126,7 @@ def read_off(
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
     kappa = np.linspace(min(visited), max(visited), options.grid)
     m, f, secant = law.moment(kappa, K0), law.tangent(kappa, K0), law.secant(kappa, K0)
-    if not np.all(f > 0.0):  # positive control points, but the spline between them is not
+    if not np.all(f > 0.0):  # positive at the control points, but not between them
         return Estimate(InverseOutcome.LIMIT_POINT)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
     by_moment[:, :k] = law.moment_by_ordinates(kappa, K0) * law.ordinates
@@ -162,7 +166,22 @@ def read_off(
         evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
         unknowns=u,
         covariance=covariance,
+        invisible=invisible_combinations(model, covariance, bound=options.invisible),
     )
+
+
+def invisible_combinations(model: FitModel, covariance: Array, *, bound: float) -> tuple[str, ...]:
+    """Combinations of control points and K0 whose std exceeds `bound` (log f_EI, K0 times length), in words."""
+    k = model.knots.size
+    values, vectors = np.linalg.eigh(covariance[: k + 1, : k + 1])
+    names = [f"f_EI at {knot:.3g} 1/m" for knot in model.knots] + ["K0"]
+    open_ones = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value > bound**2:
+            # What contributes less than a tenth of the variance is not worth a word.
+            members = [name for name, share in zip(names, vector, strict=True) if share**2 > 0.1]
+            open_ones.append(" with ".join(members) + f" (+- {np.sqrt(value):.2g} in the logarithm)")
+    return tuple(reversed(open_ones))
 
 
 def _is_rest(model: FitModel, block: str) -> bool:

@@ -133,7 +133,15 @@ class FitModel:
 
 
 def step_data(test: MeasuredTest, *, blocks: int = 160) -> tuple[StepData, ...]:
-    """Data of every step that says something about the cable: photos, and forces of loaded steps."""
+    """Data of every step that says something about the cable: photos, and forces of loaded steps.
+
+    Raises
+    ------
+    ValueError
+        If two steps have one number: residuals and nuisances are named by it.
+    """
+    if len({step.step for step in test.steps}) < len(test.steps):
+        raise ValueError("every step of a test needs a number of its own")
     data = []
     for step in test.steps:
         shape = step.shape if step.shape is not None and step.shape.section_s.size >= 8 else None

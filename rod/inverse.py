@@ -60,7 +60,7 @@ def estimate(
     """
     options = options or InverseOptions()
     data = step_data(test, blocks=options.blocks)
-    if not any(d.midline is not None and not d.at_rest for d in data):
+    if not any(d.midline is not None and not d.at_rest and d.step.force != 0.0 for d in data):
         return Estimate(InverseOutcome.NO_DATA)
     moments, curvatures = moments_and_curvatures(data)
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
@@ -80,8 +80,10 @@ def estimate(
         chosen.evaluation,
         chosen.posterior(options.tau),
         options=options,
-        outcome=_outcome(chosen, options),
+        outcome=InverseOutcome.CONVERGED if chosen.settled else InverseOutcome.STALLED,
     )
+    if result.converged and result.invisible:
+        result = replace(result, outcome=InverseOutcome.NOT_VISIBLE)
     return replace(result, evidence=evidence, iterations=evaluations + sum(f.evaluations for f in fits))
 
 
@@ -142,11 +144,3 @@ def rescaled(model: FitModel, trial: Evaluation) -> Array:
 
 def _refusal(failure: Outcome) -> InverseOutcome:
     return InverseOutcome.LIMIT_POINT if failure is Outcome.LIMIT_POINT else InverseOutcome.NO_EQUILIBRIUM
-
-
-def _outcome(found: Fit, options: InverseOptions) -> InverseOutcome:
-    if not found.settled:
-        return InverseOutcome.STALLED
-    k = found.model.knots.size
-    stds = np.sqrt(np.diag(found.posterior(options.tau).covariance))[:k]
-    return InverseOutcome.NOT_VISIBLE if np.any(stds > options.invisible) else InverseOutcome.CONVERGED

@@ -35,7 +35,8 @@ def _outcomes(found: Identification) -> Iterator[Finding]:
     inverse, graph = found.inverse.outcome, found.balance.outcome
     if inverse is not InverseOutcome.CONVERGED:
         level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
-        yield Finding(f"identify/inverse-{_code(inverse.name)}", level, f"inverse problem: {inverse.value}")
+        named = f"; open: {'; '.join(found.inverse.invisible)}" if found.inverse.invisible else ""
+        yield Finding(f"identify/inverse-{_code(inverse.name)}", level, f"inverse problem: {inverse.value}{named}")
     if graph is not BalanceOutcome.MEASURED:
         yield Finding(f"identify/balance-{_code(graph.name)}", "warning", f"balance equations: {graph.value}")
 

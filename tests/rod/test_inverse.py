@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rod.characteristic import Characteristic
+from rod.estimate import invisible_combinations
 from rod.inverse import InverseOutcome, estimate
 from rod.measurement import MeasuredTest
 from rod.options import InverseOptions
@@ -162,6 +163,24 @@ def test_one_hardly_bent_step_leaves_parameters_invisible():
     vague = Camera(section_px=2.0, axis_px=2.0)
     result = estimate(measured(chords=chords, mounted=False, camera=vague, force_noise=0.3))
     assert result.outcome is not InverseOutcome.CONVERGED
+    if result.outcome is InverseOutcome.NOT_VISIBLE:
+        assert any("f_EI at" in text for text in result.invisible)
+
+
+def test_invisible_combinations_are_named():
+    model = replace(estimate(measured(), options=QUICK).model, knots=np.array([2.0, 4.0, 9.0]))
+    blind = np.diag([1.0, 1e-4, 1e-4, 1e-4])
+    pair = np.zeros(4)
+    pair[[0, 3]] = np.sqrt(0.5)
+    assert invisible_combinations(model, blind, bound=0.5) == ("f_EI at 2 1/m (+- 1 in the logarithm)",)
+    (text,) = invisible_combinations(model, 4.0 * np.outer(pair, pair), bound=0.5)
+    assert text == "f_EI at 2 1/m with K0 (+- 2 in the logarithm)"
+
+
+def test_step_numbers_are_unique():
+    test = measured()
+    with pytest.raises(ValueError, match="number of its own"):
+        estimate(replace(test, steps=(*test.steps, test.steps[-1])))
 
 
 def test_bands_grow_where_no_photo_bends():
