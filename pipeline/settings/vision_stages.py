@@ -217,7 +217,7 @@ class BearingSettings(StageSettings):
         description="radii; how far aside of the visible cable's direction the centre lies: bend under the cover",
     )
     directions: int = Field(
-        240, ge=90, description="rays of the circle fit at most; more share their pixels and tell nothing new"
+        160, ge=90, description="rays of the circle fit at most; more share their pixels and tell little new"
     )
     edge_over_texture: float = Field(
         3.0, gt=0, description="ratio to the median gradient in the window; stronger edges count no more than this"

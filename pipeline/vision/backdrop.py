@@ -94,7 +94,7 @@ def stand_out(
 def _ground(small: Image) -> Image:
     """Robust second-order surface of each channel."""
     height, width, channels = small.shape
-    coarse_size = (min(width, 64), min(height, 64))
+    coarse_size = (min(width, 48), min(height, 48))
     coarse = cv2.resize(small, coarse_size, interpolation=cv2.INTER_AREA).reshape(-1, channels)
     x, y = np.meshgrid(_centred(coarse_size[0]), _centred(coarse_size[1]))
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
@@ -115,7 +115,7 @@ def _robust_fit(terms: Array, values: Array) -> Array:
     """Least squares with Tukey's biweight: cable and objects are outliers of the ground."""
     coefficients = np.zeros(6)
     coefficients[0] = np.median(values)
-    for _ in range(12):
+    for _ in range(8):
         residual = values - terms @ coefficients
         spread = _MAD_TO_STD * float(np.median(np.abs(residual))) + 1e-6
         weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
