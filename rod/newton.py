@@ -156,7 +156,7 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
         outcome = Outcome.LIMIT_POINT
     elif system.excess_negatives(trial.balance) != 0:
         outcome = Outcome.UNSTABLE
-    elif side and side * bow(system.rod, trial.angles) < 0.0:
+    elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH
     return trial._replace(outcome=outcome)
 

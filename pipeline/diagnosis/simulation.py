@@ -84,21 +84,31 @@ def _bare(steps: tuple[Equilibrium, ...], facts: Facts) -> Prediction:
     )
 
 
-def _groups(facts: Facts) -> list[tuple[list[int], Branch]]:
-    """Indices of the mounted steps and of the pushed ones, and the side to which each group is bowed."""
+def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
+    """Steps that are simulated together: their indices, the side to which they are bowed, and whether they are free.
+
+    A mounted cable at displacement zero is free of force, also the straight one, whose chord cannot be imposed; with a
+    load in the plane, or with a wrong zero, its chord is imposed like any other.
+    """
+    displacement = facts.displacement + model.shift
     mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
-    pushed = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
-    groups: list[tuple[list[int], Branch]] = [(mounted, "natural"), (pushed, "up")]
-    return [group for group in groups if group[0]]
+    free = [i for i in mounted if displacement[i] == 0.0 and model.bending.load == (0.0, 0.0)]
+    held = [i for i in mounted if i not in free]
+    pushed = [i for i in range(len(facts.branch)) if i not in mounted]
+    groups: list[tuple[list[int], Branch, bool]] = [(free, "natural", True), (held, "natural", False)]
+    return [group for group in (*groups, (pushed, "up", False)) if group[0]]
 
 
 def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
     displacement = facts.displacement + model.shift
     usable = near is not None and len(near.steps[0].angles) == model.bending.rod.edges.size
     found: dict[int, Equilibrium] = {}
-    for index, side in _groups(facts):
+    for index, side, free in _groups(model, facts):
         starts = [near.steps[i] if near.steps[i].good else None for i in index] if near and usable else None
-        done = simulate(model.bending, displacement[index], branch=side, starts=starts)
+        if free:
+            done = simulate(model.bending, forces=np.zeros(len(index)), branch=side, starts=starts)
+        else:
+            done = simulate(model.bending, displacement[index], branch=side, starts=starts)
         found.update(zip(index, done, strict=True))
     return tuple(found[i] for i in range(len(facts.branch)))
 
@@ -106,7 +116,7 @@ def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibriu
 def base_derivatives(here: Run, facts: Facts, names: tuple[str, ...]) -> tuple[Derivatives, ...]:
     """Derivatives of every step of a run with respect to parameters of `rod.parameters`."""
     found: dict[int, Derivatives] = {}
-    for index, _ in _groups(facts):
+    for index, *_ in _groups(here.model, facts):
         steps = tuple(here.steps[i] for i in index)
         found.update(zip(index, derivatives(here.model.bending, steps, names), strict=True))
     return tuple(found[i] for i in range(len(facts.branch)))

@@ -164,8 +164,10 @@ class Relaxation:
         span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
         if not facts.timed or span <= 0.0:
             return ()
+        reach = (0.02 * span, 10.0 * span)
         return tuple(
-            Variant(f"relaxation time {share * span:.3g} s", at=share * span) for share in (0.1, 0.3, 1.0, 3.0)
+            Variant("decaying in every hold", at=share * span, tuned=("at",), at_range=reach)
+            for share in (0.1, 0.3, 1.0, 3.0)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:

@@ -1,0 +1,270 @@
+"""What an experiment could see, before it is made.
+
+From a planned cable, protocol and precision to: how well f_EI and K0 will be known, what each cause must measure to be seen
+(at the family-wise threshold, with the stated power), what survives of its trace, its nearest twin, what an unseen one
+would do to f_EI, which causes stay invisible, and which protocol takes which twins apart. Nothing here needs data: all
+follows from the sensitivities of the planned test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.base import Base
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.extended import curve, stiffness_change_linear
+from pipeline.diagnosis.fit import Extension, fit
+from pipeline.diagnosis.next_experiment import Protocol, protocols
+from pipeline.diagnosis.observation import observe
+from pipeline.diagnosis.plan import Precision, planned_test
+from pipeline.diagnosis.prediction import Facts
+from pipeline.diagnosis.score import detectable
+from pipeline.diagnosis.search import suspect
+from pipeline.diagnosis.simulation import run
+from pipeline.diagnosis.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.workbench import Workbench, scored
+from pipeline.result import Curve
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.knots import place_knots
+from rod.laws import StickSlip
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned experiment.
+
+    Attributes
+    ----------
+    length : m
+    stiffness, stiffness_bent : N m^2
+        f_EI at rest and far from it; equal for a linear cable.
+    transition : 1/m
+        Curvature change over which one goes over into the other.
+    pre_curvature : 1/m
+    displacements : tuple of m
+        Loading steps from the mounted position.
+    mounted, unload : bool
+        Whether the force-free cable is photographed, and the way back measured in the same steps.
+    photos : bool
+    px_per_mm : float
+    section_px, correlation_px, systematic_px, axis_px : px
+        Noise of the midline, see `rod.measurement.MeasuredShape`, and of a bearing axis.
+    force_noise : share of the largest force
+    samples, hold, cycle : int, s, s
+        Force samples in a hold, its duration, time from hold to hold.
+    cover_mm : mm
+        Radius of the bearing covers.
+    scale_std, length_std_mm : relative, mm
+    """
+
+    length: float = 0.181
+    stiffness: float = 0.018
+    stiffness_bent: float = 0.008
+    transition: float = 4.5
+    pre_curvature: float = 2.0
+    displacements: tuple[float, ...] = (0.0046, 0.0092, 0.0138)
+    mounted: bool = True
+    unload: bool = False
+    photos: bool = True
+    px_per_mm: float = 11.0
+    section_px: float = 0.05
+    correlation_px: float = 10.0
+    systematic_px: float = 0.02
+    axis_px: float = 0.05
+    force_noise: float = 0.003
+    samples: int = 8
+    hold: float = 20.0
+    cycle: float = 60.0
+    cover_mm: float = 6.0
+    scale_std: float = 1e-3
+    length_std_mm: float = 0.1
+
+
+@dataclass(frozen=True)
+class CausePlan:
+    """What the planned test would show of one cause; ``separated_by`` is the protocol that takes its nearest twin off."""
+
+    name: str
+    unit: str
+    plausible: float
+    minimal_detectable: float | None
+    surviving_fraction: float
+    nearest_twin: str
+    twin_cosine: float
+    stiffness_bias_at_plausible_size: float
+    visible: bool
+    separated_by: str
+
+
+@dataclass(frozen=True)
+class Design:
+    """Outlook on a planned test.
+
+    Attributes
+    ----------
+    extent : Curve
+        f_EI with the band to be expected.
+    stiffness_std : relative
+        Root mean square of that band.
+    pre_curvature_std : 1/m
+    threshold : float
+        Family-wise, in sigma.
+    causes : list of CausePlan
+        The most visible first.
+    """
+
+    extent: Curve
+    stiffness_std: float
+    pre_curvature_std: float
+    threshold: float
+    causes: list[CausePlan]
+
+
+def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
+    """Outlook on a planned experiment.
+
+    Raises
+    ------
+    ValueError
+        If the planned cable has no equilibrium at a planned displacement, or nothing to measure is planned.
+    """
+    settings = settings or DiagnosisSettings()
+    if not plan.displacements or min(plan.displacements) <= 0.0:
+        raise ValueError("plan at least one loading step with a positive displacement")
+    facts = _facts(plan)
+    bench = _bench(plan, facts, settings)
+    table = between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
+    others = [
+        (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
+    ]
+    causes = [_cause_plan(bench, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
+    extent = curve(bench.base, points=settings.curve_points)
+    relative = np.array(extent.tangent_std_Nm2) / np.array(extent.tangent_Nm2)
+    bend = bench.base.extension.base.pre_curvature_index
+    assert bend is not None
+    return Design(
+        extent=extent,
+        stiffness_std=float(np.sqrt(np.mean(relative**2))),
+        pre_curvature_std=float(np.sqrt(bench.base.covariance[bend, bend])),
+        threshold=bench.limit,
+        causes=sorted(causes, key=lambda c: (c.minimal_detectable or np.inf) / c.plausible),
+    )
+
+
+def _facts(plan: Plan) -> Facts:
+    steps = [(0.0, "mounted")] if plan.mounted else []
+    steps += [(d, "loading") for d in plan.displacements]
+    if plan.unload:
+        steps += [(d, "unloading") for d in plan.displacements[-2::-1]]
+    times = np.linspace(0.0, plan.hold, plan.samples) if plan.samples > 1 else np.zeros(1)
+    force = np.pi**2 * plan.stiffness_bent / plan.length**2
+    bow = 0.64 * np.sqrt(plan.length * max(plan.displacements))
+    return Facts(
+        branch=tuple(branch for _, branch in steps),
+        displacement=np.array([d for d, _ in steps]),
+        photo_time=np.full(len(steps), times[-1]),
+        hold_times=(times,) * len(steps),
+        clock=plan.cycle * np.arange(len(steps)),
+        picture_centre=np.tile([0.5 * plan.length, 0.5 * bow], (len(steps), 1)),
+        half_diagonal=0.65 * plan.length,
+        moving="left",
+        timed=plan.samples > 1,
+        length=plan.length,
+        force_scale=force,
+        moment_scale=force * bow,
+        curvature_scale=np.pi**2 * bow / plan.length**2,
+    )
+
+
+def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
+    """The planned test made without noise, its base model fitted and all causes scored."""
+    law = StickSlip(plan.stiffness, plan.stiffness_bent, plan.transition)
+    base = Base(
+        knots=place_knots(0.0, 1.3 * facts.curvature_scale, settings.knots),
+        stiffness=plan.stiffness_bent,
+        length=plan.length,
+        scale_std=plan.scale_std,
+        length_std=1e-3 * plan.length_std_mm / plan.length,
+        elements=settings.grid,
+        roughness=settings.roughness,
+        first=plan.pre_curvature,
+    )
+    vector = base.neutral()
+    tangent = law.tangent(base.knots + plan.pre_curvature, plan.pre_curvature)
+    vector[: len(base.knots)] = np.log(tangent / base.stiffness)
+    made = run(base.model(vector), facts)
+    if made.prediction is None:
+        raise ValueError(f"the planned test cannot be made: {made.advice}")
+    pixel = 1e-3 / plan.px_per_mm
+    precision = Precision(
+        force_std=plan.force_noise * float(np.max(np.abs(made.prediction.force))),
+        chord_std=np.sqrt(2.0) * plan.axis_px * pixel,
+        section_std=plan.section_px * pixel,
+        correlation_length=plan.correlation_px * pixel,
+        systematic_std=plan.systematic_px * pixel,
+        systematic_length=0.2 * plan.length,
+        section_pitch=3.0 * pixel,
+        cover=1e-3 * plan.cover_mm,
+        scale_std=plan.scale_std,
+        length_std=1e-3 * plan.length_std_mm,
+    )
+    test = planned_test(made, facts, precision, photos=plan.photos)
+    observation = observe(test, settings)
+    observation = replace(observation, force_std=np.full(len(facts.branch), precision.force_std), force_freedom=0)
+    fitted = fit(
+        observation,
+        Extension(base, facts),
+        vector,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=made,
+    )
+    suspicion = suspect(observation, fitted, CATALOGUE, visible=settings.visible, trace=settings.trace)
+    return scored(test, observation, fitted, suspicion, settings)
+
+
+def _table(plan: Plan, protocol: Protocol, settings: DiagnosisSettings) -> Array:
+    """Cosines between causes if a protocol were added to the plan."""
+    bench = _bench(plan, protocol.facts, settings)
+    return between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
+
+
+def _cause_plan(
+    bench: Workbench,
+    index: int,
+    table: Array,
+    others: list[tuple[Protocol, Array]],
+    settings: DiagnosisSettings,
+) -> CausePlan:
+    suspicion, cause = bench.suspicion, bench.suspicion.causes[index]
+    own = suspicion.of(index)
+    plausible = cause.plausible(bench.facts)
+    if own.size == 0:
+        return CausePlan(cause.name, cause.unit, plausible, None, 0.0, "", 0.0, 0.0, False, cause.settled_by)
+    norm = suspicion.scores.norm[own]
+    best = int(own[np.argmax(norm)])
+    smallest = float(detectable(norm, bench.limit, power=settings.power).min())
+    bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
+    twin, closeness = nearest(table)
+    separated = ""
+    if closeness[index] > settings.twin_cosine:
+        freed = [(other[index, twin[index]], protocol.what) for protocol, other in others]
+        better = [pair for pair in freed if pair[0] < settings.twin_cosine]
+        separated = min(better)[1] if better else cause.settled_by
+    return CausePlan(
+        name=cause.name,
+        unit=cause.unit,
+        plausible=plausible,
+        minimal_detectable=smallest if np.isfinite(smallest) else None,
+        surviving_fraction=float(suspicion.scores.surviving[best]),
+        nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
+        twin_cosine=float(closeness[index]),
+        stiffness_bias_at_plausible_size=float(bias.max()),
+        visible=smallest <= plausible,
+        separated_by=separated,
+    )

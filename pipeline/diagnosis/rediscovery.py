@@ -1,0 +1,147 @@
+"""From the poorest model to the paper's: a straight cable of constant stiffness, and what must be added to it.
+
+The same scores, refits and held-out gains as in `diagnose`, started from K0 = 0 and one stiffness, on the data in the order
+in which the paper takes them up. Its Eq. (6) has the forces alone: from them follows that the stiffness depends on
+curvature. Its Eq. (7) adds the photos: from them follows that the cable is bent at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.diagnosis.base import start
+from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis.fit import Extension, Fit, fit
+from pipeline.diagnosis.heldout import measured_gain
+from pipeline.diagnosis.observation import Observation, observe
+from pipeline.diagnosis.prediction import Facts, facts_of
+from pipeline.diagnosis.search import suspect
+from pipeline.diagnosis.workbench import Workbench
+from pipeline.result import GainPart
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredTest
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """One step from a poorer model to a richer one.
+
+    Attributes
+    ----------
+    name : str
+        ``nonlinear_stiffness`` or ``pre_curvature``.
+    data : str
+        ``forces`` or ``forces and photos``: what it was found in.
+    chi2 : (before, after)
+    added : int
+        Parameters the step adds.
+    rivals : dict of name -> chi-square
+        What the other extension on offer reached on the same data.
+    gain : GainPart or None
+        On held-out steps of the data it was found in.
+    """
+
+    name: str
+    data: str
+    chi2: tuple[float, float]
+    added: int
+    rivals: dict[str, float]
+    gain: GainPart | None
+
+
+def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) -> list[Discovery]:
+    """Extend the straight cable of constant stiffness until forces and photos are explained.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    settings : DiagnosisSettings or None
+
+    Returns
+    -------
+    list of Discovery
+        In the order found; ends when neither extension is asked for.
+    """
+    settings = settings or DiagnosisSettings()
+    faults = faults_of_input(test, settings)
+    facts = facts_of(faults.test)
+    pictures = frozenset(range(len(test.steps)))
+    forces = observe(faults.test, settings, without_photos=pictures, without_forces=faults.forces)
+    everything = observe(faults.test, settings, without_photos=faults.photos, without_forces=faults.forces)
+    bent, curved = False, False
+    found: list[Discovery] = []
+    for data, observation in (("forces", forces), ("forces and photos", everything)):
+        while not (bent and curved):
+            before = _fitted(faults.test, observation, facts, settings, curved=curved, bent=bent)
+            offers = {}
+            if not curved:
+                offers["nonlinear_stiffness"] = _fitted(
+                    faults.test, observation, facts, settings, curved=True, bent=bent
+                )
+            if not bent:
+                offers["pre_curvature"] = _fitted(faults.test, observation, facts, settings, curved=curved, bent=True)
+            best = min(offers, key=lambda name: _cost(offers[name]))
+            if _cost(before) - _cost(offers[best]) < settings.knot_gain:
+                break
+            curved, bent = curved or best == "nonlinear_stiffness", bent or best == "pre_curvature"
+            gain = _gain(faults.test, observation, facts, settings, before, offers[best])
+            found.append(
+                Discovery(
+                    name=best,
+                    data=data,
+                    chi2=(before.chi2, offers[best].chi2),
+                    added=offers[best].extension.size - before.extension.size,
+                    rivals={name: offer.chi2 for name, offer in offers.items() if name != best},
+                    gain=gain,
+                )
+            )
+            if data == "forces":
+                break  # Eq. (6) has as many unknowns as forces: a second extension on them alone would prove nothing
+    return found
+
+
+def _cost(fitted: Fit) -> float:
+    """Chi-square plus two for every parameter (Akaike): what more parameters remove by chance does not count."""
+    return fitted.chi2 + 2.0 * fitted.extension.size if fitted.run.prediction is not None else np.inf
+
+
+def _fitted(
+    test: MeasuredTest, observation: Observation, facts: Facts, settings: DiagnosisSettings, *, curved: bool, bent: bool
+) -> Fit:
+    """The best fit of one of the four models, from three stiffnesses and, if bent, three pre-curvatures."""
+    base = start(
+        test,
+        facts,
+        knots=3 if curved else 1,
+        elements=settings.grid,
+        smoothness=settings.roughness,
+        straight=not bent,
+    )
+    if not bent:  # the control points then count from zero curvature
+        base = replace(base, knots=base.knots + (base.knots > 0.0) * base.first)
+    best: Fit | None = None
+    for stiffness, bend in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.1 * facts.curvature_scale)):
+        found = fit(
+            observation,
+            Extension(base, facts),
+            base.neutral(stiffness=stiffness, bend=bend),
+            iterations=2 * settings.iterations,
+            tolerance=settings.tolerance,
+        )
+        if best is None or _cost(found) < _cost(best):
+            best = found
+    assert best is not None
+    return best
+
+
+def _gain(
+    test: MeasuredTest, observation: Observation, facts: Facts, settings: DiagnosisSettings, before: Fit, after: Fit
+) -> GainPart | None:
+    """Held-out gain of a step."""
+    if before.run.prediction is None:
+        return None
+    suspicion = suspect(observation, before, (), visible=settings.visible, trace=settings.trace)
+    bench = Workbench(test, facts, observation, before, suspicion, np.zeros(1), 0.0)
+    return measured_gain(bench, after, settings)[0]
