@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.report.curves import best, curves
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
 from pipeline.result import DiagnosisPart, Result
 from pipeline.settings import ReportSettings
+from pipeline.visited import best, curves
 
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 

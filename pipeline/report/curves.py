@@ -1,6 +1,4 @@
-"""What the report reads out of a characteristic: the visited part, the best one, equivalent stiffness, photos.
-
-Only the visited range is ever shown: below the pre-curvature and above the largest curvature no cable was looked at.
+"""What the report computes from a characteristic and the photos: equivalent stiffness, smallest radius.
 
 Equivalent constant stiffness over a range [a, b]: EI = (m(b) - m(a)) / (b - a), the mean of the tangent dm/dkappa. It
 is the stiffness of the linear rod that changes its moment by as much over that range.
@@ -11,46 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.result import Curve, PhotoPart, Result
-
-Array = NDArray[np.float64]
-METHODS = ("inverse", "balance", "extended")
-
-
-@dataclass(frozen=True)
-class Visited:
-    """The visited part of a characteristic.
-
-    Attributes
-    ----------
-    method : str
-        ``inverse``, ``balance`` or ``extended``.
-    kappa : (n,) 1/m
-        Increasing.
-    moment, moment_std : (n,) N m
-    tangent, tangent_std, secant, secant_std : (n,) N m^2
-    factor : (n, r) N m^2
-        Factor F with F F^T the covariance of the tangent; r = 0 where it is not known.
-    """
-
-    method: str
-    kappa: Array
-    moment: Array
-    moment_std: Array
-    tangent: Array
-    tangent_std: Array
-    secant: Array
-    secant_std: Array
-    factor: Array
-
-    def at(self, kappa: float) -> tuple[float, float]:
-        """Tangent and its standard deviation at a curvature, in N m^2, interpolated linearly."""
-        return (
-            float(np.interp(kappa, self.kappa, self.tangent)),
-            float(np.interp(kappa, self.kappa, self.tangent_std)),
-        )
+from pipeline.result import PhotoPart, Result
+from pipeline.visited import Visited
 
 
 @dataclass(frozen=True)
@@ -73,49 +34,6 @@ class Equivalent:
     std: float
     bound: bool
     departure: float
-
-
-def visited(method: str, curve: Curve | None) -> Visited | None:
-    """The visited part of a curve; None if there is none of at least two points."""
-    if curve is None:
-        return None
-    keep = np.flatnonzero(curve.supported)
-    if keep.size < 2:
-        return None
-    rows = curve.tangent_factor_Nm2
-    factor = np.asarray(rows, dtype=np.float64)[keep] if rows else np.zeros((keep.size, 0))
-    fields = (
-        np.asarray(values, dtype=np.float64)[keep]
-        for values in (
-            curve.kappa_per_m,
-            curve.moment_Nm,
-            curve.moment_std_Nm,
-            curve.tangent_Nm2,
-            curve.tangent_std_Nm2,
-            curve.secant_Nm2,
-            curve.secant_std_Nm2,
-        )
-    )
-    return Visited(method, *fields, factor)
-
-
-def curves(result: Result) -> dict[str, Visited]:
-    """Visited parts of all characteristics of a result, by method."""
-    whole = {
-        "inverse": result.inverse.curve if result.inverse else None,
-        "balance": result.balance.curve if result.balance else None,
-        "extended": result.diagnosis.extended if result.diagnosis else None,
-    }
-    parts = {method: visited(method, whole[method]) for method in METHODS}
-    return {method: part for method, part in parts.items() if part is not None}
-
-
-def best(result: Result) -> Visited | None:
-    """The characteristic the report answers with: extended, else inverse if its fit converged, else balance."""
-    parts = curves(result)
-    fitted = result.inverse is not None and result.inverse.converged
-    order = ("extended", "inverse", "balance") if fitted else ("extended", "balance", "inverse")
-    return next((parts[method] for method in order if method in parts), None)
 
 
 def equivalent(curve: Visited, bounds: tuple[float, float] | None = None) -> Equivalent | None:

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from pipeline.report.answer import answer
 from pipeline.report.canvas import page_colours
-from pipeline.report.curves import best, equivalent, smallest_radius
+from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.evidence import (
     force_rows,
@@ -33,6 +33,7 @@ from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows,
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
+from pipeline.visited import best
 
 TEMPLATES = Path(__file__).parent / "templates"
 

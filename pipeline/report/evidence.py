@@ -11,11 +11,12 @@ import numpy as np
 
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Drawing, drawing
-from pipeline.report.curves import curves, seen_range
+from pipeline.report.curves import seen_range
 from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
+from pipeline.visited import curves
 
 TALL = (400.0, 350.0)
 

@@ -15,11 +15,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
-from pipeline.report.curves import Visited, curves, visited
 from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
 from pipeline.settings import ReportSettings
+from pipeline.visited import Visited, curves, visited
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.

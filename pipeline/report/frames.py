@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from pipeline.report.curves import METHODS, best, equivalent, smallest_radius
+from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
+from pipeline.visited import METHODS, best
 
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 

@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.answer import pre_curvatures
-from pipeline.report.curves import Visited, best
 from pipeline.report.document import asset, environment, palette_css
 from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
@@ -27,6 +26,7 @@ from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, from_json
 from pipeline.settings import ReportSettings
+from pipeline.visited import Visited, best
 
 SHAPE_POINTS = 14
 SHAPE_SIZE = (110.0, 40.0)

@@ -22,7 +22,6 @@ from matplotlib.image import imread
 from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
 from pipeline.report.canvas import FONT, LIGHT, Area, style
-from pipeline.report.curves import curves
 from pipeline.report.diagnosed import diagnosis_view, residual_map
 from pipeline.report.document import simulation_texts
 from pipeline.report.evidence import force_rows
@@ -31,6 +30,7 @@ from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
 from pipeline.result import DiagnosisPart, PhotoPart, Result
 from pipeline.settings import ReportSettings
+from pipeline.visited import curves
 
 PAGE = (595.0, 842.0)  # A4 in points
 MARGIN = 44.0

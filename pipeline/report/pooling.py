@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pipeline.report.curves import Equivalent, Visited, equivalent
+from pipeline.report.curves import Equivalent, equivalent
+from pipeline.visited import Visited
 
 Array = NDArray[np.float64]
 POINTS = 41

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.report.curves import Visited, best, curves, equivalent, smallest_radius, visited
+from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.pooling import pool, random_effects
+from pipeline.visited import Visited, best, curves, visited
 from tests.pipeline.report.virtual_result import K0, curve_of, moment_of
 
 
