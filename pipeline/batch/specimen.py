@@ -8,6 +8,7 @@ after the second death, or once the time was over, the specimen is reported inst
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import threading
 import time
@@ -21,7 +22,7 @@ from pipeline.batch.orders import Order, fingerprint
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.result import FindingPart, Result, SpecimenPart, to_json
+from pipeline.result import FindingPart, Result, SpecimenPart, schema, to_json
 from pipeline.settings import Settings
 
 Measure = Callable[..., Result]
@@ -60,9 +61,11 @@ def _pipeline_write(result: Result, folder: Path, settings: Settings) -> None:
 
 
 def _pipeline_write_index(out: Path, settings: Settings) -> None:
+    from pipeline.report.files import write_atomic
     from pipeline.report.index import write_index
 
     write_index(out, out, settings.report)
+    write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
 
 
 @dataclass(frozen=True)
