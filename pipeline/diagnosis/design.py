@@ -21,8 +21,8 @@ from pipeline.diagnosis.next_experiment import Protocol, protocols
 from pipeline.diagnosis.observation import observe
 from pipeline.diagnosis.plan import Precision, planned_test
 from pipeline.diagnosis.prediction import Facts
-from pipeline.diagnosis.score import detectable
-from pipeline.diagnosis.search import suspect
+from pipeline.diagnosis.score import sigma_needed
+from pipeline.diagnosis.search import detectable_amount, suspect
 from pipeline.diagnosis.simulation import run
 from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.workbench import Workbench, scored
@@ -248,7 +248,8 @@ def _cause_plan(
         return CausePlan(cause.name, cause.unit, plausible, None, 0.0, "", 0.0, 0.0, False, cause.settled_by)
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
-    smallest = float(detectable(norm, bench.limit, power=settings.power).min())
+    needed = sigma_needed(bench.limit, power=settings.power)
+    smallest = detectable_amount(bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace)
     bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
     twin, closeness = nearest(table)
     separated = ""

@@ -12,7 +12,8 @@ from pipeline.diagnosis.extended import curve, stiffness_change, stiffness_chang
 from pipeline.diagnosis.heldout import measured_gain
 from pipeline.diagnosis.maps import residual_map, smooth_share
 from pipeline.diagnosis.next_experiment import next_experiment
-from pipeline.diagnosis.score import adjusted_p, detectable
+from pipeline.diagnosis.score import adjusted_p, sigma_needed
+from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
@@ -104,7 +105,7 @@ def table(
     suspicion, scores = bench.suspicion, bench.suspicion.scores
     statistic = suspicion.statistic
     p_values = adjusted_p(statistic, bench.maxima) if statistic.size else statistic
-    smallest = detectable(scores.norm, bench.limit, power=settings.power)
+    needed = sigma_needed(bench.limit, power=settings.power)
     twin, closeness = nearest(between_causes(cosines(scores.unit), suspicion.owner, len(suspicion.causes)))
     refitted = {e.causes[0]: e for e in conclusion.singles}
     accepted = conclusion.accepted
@@ -129,7 +130,11 @@ def table(
                 estimate=_finite(estimate),
                 std=_finite(std),
                 unit=cause.unit,
-                minimal_detectable=_finite_or_none(float(smallest[best])),
+                minimal_detectable=_finite_or_none(
+                    detectable_amount(
+                        bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace
+                    )
+                ),
                 surviving_fraction=float(scores.surviving[best]),
                 nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
                 twin_cosine=float(closeness[index]),

@@ -149,7 +149,6 @@ def adjusted_p(statistic: Array, maxima: Array) -> Array:
     return np.where(maxima.size - rank >= 50, simulated, np.minimum(tail, simulated))
 
 
-def detectable(norm: Array, limit: float, *, power: float) -> Array:
-    """Amount (k,) that exceeds the family-wise limit with the given power; infinite where nothing survives."""
-    needed = limit + stats.norm.ppf(power)
-    return np.divide(needed, norm, out=np.full_like(norm, np.inf), where=norm > 0.0)
+def sigma_needed(limit: float, *, power: float) -> float:
+    """Size of an effect in sigma that exceeds the family-wise limit with the given power."""
+    return limit + float(stats.norm.ppf(power))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fit import Fit, Term, whole_residual
 from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.score import Scores, admissible, score
+from pipeline.diagnosis.score import Scores, admissible, score, span
 from pipeline.diagnosis.simulation import run
 
 Array = NDArray[np.float64]
@@ -117,3 +117,33 @@ def direction(observation: Observation, fitted: Fit, term: Term, *, amount: floa
         if there is not None:
             return (fitted.residual - there) / step
     return np.zeros_like(fitted.residual)
+
+
+def detectable_amount(
+    observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, needed: float, trace: float
+) -> float:
+    """Smallest amount of a cause, in its clearest form, whose score is ``needed`` sigma; infinite if none is.
+
+    A trace that grows otherwise than in proportion (stiff ends: with the square) is computed anew at the amount found,
+    by fixed-point steps in the logarithm; three reach a few per cent.
+    """
+    own = suspicion.of(cause)
+    if own.size == 0 or not np.any(suspicion.scores.norm[own] > 0.0):
+        return float("inf")
+    best = int(own[np.argmax(suspicion.scores.norm[own])])
+    amount = needed / float(suspicion.scores.norm[best])
+    plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
+    at = trace * plausible
+    basis = span(fitted.jacobian)
+    for _ in range(3):
+        if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > 30.0 * plausible:
+            column = direction(observation, fitted, suspicion.terms[best], amount=min(amount, 30.0 * plausible))
+            norm = float(np.linalg.norm(column - basis @ (basis.T @ column)))
+            if norm <= 0.0 or not np.isfinite(norm):
+                break
+            at, amount = amount, float(np.sqrt(amount * needed / norm))
+    return amount
+
+
+LINEAR = (0.02, 3.0)
+"""Amounts within these multiples of where a trace was computed are taken as proportional."""

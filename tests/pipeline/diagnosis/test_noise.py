@@ -1,0 +1,81 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import THREE, Reading, hidden_test
+from pipeline.diagnosis.noise import (
+    block_correlation,
+    block_means,
+    calibrate_photo_noise,
+    force_noise,
+    section_covariance,
+    smooth_basis,
+)
+
+
+def test_covariance_of_block_means_is_that_of_the_averages():
+    members, pitch, length = 7, 0.3, 1.1
+    s = pitch * np.arange(5 * members)
+    full = np.exp(-np.abs(np.subtract.outer(s, s)) / length)
+    mean = np.kron(np.eye(5), np.full((1, members), 1.0 / members))
+    assert np.allclose(block_correlation(5, members=members, pitch=pitch, length=length), mean @ full @ mean.T, atol=1e-12)
+
+
+def test_uncorrelated_sections_average_by_the_square_root():
+    assert np.allclose(block_correlation(3, members=4, pitch=1.0, length=0.0), np.eye(3) / 4.0)
+
+
+@pytest.fixture(scope="module")
+def shape():
+    return hidden_test(Cable(), THREE, largest=0.0138, seed=5).steps[-1].shape
+
+
+def test_block_means_lie_on_the_curve(shape):
+    """Without noise a block mean lies on the curve, not inside the arc: the mean of positions would be 0.4 um off."""
+    exact = Reading(section_px=1e-9, axis_px=1e-9)
+    clean = hidden_test(Cable(), THREE, largest=0.0138, seed=5, reading=exact).steps[-1].shape
+    blocks = block_means(clean, blocks=90)
+    radius = 1.0 / np.interp(blocks.s, clean.s, clean.kappa)
+    inside = np.interp(blocks.s, clean.section_s, clean.section_y) - blocks.y
+    assert np.max(np.abs(inside)) < 2e-8 < (blocks.members * blocks.pitch) ** 2 / 24.0 / radius.min()
+
+
+@pytest.mark.parametrize(("factor", "stretch"), [(1.0, 1.0), (1.4, 1.0), (1.0, 2.8), (0.7, 0.6)])
+def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
+    rng = np.random.default_rng(1)
+    blocks = block_means(shape, blocks=96)
+    basis = smooth_basis(blocks.s, 0.181, functions=20)
+    root = np.linalg.cholesky(section_covariance(blocks, factor=factor, stretch=stretch))
+    misfit = basis @ np.linspace(1e-3, 1e-5, 20)  # a hundred times the noise, and smooth
+    residuals = [root @ rng.standard_normal(len(blocks.s)) + misfit for _ in range(7)]
+    found = calibrate_photo_noise(
+        residuals, [blocks] * 7, [basis] * 7, stretches=(0.35, 0.6, 1.0, 1.7, 2.8, 4.5), prior_weight=20.0
+    )
+    white = np.linalg.solve(np.linalg.cholesky(section_covariance(blocks, factor=found.factor, stretch=found.stretch)), root)
+    # what counts is the weight of a smooth component, which must be right to a fifth (the false alarms are set by it)
+    weight = np.linalg.norm(np.linalg.qr(basis)[0].T @ white.T, axis=1)[:8]
+    assert np.all(np.abs(weight - 1.0) < 0.2)
+
+
+def test_force_noise_ignores_drift_and_level():
+    test = hidden_test(Cable(), THREE, largest=0.0138, seed=5, reading=Reading(force_drift=0.01))
+    level = force_noise(test.steps, floor=0.0, distinct=1e-3)
+    truth = test.steps[0].force_std
+    assert level.freedom == 18
+    assert np.all(np.abs(level.std / truth - 1.0) < 3.0 / np.sqrt(2.0 * 18))
+
+
+def test_a_noisy_hold_gets_its_own_level():
+    test = hidden_test(Cable(), THREE, largest=0.0138, seed=5)
+    noisy = replace(test.steps[1], hold_forces=test.steps[1].hold_forces + 0.5 * (-1.0) ** np.arange(8))
+    level = force_noise((test.steps[0], noisy, test.steps[2]), floor=0.0, distinct=1e-3)
+    assert level.std[1] > 10.0 * level.std[0]
+
+
+def test_stated_level_where_there_are_no_samples():
+    test = hidden_test(Cable(), THREE, largest=0.0138, seed=5)
+    bare = tuple(replace(step, hold_forces=None, hold_times=None) for step in test.steps)
+    level = force_noise(bare, floor=0.0, distinct=1e-3)
+    assert level.freedom == 0 and level.std[0] == test.steps[0].force_std

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from pipeline.diagnosis.pairs import best_pairs, pair_gains, second_given_first
+from pipeline.diagnosis.score import score
+from pipeline.diagnosis.twins import between_causes, cosines, nearest, tellable_size, twins_of
+
+
+@pytest.fixture
+def scored():
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((60, 6))
+    columns[:, 1] = columns[:, 0] + 0.2 * columns[:, 1]
+    data = 3.0 * columns[:, 2] - 2.0 * columns[:, 4] + rng.standard_normal(60)
+    return data, columns, score(data, np.zeros((60, 0)), columns)
+
+
+def removed(data, columns):
+    left = data - columns @ np.linalg.lstsq(columns, data, rcond=None)[0]
+    return data @ data - left @ left
+
+
+def test_gain_of_a_pair_is_that_of_the_joint_fit(scored):
+    data, columns, found = scored
+    gains = pair_gains(found.z, cosines(found.unit), np.zeros(6), np.arange(6), collinear=0.999)
+    for i in range(6):
+        for j in range(i + 1, 6):
+            assert gains[i, j] == pytest.approx(removed(data, columns[:, [i, j]]), rel=1e-9)
+    best = best_pairs(gains, np.arange(6), count=3)[0]
+    assert {best.first, best.second} == {2, 4}
+
+
+def test_forms_of_one_cause_and_wrong_signs_make_no_pair(scored):
+    _, _, found = scored
+    owner = np.array([0, 0, 1, 2, 3, 4])
+    sign = np.array([0, 0, 0, 0, 1, 0])  # direction 4 enters with a negative amount
+    gains = pair_gains(found.z, cosines(found.unit), sign, owner, collinear=0.999)
+    assert gains[0, 1] == 0.0 and gains[2, 4] == 0.0 and gains[2, 3] > 0.0
+
+
+def test_second_score_is_what_the_first_leaves(scored):
+    data, columns, found = scored
+    left = data - found.unit[:, 2] * found.z[2]
+    expected = score(left, columns[:, 2:3], columns).z
+    second = second_given_first(found.z, cosines(found.unit), 2)
+    others = [0, 1, 3, 4, 5]
+    assert np.allclose(second[others], expected[others], atol=1e-9)
+
+
+def test_nearest_twin_and_class():
+    angle = np.radians([0.0, 10.0, 60.0, 90.0])
+    unit = np.vstack([np.cos(angle), np.sin(angle)])
+    owner = np.array([0, 1, 2, 2])
+    table = between_causes(cosines(unit), owner, 3)
+    index, closeness = nearest(table)
+    assert index.tolist() == [1, 0, 1]
+    assert closeness[2] == pytest.approx(np.cos(np.radians(50.0)))
+    assert twins_of(0, cosines(unit), owner, limit=0.95) == [0, 1]
+
+
+def test_exact_twins_are_never_told_apart():
+    assert np.isinf(tellable_size(1.0, sigma=4.0))
+    assert tellable_size(0.95, sigma=4.0) == pytest.approx(12.81, abs=0.01)  # 4 / sqrt(1 - 0.95^2)

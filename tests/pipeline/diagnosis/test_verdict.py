@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from pipeline.diagnosis.score import score
+from pipeline.diagnosis.verdict import Weighed, credible_set, decide, probabilities, scan_share
+
+
+def weigh(gains, **kind):
+    return probabilities([Weighed(gain, **kind) for gain in gains], reduced_chi2=1.0, implausible=4.0)
+
+
+def test_probabilities_follow_the_likelihood():
+    p = weigh([20.0, 18.0, 10.0])
+    assert p.sum() == pytest.approx(1.0)
+    assert p[1] / p[0] == pytest.approx(np.exp(-1.0))
+
+
+def test_misfit_of_the_best_tempers_the_others():
+    options = [Weighed(1000.0), Weighed(980.0)]
+    sharp = probabilities(options, reduced_chi2=1.0, implausible=4.0)
+    blunt = probabilities(options, reduced_chi2=10.0, implausible=4.0)
+    assert sharp[1] < 1e-4 and blunt[1] == pytest.approx(1.0 / (1.0 + np.e), rel=1e-6)
+
+
+def test_absurd_amounts_and_long_scans_lose():
+    p = probabilities([Weighed(20.0), Weighed(20.0, excess=40.0)], reduced_chi2=1.0, implausible=4.0)
+    assert p[1] / p[0] == pytest.approx(0.01)
+    assert scan_share(np.array([3.0])) == 0.0
+    assert scan_share(np.array([5.0, 0.0, 0.0, 0.0])) == pytest.approx(np.log(1.0 / 4.0), abs=1e-4)
+
+
+def test_set_holds_the_level():
+    p = np.array([0.5, 0.02, 0.4, 0.08])
+    assert credible_set(p, level=0.95) == [0, 2, 3]
+    assert credible_set(p, level=0.5) == [0]
+
+
+def test_stated_probabilities_are_true_for_twins():
+    """Two causes at a cosine of 0.97, effects of 3 to 9 sigma: of those named with 70 %, 70 % must be right."""
+    rng = np.random.default_rng(1)
+    columns = np.array([[1.0, 0.97], [0.0, np.sqrt(1.0 - 0.97**2)]])
+    right, stated, inside = [], [], []
+    for _ in range(4000):
+        truth = int(rng.integers(2))
+        data = rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 9.0) * columns[:, truth] + rng.standard_normal(2)
+        p = weigh(score(data, np.zeros((2, 0)), columns).z ** 2)
+        right.append(int(np.argmax(p)) == truth)
+        stated.append(p.max())
+        inside.append(truth in credible_set(p, level=0.95))
+    right, stated = np.array(right), np.array(stated)
+    for low, high in ((0.5, 0.65), (0.65, 0.8), (0.8, 0.95)):
+        chosen = (stated > low) & (stated <= high)
+        # the target of 0.03 plus two standard errors of some 500 draws
+        assert abs(right[chosen].mean() - stated[chosen].mean()) < 0.03 + 2.0 * 0.5 / np.sqrt(chosen.sum())
+    assert np.mean(inside) > 0.95
+
+
+@pytest.mark.parametrize(
+    ("facts", "word"),
+    [
+        ({"detected": False, "alien": False, "two": False, "names": 0, "powerless": False}, "adequate"),
+        ({"detected": False, "alien": False, "two": False, "names": 0, "powerless": True}, "underpowered"),
+        ({"detected": False, "alien": True, "two": False, "names": 0, "powerless": False}, "unexplained"),
+        ({"detected": True, "alien": True, "two": False, "names": 1, "powerless": False}, "unexplained"),
+        ({"detected": True, "alien": False, "two": True, "names": 1, "powerless": False}, "two_causes"),
+        ({"detected": True, "alien": False, "two": False, "names": 1, "powerless": False}, "named"),
+        ({"detected": True, "alien": False, "two": False, "names": 2, "powerless": False}, "class"),
+    ],
+)
+def test_word(facts, word):
+    assert decide(**facts) == word
