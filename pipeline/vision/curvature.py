@@ -28,7 +28,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, CubicHermiteSpline
+from scipy.interpolate import BSpline
 
 from pipeline.records import Array
 from pipeline.vision.smoothing import Problem, Smooth
@@ -105,12 +105,12 @@ def _penalty(spline: BSpline, edges: Array, order: int) -> Array:
 
 
 class _Nodes(NamedTuple):
-    """Grid nodes, angles and tangents on the whole grid, and the position as a spline."""
+    """Grid nodes, angles and tangents on the whole grid, and the position's coefficients ``(cells, 2)`` by power."""
 
     s: Array
     theta: Array
     tangent: Array
-    position: CubicHermiteSpline
+    position: tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -121,6 +121,11 @@ class PlaneCurve:
     coefficients: Array
     point: Array
     angle: float
+
+    @property
+    def parameters(self) -> Array:
+        """Parameters q ``(J + 2,)``; offset and turn count from here, so they are zero."""
+        return np.concatenate([np.zeros(2), self.coefficients])
 
     def curvature(self, s: Array) -> Array:
         """Curvature at ``s`` (d theta / ds)."""
@@ -133,19 +138,22 @@ class PlaneCurve:
         tangent = np.column_stack([np.cos(theta), np.sin(theta)])
         nodes = frame.grid[::2]
         points = self.point + _integrate(tangent, frame.grid, frame.anchor)
-        # Cubic Hermite pieces: the tangents are known, and the error is far below that of the quadrature.
-        return _Nodes(nodes, theta, tangent, CubicHermiteSpline(nodes, points, tangent[::2]))
+        # Cubic Hermite pieces in powers of the share of the cell: the tangents are known.
+        width = np.diff(nodes)[:, None]
+        step, first, last = np.diff(points, axis=0), width * tangent[:-2:2], width * tangent[2::2]
+        return _Nodes(nodes, theta, tangent, (points[:-1], first, 3 * step - 2 * first - last, first + last - 2 * step))
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """Points ``(n, 2)`` and angles ``(n,)`` at ``s``; beyond the range the curve goes on straight."""
-        nodes, theta, _, spline = self._nodes
+        nodes, theta, _, (c0, c1, c2, c3) = self._nodes
         inside = np.clip(s, nodes[0], nodes[-1])
         cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
         # The angle by the parabola through both ends and the middle of the cell.
         t = (inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
         a, m, b = theta[2 * cell], theta[2 * cell + 1], theta[2 * cell + 2]
         angle = a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)
-        where = spline(inside)
+        f = t[:, None]
+        where = c0[cell] + f * (c1[cell] + f * (c2[cell] + f * c3[cell]))
         beyond = np.asarray(s) - inside
         if beyond.any():
             where = where + beyond[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -290,7 +298,7 @@ def fit_curve(
     )
     s, residual = _step_to_foot(curve, points, s)
     smooth = _linear(curve, s, residual, std, weight, order).smooth(length, bias_share=bias_share)
-    curve = curve.moved(smooth.estimate - np.r_[0.0, 0.0, curve.coefficients])
+    curve = curve.moved(smooth.estimate - curve.parameters)
     s, residual = _step_to_foot(curve, points, curve.foot(points, s, steps=1))
     return CurveFit(curve, smooth, points, std, s, residual, weight)
 
@@ -326,7 +334,7 @@ def _settle(
         problem = _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
             length = problem.correlation_length(longest)
-        step = problem.estimate(length) - np.r_[0.0, 0.0, curve.coefficients]
+        step = problem.estimate(length) - curve.parameters
         curve = curve.moved(step)
         # A hundredth of a point's error: the curve's own is a tenth to a third of it.
         if iteration > 1 and np.max(np.abs(problem.design @ step)) < 0.01 * spread * np.median(std):

@@ -108,7 +108,7 @@ class _Diagonal:
     def weights(self) -> Array:
         """Weights of the penalty over all that can matter."""
         ratio = np.sort(np.maximum(self.gamma2, _FLOOR) / np.maximum(1.0 - self.gamma2, _FLOOR))[: -self.null]
-        return np.geomspace(0.1 * ratio[0], 1e3 * ratio[-1], _GRID)
+        return np.exp(np.linspace(np.log(0.1 * ratio[0]), np.log(1e3 * ratio[-1]), _GRID))
 
     def criterion(self, weights: Array) -> tuple[Array, Array]:
         """Restricted likelihood, -2 log, and sigma squared at every weight."""
