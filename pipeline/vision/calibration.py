@@ -134,10 +134,10 @@ def check_scale(
         std = float(np.hypot(other.std_relative, calibration.scale.std_relative))
         if abs(ratio - 1.0) > max(settings.check_sigmas * std, settings.check_floor):
             text = (
-                f"The {other.source} says the scale should be {100 * (ratio - 1):+.2f} ± {100 * std:.2f} % "
-                f"of the one used ({calibration.scale.source})"
+                f"The {other.source} gives a scale {100 * (ratio - 1):+.2f} ± {100 * std:.2f} % away from the one used "
+                f"({calibration.scale.source})."
             )
-            findings.append(Finding(code, "warning", text.replace("of the one", "away from the one") + "."))
+            findings.append(Finding(code, "warning", text))
     return tuple(findings)
 
 

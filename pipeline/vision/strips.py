@@ -121,12 +121,18 @@ def join_strips(
         a, b = strips[i], strips[j]
         share = np.array([a.length, b.length]) / (a.length + b.length)
         joined = Strip(
-            np.vstack([first, second]),
+            np.vstack([first, _bridge(first[-1], second[0]), second]),
             float(share @ (a.width, b.width)),
             float(share @ (a.width_scatter, b.width_scatter)),
             max(a.branch, b.branch),
         )
         strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
+
+
+def _bridge(start: Array, stop: Array) -> Array:
+    """Points a cell apart between two ends, without them: a path must be dense to tell where it crosses itself."""
+    count = max(2, round(float(np.hypot(*(stop - start)))) + 1)
+    return np.linspace(start, stop, count)[1:-1]
 
 
 def _best_joint(
