@@ -11,7 +11,7 @@ import pytest
 
 from tests.pipeline.identify.accuracy_study import case, summary
 
-CABLES = int(os.environ.get("CABLEBEND_STUDY_CABLES", "10"))
+CABLES = int(os.environ.get("CABLEBEND_STUDY_CABLES", "8"))
 
 
 @pytest.fixture(scope="module")

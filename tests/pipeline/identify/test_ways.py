@@ -43,10 +43,10 @@ def test_both_ways_are_compared_on_the_range_both_visited(found):
 
 def test_shared_errors_explain_most_of_both_bands(found, measured):
     one, two = Characterised.of_inverse(found.inverse), Characterised.of_balance(found.balance)
-    grid = one.common_grid(two)
-    first, second = one.contraction(grid), two.contraction(grid)
+    grid = one.curve.common_grid(two.curve)
+    first, second = one.curve.contraction(grid), two.curve.contraction(grid)
     own = np.diag(first @ cross_covariance(measured, one.gains, one.gains) @ first.T)
-    assert np.all(own < 1.02 * np.diag(first @ one.log_covariance @ first.T))
+    assert np.all(own < 1.02 * np.diag(first @ one.curve.log_covariance @ first.T))
     both = np.diag(first @ cross_covariance(measured, one.gains, two.gains) @ second.T)
     # Near the rest curvature the band is mostly what no data tell; in the other two thirds it is the data's noise.
     assert np.all(both[1:] > 0.5 * own[1:])
