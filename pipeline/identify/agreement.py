@@ -9,8 +9,7 @@ over the sources of error with covariance S and gains G. What remains of each ba
 the form of the law; both ways smooth the same law, so a part ``common`` of it is the same error in both (measured with
 the accuracy study: 0.6; with none the test would never reject).
 
-The test looks at the mean of the log ratio over each third of the common range: three numbers that a stretched, bent
-or tilted curve moves, with a covariance that is far from singular.
+The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
 """
 
 from __future__ import annotations
@@ -18,15 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
+from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
 from rod.measurement import MeasuredTest
-
-PARTS = 3
-GRID = 61
 
 Source = tuple[str, int]
 
@@ -35,9 +31,7 @@ Source = tuple[str, int]
 class Characterised:
     """What a way hands to the comparison: log f on a grid with covariance and gains, and K0."""
 
-    kappa: Array
-    tangent: Array
-    log_covariance: Array
+    curve: LogCurve
     gains: dict[Source, Array]
     pre_curvature: float
     pre_curvature_std: float
@@ -45,29 +39,14 @@ class Characterised:
     @staticmethod
     def of_inverse(way: Estimate) -> Characterised:
         """Of the inverse problem."""
-        return Characterised(
-            way.kappa, way.tangent, way.log_covariance, way.gains, way.pre_curvature, way.pre_curvature_std
-        )
+        curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
+        return Characterised(curve, way.gains, way.pre_curvature, way.pre_curvature_std)
 
     @staticmethod
     def of_balance(way: BalanceGraph) -> Characterised:
         """Of the balance equations."""
-        return Characterised(
-            way.kappa, way.tangent, way.log_covariance, way.gains, way.pre_curvature, way.pre_curvature_std
-        )
-
-    def common_grid(self, other: Characterised) -> Array | None:
-        """Curvatures that both visited, 1/m; None if there are none."""
-        low, high = max(self.kappa[0], other.kappa[0]), min(self.kappa[-1], other.kappa[-1])
-        return np.linspace(low, high, GRID) if high > low else None
-
-    def onto(self, grid: Array) -> Array:
-        """Matrix of linear interpolation from the own grid to another, (n, own)."""
-        return np.stack([np.interp(grid, self.kappa, column) for column in np.eye(self.kappa.size)], axis=1)
-
-    def contraction(self, grid: Array) -> Array:
-        """Matrix of the means over each part of the grid, (parts, own)."""
-        return np.stack([part.mean(axis=0) for part in np.array_split(self.onto(grid), PARTS)])
+        curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
+        return Characterised(curve, way.gains, way.pre_curvature, way.pre_curvature_std)
 
 
 @dataclass(frozen=True)
@@ -102,24 +81,19 @@ def compare(
 ) -> Agreement | None:
     """Compare both ways; None if they visited no common curvature. `common`: see the module."""
     one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
-    grid = one.common_grid(two)
+    grid = one.curve.common_grid(two.curve)
     if grid is None:
         return None
-    ratio = one.onto(grid) @ np.log(one.tangent) - two.onto(grid) @ np.log(two.tangent)
-    first, second = one.contraction(grid), two.contraction(grid)
-    difference = first @ np.log(one.tangent) - second @ np.log(two.tangent)
+    ratio = one.curve.log_on(grid) - two.curve.log_on(grid)
+    first, second = one.curve.contraction(grid), two.curve.contraction(grid)
     shared = first @ cross_covariance(test, one.gains, two.gains) @ second.T
     noises = (
         first @ cross_covariance(test, one.gains, one.gains) @ first.T,
         second @ cross_covariance(test, two.gains, two.gains) @ second.T,
     )
-    bands = first @ one.log_covariance @ first.T, second @ two.log_covariance @ second.T
+    bands = one.curve.parts_covariance(grid), two.curve.parts_covariance(grid)
     covariance = common * sum(noises) + (1.0 - common) * sum(bands) - shared - shared.T
-    values, vectors = np.linalg.eigh(covariance)
-    # Directions in which both ways answer alike have no variance to judge by: a thousandth of the largest at least.
-    values = np.maximum(values, 1e-3 * values[-1])
-    chi2 = float(np.sum((vectors.T @ difference) ** 2 / values))
-    p = float(chdtrc(PARTS, chi2))
+    p = p_value(parts_difference(one.curve, two.curve, grid), covariance)
     return Agreement(
         range_per_m=(float(grid[0]), float(grid[-1])),
         rms_relative=float(np.sqrt(np.mean(ratio**2))),
@@ -170,11 +144,11 @@ def rest_curvature(test: MeasuredTest) -> tuple[float, float] | None:
 def difference_hints(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph) -> tuple[str, ...]:
     """First candidates for a difference of the two ways, each with the size it would have."""
     one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
-    grid = one.common_grid(two)
+    grid = one.curve.common_grid(two.curve)
     if grid is None:
         return ()
     reading = np.interp(grid, inverse.kappa, inverse.secant / inverse.tangent) - 1.0
-    stretch = one.onto(grid) @ one.gains["scale", -1] - two.onto(grid) @ two.gains["scale", -1]
+    stretch = one.curve.onto(grid) @ one.gains["scale", -1] - two.curve.onto(grid) @ two.gains["scale", -1]
     hints = [
         f"reading one curve as a secant and the other as a tangent would make {np.abs(reading).max():.0%}",
         f"a scale wrong by 1 % would make {0.01 * np.abs(stretch).max():.1%}",

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.special import chdtrc
 
 from pipeline.identify.agreement import Agreement, Characterised, compare, rest_curvature
+from pipeline.identify.contrast import chi_square, parts_difference
 from pipeline.identify.findings import identification_findings
 from pipeline.identify.measured import measured_test
-from pipeline.records import Array, Finding, Specimen, Traces
+from pipeline.records import Finding, Specimen, Traces
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceGraph, BalanceOptions, balance
 from rod.inverse import Estimate, InverseOptions, estimate
@@ -125,13 +126,10 @@ def _branches_p(branches: dict[str, Estimate]) -> float | None:
     one, two = Characterised.of_inverse(branches["loading"]), Characterised.of_inverse(branches["unloading"])
     shift = one.pre_curvature - two.pre_curvature
     z = shift / np.hypot(one.pre_curvature_std, two.pre_curvature_std)
-    common = one.common_grid(two)
+    common = one.curve.common_grid(two.curve)
     chi2, free = float(z**2), 1
     if common is not None:
-        contract_one, contract_two = one.contraction(common), two.contraction(common)
-        difference: Array = contract_one @ np.log(one.tangent) - contract_two @ np.log(two.tangent)
-        covariance = contract_one @ one.log_covariance @ contract_one.T
-        covariance += contract_two @ two.log_covariance @ contract_two.T
-        chi2 += float(difference @ np.linalg.solve(covariance, difference))
+        difference = parts_difference(one.curve, two.curve, common)
+        chi2 += chi_square(difference, one.curve.parts_covariance(common) + two.curve.parts_covariance(common))
         free += difference.size
     return float(chdtrc(free, chi2))
