@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtrc
 
-from pipeline.records import Finding
+from pipeline.records import Finding, Level
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
@@ -34,7 +34,7 @@ def identification_findings(found: Identification, settings: IdentifySettings) -
 def _outcomes(found: Identification) -> Iterator[Finding]:
     inverse, graph = found.inverse.outcome, found.balance.outcome
     if inverse is not InverseOutcome.CONVERGED:
-        level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
+        level: Level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
         named = f"; open: {'; '.join(found.inverse.invisible)}" if found.inverse.invisible else ""
         yield Finding(f"identify/inverse-{_code(inverse.name)}", level, f"inverse problem: {inverse.value}{named}")
     if graph is not BalanceOutcome.MEASURED:

@@ -42,6 +42,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
         length=specimen.length_m,
         length_std=settings.length_std_relative * specimen.length_m,
         scale_std=traces.scale.std_relative,
+        axis_std=settings.axis_std_m,
         steps=steps,
         moving=specimen.rig.moving_bearing,
         picture_half_diagonal=float(max(diagonals)) if diagonals else None,

@@ -21,7 +21,7 @@ from pipeline.result import (
 )
 from rod.balance import BalanceGraph
 from rod.evaluation import StepFit
-from rod.fit_model import POSE, FitModel
+from rod.fit_model import FitModel
 from rod.inverse import Estimate, InverseOutcome
 from rod.measurement import MeasuredShape
 from rod.moment_points import pointwise_graph
@@ -209,7 +209,7 @@ def _photos(way: Estimate) -> dict[int, PhotoResidual]:
 
 
 def _pose(model: FitModel, u: Array, fit: StepFit) -> Pose:
-    return Pose(*(model.nuisance(u, name) for name in (*(f"{n}/{fit.data.step.step}" for n in POSE), "scale")))
+    return Pose(*model.pose(u, fit.data.step.step), model.nuisance(u, "scale"))
 
 
 def _photo(model: FitModel, u: Array, fit: StepFit, shape: MeasuredShape) -> PhotoResidual:
