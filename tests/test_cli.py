@@ -258,3 +258,21 @@ def test_simulated_specimen_is_read_like_any_other_and_keeps_its_truth_apart(tmp
     assert json.loads((tmp_path / "virtual.truth.json").read_text())["effects"] == {"force_offset": [0.02]}
     checked = json.loads(call("check", tmp_path / "virtual", "--json").stdout)["specimens"]
     assert [(row["status"], row["steps"], row["photos"], row["findings"]) for row in checked] == [("ok", 2, 2, [])]
+
+
+def test_design_ranks_causes_and_says_what_stays_invisible():
+    found = json.loads(call("design", "--steps", 3, "--json").stdout)
+    causes = {cause["name"]: cause for cause in found["causes"]}
+    assert len(causes) == 19
+    assert not causes["force_gain"]["visible"]  # the same as the scale of EI, always
+    assert 0.0 < found["stiffness_std"] < 0.1
+    more = json.loads(call("design", "--steps", 6, "--step-mm", 2.3, "--unload", "--json").stdout)
+    assert more["pre_curvature_std"] < found["pre_curvature_std"]
+    assert call("design", "--step-mm", -1).exit_code == 2
+
+
+def test_folders_without_description_are_told(cheap):
+    (cheap / "batch/b/specimen.toml").unlink()
+    done = call("check", "batch")
+    assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
+    assert "2 of 2 specimens would run" in done.stdout

@@ -68,7 +68,7 @@ def run(
 
 def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
-    from pipeline.intake.folder import find_specimens
+    from pipeline.intake.folder import find_specimens, find_undescribed
 
     specimens: dict[Path, None] = {}
     refused = []
@@ -78,6 +78,8 @@ def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[In
         except InputError as error:
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
+    for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
+        click.echo(f"cablebend: {folder}: has photos and a table but no specimen.toml; write one with init.", err=True)
     return list(specimens), refused
 
 

@@ -41,7 +41,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
             raise InputError(
                 "is no folder", path=path, code="folder/missing", remedy="give a specimen folder or one above"
             )
-        here = list(_search(path, (), settings.search_depth))
+        here = [folder for folder in _search(path, (), settings.search_depth) if os.path.lexists(folder / NAME)]
         if not here:
             raise InputError(
                 f"holds no {NAME}, neither itself nor in its folders",
@@ -53,12 +53,27 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     return list(found)
 
 
+def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
+    """Folders that hold photos and a table but no ``specimen.toml``: specimens somebody forgot to describe."""
+    searched = (folder for path in paths for folder in _search(path, (), settings.search_depth))
+    return [
+        folder
+        for folder in dict.fromkeys(searched)
+        if not os.path.lexists(folder / NAME)
+        and candidate_logs(folder)
+        and list_photos(folder, without=None, settings=settings)
+    ]
+
+
 def _search(folder: Path, above: tuple[tuple[int, int], ...], depth: int) -> Iterator[Path]:
-    """Walk down; ``above`` are the identities of the folders on the way, to notice a circle of links."""
+    """All folders on the way down to specimens, and these, which are not searched further.
+
+    ``above`` are the identities of the folders above, to notice a circle of links.
+    """
+    yield folder
+    if os.path.lexists(folder / NAME):
+        return
     try:
-        if os.path.lexists(folder / NAME):
-            yield folder
-            return
         status = folder.stat()
         entries = sorted((entry.name for entry in folder.iterdir() if entry.is_dir()), key=natural_key)
     except OSError:

@@ -24,9 +24,7 @@ class IntakeSettings(BaseModel):
         500_000_000, gt=0, description="bytes; an uncompressed 16 bit colour photo of 80 Mpx is 480 MB"
     )
     photos_max: int = Field(10_000, gt=0, description="photos in one folder; a test has tens of steps")
-    search_depth: int = Field(
-        12, gt=0, description="folders below the given one; deeper trees are linked or a mistake"
-    )
+    search_depth: int = Field(12, gt=0, description="folders below the given one; deeper trees are linked or a mistake")
 
     # Force log
     header_search_lines: int = Field(

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.intake.folder import find_specimens, read_specimen
+from pipeline.intake.folder import find_specimens, find_undescribed, read_specimen
 from pipeline.intake.photos import natural_key
 from pipeline.settings.intake import IntakeSettings
 
@@ -213,3 +213,11 @@ def test_specimens_are_found_below_in_natural_order(specimen_folder, tmp_path):
         specimen_folder(name=name)
     found = find_specimens([tmp_path, tmp_path / "b"], SETTINGS)
     assert [path.relative_to(tmp_path).as_posix() for path in found] == ["a/deep/er/cable", "b/cable_2", "b/cable_10"]
+
+
+def test_a_folder_somebody_forgot_to_describe_is_noticed(specimen_folder, tmp_path):
+    specimen_folder(name="batch/described")
+    forgotten = specimen_folder(name="batch/forgotten")
+    (forgotten.path / "specimen.toml").unlink()
+    assert find_specimens([tmp_path / "batch"], SETTINGS) == [tmp_path / "batch/described"]
+    assert find_undescribed([tmp_path / "batch"], SETTINGS) == [forgotten.path]
