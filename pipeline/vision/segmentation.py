@@ -11,8 +11,9 @@ The cable is the longest strip of the right width; known bearings decide between
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from pipeline.records import Rejected
+from pipeline.records import Array, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout, choose_reduction, stand_out
@@ -60,12 +61,17 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
     standout = stand_out(photo, reduction, stage, window=window)
     wanted = _wanted(standout, cable, stage)
     first: Rejected | None = None
+    leaving: list[Array] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
             return _nothing(photo, standout, readings[0]) if first is None else first
-        outcome = _weigh(photo, standout, readings, wanted, cable, settings)
-        if isinstance(outcome, RoughCable) or outcome.code in _CONCLUSIVE:
+        outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
+        if isinstance(outcome, RoughCable):
+            return first if first is not None and _is_part(outcome, leaving) else outcome
+        if outcome.code in _CONCLUSIVE:
             return outcome
+        if outcome.code == "photo/leaves-frame":
+            leaving.append(path)
         first = outcome if first is None else first
     if first is None:
         raise ValueError("read_photo always gives a reading")
@@ -79,26 +85,38 @@ def _weigh(
     wanted: Wanted,
     cable: Cable,
     settings: VisionSettings,
-) -> RoughCable | Rejected:
-    """Judge the long strips of each reading; the largest strip with a clear verdict speaks for the photo."""
-    verdicts: list[tuple[float, RoughCable | Rejected]] = []
+) -> tuple[RoughCable | Rejected, Array]:
+    """Judge the long strips of each reading; the largest strip with a clear verdict speaks for the photo.
+
+    Returns the verdict and the strip's path in px.
+    """
+    verdicts: list[tuple[float, RoughCable | Rejected, Array]] = []
     for reading in readings:
         least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
         rivals = [strip for strip in reading.strips if strip.length >= least]
         outcomes = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in rivals]
         accepted = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, RoughCable)]
         area = reading.longest * reading.width
+        chosen = accepted[0] if accepted else 0
+        outcome = outcomes[chosen]
         if len(accepted) > 1:
             lengths = [rivals[k].length * standout.reduction for k in accepted]
             text = (
                 f"{len(accepted)} strips could be the cable ({lengths[0]:.0f} px and {lengths[1]:.0f} px long); "
                 "leave one cable in the picture"
             )
-            verdicts.append((area, refused(photo, "photo/two-candidates", text, candidates=float(len(accepted)))))
-        else:
-            verdicts.append((area, outcomes[accepted[0] if accepted else 0]))
+            outcome = refused(photo, "photo/two-candidates", text, candidates=float(len(accepted)))
+        verdicts.append((area, outcome, standout.to_pixels(rivals[chosen].path)))
     clear = [v for v in verdicts if isinstance(v[1], RoughCable) or v[1].code in _CONCLUSIVE]
-    return max(clear or verdicts, key=lambda verdict: verdict[0])[1]
+    _, outcome, path = max(clear or verdicts, key=lambda verdict: verdict[0])
+    return outcome, path
+
+
+def _is_part(found: RoughCable, leaving: list[Array]) -> bool:
+    """True if the cable found lies on a strip that left the picture in another reading: a piece torn off it."""
+    first, last = found.visible
+    body = found.path_px[first : last + 1]
+    return any(float(np.median(cKDTree(path).query(body)[0])) < found.half_width_px for path in leaving)
 
 
 def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wanted:
