@@ -116,7 +116,7 @@ class BalanceGraph:
         Joint covariance of log(tangent) on the grid.
     gains : dict
         Response of log(tangent) on the grid to the sources of error, keyed ``("curve", step)`` (n, p),
-        ``("axes", step)`` (n, 2), ``("force", step)`` (n, 1), ``("scale", -1)`` (n, 1): what a comparison with another
+        ``("force", step)`` (n, 1), ``("scale", -1)`` (n, 1): what a comparison with another
         way through the same data needs for the joint uncertainty.
     points : tuple of MomentPoints
     varying : (4,) 1/m

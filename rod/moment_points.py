@@ -2,8 +2,9 @@
 
 One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
 (Eq. 13). The residual against a compliance curve, ``rho = K - K0 - excess(m)``, is moved by the parameters of the
-smooth curve (through K and y together), by the force, by both bearing axes across the chord and by the scale of the
-photos; their derivatives here are the ingredients of its covariance.
+smooth curve (through K and y together), by the force and by the scale of the photos; their derivatives here are the
+ingredients of its covariance. Errors of the bearing axes across the chord are part of the covariance of the curve: they
+shift and turn the whole chord frame.
 
 Axes and signs: chord frame of `rod.measurement`; SI units.
 """
@@ -37,8 +38,6 @@ class MomentPoints:
         Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
     by_curve_kappa : (n, p) 1/m, by_curve_y : (n, p) m
         Derivatives of curvature and y with respect to the curve's parameters, covariance `curve_covariance` (p, p).
-    by_axes_y : (n, 2) m
-        Derivative of y with respect to the sideways position of the left and right axis, each of std `axis_std`.
     """
 
     step: MeasuredStep
@@ -51,8 +50,6 @@ class MomentPoints:
     by_curve_kappa: Array
     by_curve_y: Array
     curve_covariance: Array
-    by_axes_y: Array
-    axis_std: float
 
     @property
     def moment(self) -> Array:
@@ -65,7 +62,7 @@ class Residual:
     """Residual of one photo against a compliance curve, whitened, and its derivatives (all rows whitened).
 
     `whitener` turns a change of the raw residual into whitened rows. ``by_source`` holds the raw derivatives with
-    respect to the sources of error ``curve`` (n, p), ``axes`` (n, 2), ``force`` (n, 1). ``informative`` is the number
+    respect to the sources of error ``curve`` (n, p) and ``force`` (n, 1). ``informative`` is the number
     of rows whose noise is the photo's: a curve of p parameters fills only p of n rows, the others hold the floor.
     """
 
@@ -89,7 +86,6 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
     seen = np.flatnonzero(shape.seen)
     keep = np.unique(np.round(np.linspace(0, seen.size - 1, min(points, seen.size))).astype(int))
     at = seen[keep]
-    along = shape.s[at] / shape.s[-1]
     mounted = step.branch == "mounted"
     return MomentPoints(
         step=step,
@@ -102,8 +98,6 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
         by_curve_kappa=shape.basis_kappa[at],
         by_curve_y=np.cos(shape.theta[at])[:, None] * shape.basis_normal[at],
         curve_covariance=shape.covariance,
-        by_axes_y=-np.column_stack([1.0 - along, along]),
-        axis_std=(step.chord_std or 0.0) / np.sqrt(2.0),
     )
 
 
@@ -133,11 +127,9 @@ def residual(
     stiff = (c * data.force)[:, None]
     by_source = {
         "curve": data.by_curve_kappa - stiff * data.by_curve_y,
-        "axes": -stiff * data.by_axes_y,
         "force": -(c * y)[:, None],
     }
     covariance = by_source["curve"] @ data.curve_covariance @ by_source["curve"].T
-    covariance += data.axis_std**2 * by_source["axes"] @ by_source["axes"].T
     covariance += data.force_std**2 * by_source["force"] @ by_source["force"].T
     covariance[np.diag_indices_from(covariance)] += floor**2
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
