@@ -41,6 +41,8 @@ def curve(fitted: Fit, *, points: int) -> Curve:
         used.append(bend)
     covariance = fitted.covariance[np.ix_(used, used)]
     moment_std = _std(by_moment, covariance)
+    values, vectors = np.linalg.eigh(covariance)
+    factor = by_tangent @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     excess = K - K0
     # at K = K0 the secant is the tangent, and so is its band
     far = excess > 1e-3 * (high - K0)
@@ -54,6 +56,7 @@ def curve(fitted: Fit, *, points: int) -> Curve:
         secant_Nm2=law.secant(K, K0).tolist(),
         secant_std_Nm2=secant_std.tolist(),
         supported=[True] * points,
+        tangent_factor_Nm2=factor.tolist(),
     )
 
 
