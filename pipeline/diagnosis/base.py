@@ -2,11 +2,11 @@
 
 A cable of uniform pre-curvature K0 with a spline characteristic f_EI(K - K0) (tangent reading, control points fixed
 before the diagnosis), on ideal bearings, the displacement counted from the mounted position, loading and unloading with
-one and the same law. Beside them, with the prior knowledge the measurement states: the scale of the photos and the length
-of the cable. Every candidate cause is an addition to this.
+one and the same law. Beside them, with the prior knowledge the measurement states: where the bearing axes are on all
+photos alike, the scale of the photos and the length of the cable. Every candidate cause is an addition to this.
 
 Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0 (1/m),
-relative error of the stated px/mm, relative error of the stated length. A weak prior keeps the law smooth,
+errors of the axes along and across the chord (m; only if the measurement states any), relative error of the stated px/mm, relative error of the stated length. A weak prior keeps the law smooth,
 ``int (d^2 log f / dt^2)^2 dt / tau^2`` with t from 0 to 1 over the control points (see `rod.knots`): without a photo of
 the force-free cable, K0 and the stiffness near K0 are else free to run away together.
 """
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.camera import scaled
+from pipeline.diagnosis.causes.camera import axes_off, scaled
 from pipeline.diagnosis.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
@@ -26,6 +26,8 @@ from rod.knots import place_knots, roughness
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
+
+AXES = ("left_along", "left_across", "right_along", "right_across")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,8 @@ class Base:
         As stated.
     scale_std, length_std : relative
         Prior knowledge.
+    axis_std : m
+        Prior knowledge of each coordinate of the axes, common to all photos; 0 if they are exact.
     elements : int
     roughness : float
         tau of the prior on the law.
@@ -60,12 +64,28 @@ class Base:
     roughness: float
     first: float = 0.0
     straight: bool = False
+    axis_std: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         bend = () if self.straight else ("pre_curvature",)
-        return (*(f"stiffness_{i}" for i in range(len(self.knots))), *bend, "scale", "length")
+        return (*(f"stiffness_{i}" for i in range(len(self.knots))), *bend, *self.axes, "scale", "length")
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the errors of the bearing axes."""
+        return AXES if self.axis_std > 0.0 else ()
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """Names of the parameters that change what is seen and not what happens."""
+        return (*self.axes, "scale")
+
+    def axis_errors(self, vector: Array) -> Array:
+        """Errors (4,) of the axes in the order of `AXES`, m."""
+        first = self.names.index("scale") - len(self.axes)
+        return np.asarray(vector[first : first + 4]) if self.axes else np.zeros(4)
 
     @property
     def pre_curvature_index(self) -> int | None:
@@ -74,9 +94,10 @@ class Base:
 
     @property
     def prior(self) -> Array:
-        """Prior knowledge as rows (m, p) of unit variance: scale, length, and smoothness of the law; all centred at zero."""
+        """Prior knowledge as rows (m, p) of unit variance, centred at zero: scale, length, axes, smoothness of the law."""
         count, size = len(self.knots), len(self.names)
         rows = [np.eye(size)[-2] / self.scale_std, np.eye(size)[-1] / self.length_std]
+        rows += [np.eye(size)[self.names.index(name)] / self.axis_std for name in self.axes]
         if count > 2:
             weight, mode = np.linalg.eigh(roughness(self.knots))
             kept = weight > 1e-9 * weight[-1]
@@ -87,12 +108,13 @@ class Base:
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
-        return np.r_[np.full(len(self.knots), 1e-4), bend, 1e-6, 1e-6]
+        axes = np.full(len(self.axes), 1e-6 * facts.length)
+        return np.r_[np.full(len(self.knots), 1e-4), bend, axes, 1e-6, 1e-6]
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m) to go with it."""
         rest = [] if self.straight else [self.first + bend]
-        return np.r_[np.full(len(self.knots), np.log(stiffness)), rest, 0.0, 0.0]
+        return np.r_[np.full(len(self.knots), np.log(stiffness)), rest, np.zeros(len(self.axes)), 0.0, 0.0]
 
     def pre_curvature(self, vector: Array) -> float:
         """K0, 1/m."""
@@ -114,8 +136,12 @@ class Base:
         return Model(bending).observed(self.observer(vector))
 
     def observer(self, vector: Array) -> Observer:
-        """First observer of every model: the camera with its scale."""
-        return scaled(float(vector[len(self.names) - 2]))
+        """First observer of every model: the camera with its scale, and the axes found on its photos."""
+        camera = scaled(float(vector[len(self.names) - 2]))
+        if not self.axes:
+            return camera
+        errors = axes_off(self.axis_errors(vector))
+        return lambda prediction, facts: errors(camera(prediction, facts), facts)
 
     def law_directions(self, vector: Array, knots: Array) -> Array:
         """Change (k, p) of the law at ``knots`` (k,) per unit of the first p parameters, N m^2."""
@@ -163,4 +189,5 @@ def start(
         roughness=smoothness,
         first=float(rest),
         straight=straight,
+        axis_std=test.axis_std,
     )

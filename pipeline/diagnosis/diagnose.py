@@ -14,8 +14,10 @@ import numpy as np
 from pipeline.diagnosis.explanation import Explanation, candidates, refit_one, refit_pairs
 from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
+from pipeline.diagnosis.pairs import pair_gains
 from pipeline.diagnosis.presentation import present
 from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.diagnosis.twins import cosines
 from pipeline.diagnosis.verdict import credible_set, probabilities
 from pipeline.diagnosis.workbench import Workbench, prepare, scored, with_finer_law
 from pipeline.identify import Identification
@@ -78,14 +80,13 @@ def diagnose(
     bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
     if isinstance(bench, str):
         return _nothing_to_compare(bench), faults.findings
-    conclusion = conclude(bench, settings)
-    fault = _item_at_fault(bench, conclusion, settings)
+    fault = _item_at_fault(bench, settings)
     if fault is not None:
-        faults = faults.joined(fault)
-        again = prepare(faults, settings, knots=len(bench.base.extension.base.knots))
-        if not isinstance(again, str):
-            bench, conclusion = again, conclude(again, settings)
-    return present(bench, conclusion, settings), faults.findings
+        knots = len(bench.base.extension.base.knots)
+        again = prepare(faults.joined(fault), settings, knots=knots)
+        if not isinstance(again, str) and again.largest <= again.limit:
+            faults, bench = faults.joined(fault), again
+    return present(bench, conclude(bench, settings), settings), faults.findings
 
 
 def chosen_knots(identification: Identification | None, settings: DiagnosisSettings) -> int:
@@ -167,16 +168,22 @@ def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Le
     return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng)
 
 
-def _item_at_fault(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> Faults | None:
-    """One photo or force whose absence removes the misfit, where no cause does."""
+def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:
+    """One photo or force whose absence brings the rest to the noise, and removes more than any cause or pair can."""
     item = worst_item(bench.observation, bench.base)
     if item is None or item.gain - item.rows < settings.fault_sigma**2:
         return None
-    by_cause = max((e.gain for e in conclusion.singles), default=0.0)
-    if conclusion.accepted is not None:
-        by_cause = max(by_cause, conclusion.accepted.gain)
     freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
     fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + settings.explained_share * item.gain
+    scores = bench.suspicion.scores
+    pairs = pair_gains(
+        scores.z,
+        cosines(scores.unit),
+        bench.suspicion.sign,
+        bench.suspicion.owner,
+        collinear=settings.pair_collinear,
+    )
+    by_cause = max(bench.largest**2, float(pairs.max(initial=0.0)))
     better = item.gain - item.rows > by_cause + settings.fault_sigma**2
     return outlier_fault(bench.test, item) if fits and better else None
 

@@ -198,7 +198,8 @@ def _base_columns(
     # where a cause has put further control points into the law, a base ordinate moves them along the base spline
     share = base.law_directions(vector, law.knots)
     count = share.shape[0]
-    change = np.zeros((count + (0 if base.straight else 1) + 1, len(base.names) - 1))
+    bent = [name for name in base.names if name not in base.observed]
+    change = np.zeros((count + (0 if base.straight else 1) + 1, len(bent)))
     change[:count, : share.shape[1]] = share
     if (bend := base.pre_curvature_index) is not None:
         change[count, bend] = 1.0
@@ -209,10 +210,10 @@ def _base_columns(
     for j in range(len(base.names)):
         trial = vector.copy()
         trial[j] += steps[j]
-        if base.names[j] == "scale":
+        if base.names[j] in base.observed:
             shown = observed(bare, replace(model, observers=(base.observer(trial), *model.observers[1:])), facts)
         else:
-            shown = observed(moved(bare, by, j if base.names[j] != "length" else -1, float(steps[j])), model, facts)
+            shown = observed(moved(bare, by, bent.index(base.names[j]), float(steps[j])), model, facts)
         value = whole_residual(observation, shown, trial, prior)
         assert value is not None
         columns.append((at_here - value) / steps[j])

@@ -68,7 +68,7 @@ class DiagnosisSettings(BaseModel):
     refit_least: float = Field(
         30.0, description="chi-square a cause may always fall short of the best and still be refitted"
     )
-    refit_most: int = Field(12, description="causes refitted at most, best linear scores first; time")
+    refit_most: int = Field(8, description="causes refitted at most, best linear scores first; time")
     hopeless: float = Field(
         0.02, description="share of the base chi-square a refit may lie above the best one and still be worked on; time"
     )

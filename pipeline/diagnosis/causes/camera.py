@@ -69,6 +69,29 @@ def scaled(error: float) -> Observer:
     return observer
 
 
+def axes_off(errors: Array) -> Observer:
+    """Observer that takes the bearing axes at (left along, left across, right along, right across) (4,) m off them.
+
+    The chord frame is laid through what is taken for the axes.
+    """
+    left_along, left_across, right_along, right_across = errors
+
+    def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        span = prediction.chord + right_along - left_along
+        rise = right_across - left_across
+        roll = np.arctan2(rise, span)[:, None]
+        rel_x, rel_y = prediction.x - left_along, prediction.y - left_across
+        return replace(
+            prediction,
+            chord=np.hypot(span, rise),
+            x=np.cos(roll) * rel_x + np.sin(roll) * rel_y,
+            y=np.cos(roll) * rel_y - np.sin(roll) * rel_x,
+            theta=prediction.theta - roll,
+        )
+
+    return observer
+
+
 @dataclass(frozen=True)
 class ScaleError:
     """``scale_error``: the stated px/mm is not the true one."""

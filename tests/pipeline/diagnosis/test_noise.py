@@ -20,7 +20,9 @@ def test_covariance_of_block_means_is_that_of_the_averages():
     s = pitch * np.arange(5 * members)
     full = np.exp(-np.abs(np.subtract.outer(s, s)) / length)
     mean = np.kron(np.eye(5), np.full((1, members), 1.0 / members))
-    assert np.allclose(block_correlation(5, members=members, pitch=pitch, length=length), mean @ full @ mean.T, atol=1e-12)
+    assert np.allclose(
+        block_correlation(5, members=members, pitch=pitch, length=length), mean @ full @ mean.T, atol=1e-12
+    )
 
 
 def test_uncorrelated_sections_average_by_the_square_root():
@@ -53,7 +55,9 @@ def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
     found = calibrate_photo_noise(
         residuals, [blocks] * 7, [basis] * 7, stretches=(0.35, 0.6, 1.0, 1.7, 2.8, 4.5), prior_weight=20.0
     )
-    white = np.linalg.solve(np.linalg.cholesky(section_covariance(blocks, factor=found.factor, stretch=found.stretch)), root)
+    white = np.linalg.solve(
+        np.linalg.cholesky(section_covariance(blocks, factor=found.factor, stretch=found.stretch)), root
+    )
     # what counts is the weight of a smooth component, which must be right to a fifth (the false alarms are set by it)
     weight = np.linalg.norm(np.linalg.qr(basis)[0].T @ white.T, axis=1)[:8]
     assert np.all(np.abs(weight - 1.0) < 0.2)

@@ -1,0 +1,99 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import SIX, Reading, hidden_test
+from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.faults import faults_of_input
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+SETTINGS = DiagnosisSettings()
+
+
+@pytest.fixture(scope="module")
+def honest():
+    return hidden_test(Cable(), SIX, largest=0.0138, seed=21)
+
+
+def with_steps(test, **changes):
+    steps = list(test.steps)
+    for name, change in changes.items():
+        index = int(name.removeprefix("step"))
+        steps[index] = replace(steps[index], **change)
+    return replace(test, steps=tuple(steps))
+
+
+def picture(step):
+    return {"shape": step.shape, "chord": step.chord, "picture_centre": step.picture_centre}
+
+
+def codes(found):
+    return [finding.code for finding in found.findings]
+
+
+def test_honest_data_have_no_faults(honest):
+    assert codes(faults_of_input(honest, SETTINGS)) == []
+
+
+def test_photos_out_of_order(honest):
+    mixed = with_steps(honest, step2=picture(honest.steps[4]), step4=picture(honest.steps[2]))
+    part, findings = diagnose(mixed, None, SETTINGS)
+    assert [finding.code for finding in findings] == ["photo/order"]
+    assert "2, 4" in findings[0].message
+    assert part.verdict == "adequate"  # what is left of the data is sound
+
+
+def test_doubled_photo(honest):
+    part, findings = diagnose(with_steps(honest, step3=picture(honest.steps[5])), None, SETTINGS)
+    assert [finding.code for finding in findings] == ["photo/doubled"]
+    assert "of step 3, which fits its displacement less well" in findings[0].message
+    assert part.verdict == "adequate"
+
+
+@pytest.mark.parametrize(("factor", "word"), [(1e-3, "m instead of mm"), (1.0 / 25.4, "inches"), (0.1, "cm instead")])
+def test_wrong_unit_of_displacement(honest, factor, word):
+    steps = tuple(replace(step, displacement=factor * step.displacement) for step in honest.steps)
+    found = faults_of_input(replace(honest, steps=steps), SETTINGS)
+    assert codes(found) == ["log/unit"] and word in found.findings[0].message
+    # displacements are scaled to the photographed chords: 0.1 % at 5 um in 14 mm
+    assert found.test.steps[-1].displacement == pytest.approx(honest.steps[-1].displacement, rel=2e-3)
+
+
+def test_wrong_length():
+    test = hidden_test(Cable(), SIX, largest=0.0138, seed=22, reading=Reading(length_error=0.03))
+    found = faults_of_input(test, SETTINGS)
+    assert codes(found) == ["length/traced"] and "181.0 mm" in found.findings[0].message
+
+
+def test_forces_of_the_wrong_sign_and_unit(honest):
+    def scaled(factor):
+        return tuple(
+            replace(step, force=factor * step.force, hold_forces=factor * step.hold_forces) for step in honest.steps
+        )
+
+    assert codes(faults_of_input(replace(honest, steps=scaled(-1.0)), SETTINGS)) == ["force/sign"]
+    assert codes(faults_of_input(replace(honest, steps=scaled(1e6)), SETTINGS)) == ["force/unit"]
+
+
+def test_one_bad_photo_is_no_cause(honest):
+    shape = honest.steps[3].shape
+    bent = 3e-4 * np.sin(2.5 * np.pi * shape.section_s / 0.181) ** 2  # a third of a millimetre, beside a shadow
+    spoiled = replace(shape, section_y=shape.section_y + bent)
+    part, findings = diagnose(with_steps(honest, step3={"shape": spoiled}), None, SETTINGS)
+    assert [finding.code for finding in findings] == ["photo/outlier"]
+    assert "step 3" in findings[0].message and part.verdict == "adequate"
+
+
+def test_one_bad_force_is_no_cause(honest):
+    forces = honest.steps[4].hold_forces + 0.3
+    part, findings = diagnose(with_steps(honest, step4={"hold_forces": forces}), None, SETTINGS)
+    assert [finding.code for finding in findings] == ["force/outlier"]
+    assert "step 4" in findings[0].message and part.verdict == "adequate"
+
+
+def test_without_photos_nothing_can_be_held_against_the_simulation(honest):
+    steps = tuple(replace(step, shape=None, chord=None) for step in honest.steps)
+    part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
+    assert part.verdict == "underpowered" and findings == ()

@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import LOOP, hidden_test
+from pipeline.diagnosis.gain import Fold, folds_by_level, held_out, predictive_root
+from pipeline.diagnosis.leftover import smooth_fields, test_leftover as leftover_of
+from pipeline.diagnosis.observation import observe
+from pipeline.diagnosis.prediction import facts_of
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+def test_both_branches_of_a_level_are_left_out_together_and_the_mounted_step_never():
+    displacement = np.array([0.0, 1.0, 2.0, 3.0, 2.001, 1.0])
+    branch = ("mounted", *("loading",) * 3, *("unloading",) * 2)
+    assert folds_by_level(displacement, branch, same=0.01) == [[1, 5], [2, 4], [3]]
+
+
+def folds(rng, effect):
+    """Straight line plus an effect that bends; the base model is the line, the extended one has the bend."""
+    x = np.linspace(-1.0, 1.0, 60)
+    line, bend = np.column_stack([np.ones(60), x]), x**3
+    full = np.column_stack([line, bend])
+    data = effect * bend + rng.standard_normal(60)
+    made = []
+    for part in np.array_split(np.arange(60), 4):
+        kept = np.setdiff1d(np.arange(60), part)
+        left = [data[part] - d[part] @ np.linalg.lstsq(d[kept], data[kept], rcond=None)[0] for d in (line, full)]
+        made.append(Fold(left[0], left[1], full[kept], full[part]))
+    return made
+
+
+def test_true_extension_removes_the_excess_on_what_it_has_not_seen():
+    shares = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        found = held_out(folds(rng, 20.0), draws=500, rng=rng)
+        assert found.interval[0] <= found.removed <= found.interval[1]
+        shares.append(found.removed)
+    assert np.mean(shares) == pytest.approx(1.0, abs=0.02)
+
+
+def test_nothing_is_shared_out_where_the_base_has_no_excess():
+    rng = np.random.default_rng(1)
+    assert held_out(folds(rng, 0.0), draws=500, rng=rng) is None
+
+
+def test_a_useless_extension_removes_nothing():
+    rng = np.random.default_rng(2)
+    made = [Fold(fold.base, fold.base, fold.inside, fold.outside) for fold in folds(rng, 20.0)]
+    assert held_out(made, draws=500, rng=rng).removed == 0.0
+
+
+def test_what_the_kept_data_do_not_tell_counts_for_neither_model():
+    inside = np.array([[1.0, 0.0], [1.0, 0.0]])
+    root = predictive_root(inside, np.array([[0.0, 1.0], [1.0, 0.0]]))
+    variance = np.diag(root @ root.T)
+    assert variance[0] > 1e6 and variance[1] == pytest.approx(1.5)
+
+
+@pytest.fixture(scope="module")
+def fields():
+    test = hidden_test(Cable(), LOOP, largest=0.0138, seed=4)
+    observation = observe(test, DiagnosisSettings())
+    rows = len(observation.rows.kind)
+    return observation, smooth_fields(observation, facts_of(test), rows=rows), rows
+
+
+def p_value(fields, data):
+    _, columns, rows = fields
+    jacobian = np.random.default_rng(1).standard_normal((rows, 8))
+    return leftover_of(data, jacobian, columns, draws=4000, rng=np.random.default_rng(2)).p_value
+
+
+def test_false_alarms_of_the_leftover_are_as_stated(fields):
+    rng = np.random.default_rng(3)
+    p = np.array([p_value(fields, rng.standard_normal(fields[2])) for _ in range(150)])
+    assert abs(np.mean(p < 0.1) - 0.1) < 3.0 * np.sqrt(0.09 / 150)
+
+
+def test_a_smooth_leftover_of_eight_sigma_is_found(fields):
+    observation, _, rows = fields
+    rng = np.random.default_rng(4)
+    found = []
+    for _ in range(40):
+        field, place = np.zeros(rows), rng.uniform(0.03, 0.15)
+        for photo in observation.photos:  # a bump at a random place that grows with the step
+            own = np.flatnonzero((observation.rows.kind > 0) & (observation.rows.step == photo.step))
+            bump = np.exp(-0.5 * ((photo.sections.s - place) / 0.02) ** 2)
+            field[own] = photo.step * photo.whiten[:, 1:] @ bump
+        found.append(p_value(fields, 8.0 * field / np.linalg.norm(field) + rng.standard_normal(rows)) < 0.003)
+    assert np.mean(found) >= 0.9
