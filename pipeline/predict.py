@@ -33,7 +33,7 @@ from scipy.optimize import brentq
 from pipeline.records import Finding
 from pipeline.result import Result
 from pipeline.settings.predict import PredictSettings
-from pipeline.visited import Visited, best
+from pipeline.visited import Visited, best, pre_curvature
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
 from rod.equilibrium import Equilibrium
@@ -209,10 +209,7 @@ def identified_model(result: Result) -> IdentifiedModel | None:
     curve = best(result)
     if curve is None:
         return None
-    told = {"inverse": result.inverse, "balance": result.balance}.get(curve.method)
-    K0, std = _rest(curve)
-    if told is not None and told.pre_curvature_per_m is not None and told.pre_curvature_std_per_m is not None:
-        K0, std = told.pre_curvature_per_m, told.pre_curvature_std_per_m
+    K0, std = pre_curvature(result, curve)
     law = Characteristic.from_ordinates(curve.kappa, curve.tangent)
     low, high = float(curve.kappa[0]), float(curve.kappa[-1])
     return IdentifiedModel(curve.method, law, K0, _joint_factor(curve, K0, std), (low, high))
@@ -253,7 +250,7 @@ def _step(
     return replace(_with_bands(test, model, bent), displacement_m=displacement, status=status, reason=reason)
 
 
-def _with_bands(test: BendingTest, model: IdentifiedModel, bent: tuple[Equilibrium]) -> PredictedStep:
+def _with_bands(test: BendingTest, model: IdentifiedModel, bent: tuple[Equilibrium, ...]) -> PredictedStep:
     """Force and shape of an equilibrium with standard deviations to first order."""
     (by,) = derivatives(test, bent, ["ordinates", "pre_curvature"])
     (step,) = bent
@@ -278,13 +275,6 @@ def _with_bands(test: BendingTest, model: IdentifiedModel, bent: tuple[Equilibri
         kappa_per_m=step.kappa.tolist(),
         kappa_std_per_m=std(by.kappa).tolist(),
     )
-
-
-def _rest(curve: Visited) -> tuple[float, float]:
-    """Curvature of zero moment and its standard deviation, which is that of the moment there over f."""
-    nearest = int(np.argmin(np.abs(curve.moment)))
-    f = curve.tangent[nearest]
-    return float(curve.kappa[nearest] - curve.moment[nearest] / f), float(curve.moment_std[nearest] / abs(f))
 
 
 def _joint_factor(curve: Visited, K0: float, std: float) -> Array:

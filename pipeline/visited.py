@@ -44,6 +44,12 @@ class Visited:
     secant_std: Array
     factor: Array
 
+    def rest(self) -> tuple[float, float]:
+        """Curvature of zero moment and its standard deviation, which is that of the moment there over f; 1/m."""
+        nearest = int(np.argmin(np.abs(self.moment)))
+        f = self.tangent[nearest]
+        return float(self.kappa[nearest] - self.moment[nearest] / f), float(self.moment_std[nearest] / abs(f))
+
     def at(self, kappa: float) -> tuple[float, float]:
         """Tangent and its standard deviation at a curvature, in N m^2, interpolated linearly."""
         return (
@@ -93,3 +99,14 @@ def best(result: Result) -> Visited | None:
     fitted = result.inverse is not None and result.inverse.converged
     order = ("extended", "inverse", "balance") if fitted else ("extended", "balance", "inverse")
     return next((parts[method] for method in order if method in parts), None)
+
+
+def pre_curvature(result: Result, curve: Visited) -> tuple[float, float]:
+    """Pre-curvature of the way a curve comes from and its standard deviation, 1/m.
+
+    An extended model tells it with its curve alone.
+    """
+    part = {"inverse": result.inverse, "balance": result.balance}.get(curve.method)
+    if part is None or part.pre_curvature_per_m is None or part.pre_curvature_std_per_m is None:
+        return curve.rest()
+    return part.pre_curvature_per_m, part.pre_curvature_std_per_m

@@ -1,0 +1,273 @@
+"""Two results beside each other, such as before and after a change, and whether they differ beyond their bands.
+
+Two results -> f_EI (tangent reading) on the curvatures that both visited, with both covariances, and K0. The two share
+no photo and no force, so the covariance of the difference is the sum of both; `pipeline.identify.contrast` tests the
+mean log ratio over each third of the common range. K0 is tested on its own. Both p-values are doubled (Bonferroni), so
+that the verdict as a whole has the level that is told. Each result answers with its best curve (extended, else
+inverse, else balance). Nothing is compared outside the common range.
+
+What no test on two results can see is said as a finding: an error of the scale that both have in common, and what
+else makes a difference, or its absence, doubtful. Lengths too large by e make f_EI too large by up to 2 e: f is a
+moment P y over a curvature, the one grows with the scale and the other falls.
+
+Curvature in 1/m, f in N m^2; ratios are f_B / f_A, above one where B is stiffer. Tests are made on the logarithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from pipeline.identify.contrast import LogCurve, p_value, parts_difference
+from pipeline.records import Finding
+from pipeline.result import Result
+from pipeline.rounding import plain, rounded
+from pipeline.settings.compare import CompareSettings
+from pipeline.visited import Visited, best, pre_curvature
+
+Array = NDArray[np.float64]
+
+# Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it.
+DOUBTS = ("identify/scale", "identify/length", "identify/misfit-shape", "identify/misfit-force", "length/traced")
+TESTS = 2
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A number in both results: B minus A with its standard deviation, and the p-value of no difference."""
+
+    a: float
+    b: float
+    difference: float
+    std: float
+    p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What two results say about each other.
+
+    Attributes
+    ----------
+    a, b : str
+        Names of the specimens.
+    methods : (str, str)
+        Way that each answers with.
+    verdict : {"differ", "no difference seen", "not comparable"}
+    statement : str
+        In plain words.
+    range_per_m : (low, high) or None
+        Curvatures that both visited.
+    kappa_per_m, ratio, ratio_std : (n,)
+        f_B / f_A along the range, with its pointwise standard deviation.
+    rms_relative, max_relative : float or None
+        Of f_B / f_A - 1.
+    mean_stiffness : Difference or None
+        Geometric mean of f over the range, N m^2.
+    p_characteristic : float or None
+        Of a difference as large as this where both have one characteristic; None without covariances.
+    pre_curvature : Difference or None
+        1/m.
+    level : float
+        Of the verdict: both tests together.
+    findings : tuple of Finding
+    """
+
+    a: str
+    b: str
+    methods: tuple[str, str]
+    verdict: str
+    statement: str
+    range_per_m: tuple[float, float] | None
+    kappa_per_m: Array
+    ratio: Array
+    ratio_std: Array
+    rms_relative: float | None
+    max_relative: float | None
+    mean_stiffness: Difference | None
+    p_characteristic: float | None
+    pre_curvature: Difference | None
+    level: float
+    findings: tuple[Finding, ...] = ()
+
+
+def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) -> Comparison:
+    """Compare two results that were measured apart.
+
+    Parameters
+    ----------
+    a, b : Result
+    settings : CompareSettings, optional
+
+    Returns
+    -------
+    Comparison
+        ``not comparable`` where a characteristic is missing or no curvature was visited by both.
+    """
+    settings = settings or CompareSettings()
+    one, two = best(a), best(b)
+    if one is None or two is None:
+        lacking = " and ".join(r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None)
+        return _not_comparable(a, b, ("", ""), f"No characteristic was measured on {lacking}.", settings)
+    methods = (one.method, two.method)
+    first, second = _log_curve(one), _log_curve(two)
+    grid = first.common_grid(second)
+    if grid is None:
+        ranges = " and ".join(f"{c.kappa[0]:.3g} to {c.kappa[-1]:.3g} 1/m" for c in (one, two))
+        return _not_comparable(a, b, methods, f"No curvature was visited by both ({ranges}).", settings)
+    ratio = np.exp(second.log_on(grid) - first.log_on(grid))
+    bands = first.onto(grid) @ first.log_covariance @ first.onto(grid).T
+    bands += second.onto(grid) @ second.log_covariance @ second.onto(grid).T
+    known = one.factor.shape[1] > 0 and two.factor.shape[1] > 0
+    covariance = first.parts_covariance(grid) + second.parts_covariance(grid)
+    p = p_value(parts_difference(first, second, grid), covariance) if known else None
+    (K0_a, std_a), (K0_b, std_b) = pre_curvature(a, one), pre_curvature(b, two)
+    rest = _difference(K0_a, K0_b, float(np.hypot(std_a, std_b)))
+    mean = _mean(first, second, grid, bands)
+    verdict, statement = _verdict(a, b, (p, rest, mean), ratio, settings)
+    return Comparison(
+        a=a.specimen.id,
+        b=b.specimen.id,
+        methods=methods,
+        verdict=verdict,
+        statement=statement,
+        range_per_m=(float(grid[0]), float(grid[-1])),
+        kappa_per_m=grid,
+        ratio=ratio,
+        ratio_std=ratio * np.sqrt(np.maximum(np.diag(bands), 0.0)),
+        rms_relative=float(np.sqrt(np.mean((ratio - 1.0) ** 2))),
+        max_relative=float(np.max(np.abs(ratio - 1.0))),
+        mean_stiffness=mean,
+        p_characteristic=p,
+        pre_curvature=rest,
+        level=settings.level,
+        findings=tuple(_findings(a, b, (one, two), mean, settings)),
+    )
+
+
+def _log_curve(curve: Visited) -> LogCurve:
+    """The curve with the covariance of log f; without a factor its errors count as independent, for the band alone."""
+    factor = curve.factor if curve.factor.shape[1] else np.diag(curve.tangent_std)
+    relative = factor / curve.tangent[:, None]
+    return LogCurve(curve.kappa, curve.tangent, relative @ relative.T)
+
+
+def _mean(first: LogCurve, second: LogCurve, grid: Array, bands: Array) -> Difference:
+    """Geometric mean stiffness over the range; the test is that of the logarithms."""
+    log_a, log_b = float(np.mean(first.log_on(grid))), float(np.mean(second.log_on(grid)))
+    tested = _difference(log_a, log_b, float(np.sqrt(max(np.mean(bands), 0.0))))
+    a, b = float(np.exp(log_a)), float(np.exp(log_b))
+    return Difference(a, b, b - a, tested.std * float(np.sqrt(a * b)), tested.p_value)
+
+
+def _difference(a: float, b: float, std: float) -> Difference:
+    z = abs(b - a) / std if std > 0.0 else (0.0 if a == b else np.inf)
+    return Difference(a, b, b - a, std, float(2.0 * ndtr(-z)))
+
+
+def _verdict(
+    a: Result,
+    b: Result,
+    tested: tuple[float | None, Difference, Difference],
+    ratio: Array,
+    settings: CompareSettings,
+) -> tuple[str, str]:
+    """Verdict and statement in plain words."""
+    p, rest, mean = tested
+    names = f"{a.specimen.id} and {b.specimen.id}"
+    rms, most = np.sqrt(np.mean((ratio - 1.0) ** 2)), np.max(np.abs(ratio - 1.0))
+    size = f"f_EI differs by {plain(100 * rms, 2)} % rms, {plain(100 * most, 2)} % at most"
+    if p is None:
+        return "not comparable", f"{size}, but a result holds no covariance along its curve: it cannot be tested."
+    bent = min(1.0, TESTS * p) < settings.level
+    set_off = min(1.0, TESTS * rest.p_value) < settings.level
+    stiffer = b.specimen.id if mean.difference > 0.0 else a.specimen.id
+    seen = []
+    if bent:
+        seen.append(f"the bending stiffness characteristic (p = {p:.2g}; {stiffer} is stiffer on the mean)")
+    if set_off:
+        seen.append(f"the pre-curvature (by {rounded(rest.difference, rest.std)} 1/m, p = {rest.p_value:.2g})")
+    if seen:
+        return "differ", f"{names} differ beyond their bands in {' and in '.join(seen)}. {size}."
+    found = f"{size}, which is within both bands (p = {p:.2g})"
+    seen_from = f"a mean difference of {plain(200 * mean.std / mean.a, 2)} % is twice its standard deviation"
+    return "no difference seen", f"{names} do not differ beyond their bands: {found}; {seen_from}."
+
+
+def _not_comparable(
+    a: Result, b: Result, methods: tuple[str, str], statement: str, settings: CompareSettings
+) -> Comparison:
+    none = np.empty(0)
+    return Comparison(
+        a=a.specimen.id,
+        b=b.specimen.id,
+        methods=methods,
+        verdict="not comparable",
+        statement=statement,
+        range_per_m=None,
+        kappa_per_m=none,
+        ratio=none,
+        ratio_std=none,
+        rms_relative=None,
+        max_relative=None,
+        mean_stiffness=None,
+        p_characteristic=None,
+        pre_curvature=None,
+        level=settings.level,
+    )
+
+
+def _findings(
+    a: Result, b: Result, curves: tuple[Visited, Visited], mean: Difference, settings: CompareSettings
+) -> Iterator[Finding]:
+    """What makes the comparison doubtful."""
+    yield from _scale_findings(a, b, mean)
+    lengths = [r.specimen.length_m for r in (a, b) if r.specimen.length_m is not None]
+    if len(lengths) == len(curves) and max(lengths) > (1.0 + settings.length_relative) * min(lengths):
+        message = (
+            f"The cables were measured with lengths of {1e3 * lengths[0]:.4g} and {1e3 * lengths[1]:.4g} mm: what "
+            "belongs to the ends (covers, friction, springs) weighs differently, and passes for a difference."
+        )
+        yield Finding("compare/length", "warning", message)
+    spans = [float(c.kappa[-1] - c.kappa[0]) for c in curves]
+    common = min(float(c.kappa[-1]) for c in curves) - max(float(c.kappa[0]) for c in curves)
+    if common < settings.least_overlap * max(spans):
+        message = f"Only {100 * common / max(spans):.0f} % of the larger visited range was visited by both."
+        yield Finding("compare/range", "warning", message)
+    if curves[0].method != curves[1].method:
+        message = f"One answers with the {curves[0].method} curve, the other with the {curves[1].method} one."
+        yield Finding("compare/method", "warning", message)
+    for result in (a, b):
+        doubts = [f.message.rstrip(".") + "." for f in result.findings if f.code in DOUBTS]
+        if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
+            doubts.append("its simulation leaves a misfit that no known cause removes.")
+        if doubts:
+            yield Finding("compare/doubt", "warning", f"{result.specimen.id}: {' '.join(doubts)}")
+
+
+def _scale_findings(a: Result, b: Result, mean: Difference) -> Iterator[Finding]:
+    """Scales: an error in common cannot show, one of a single result passes for a difference."""
+    if a.scale is None or b.scale is None:
+        return
+    if (a.scale.source, a.scale.px_per_mm) == (b.scale.source, b.scale.px_per_mm):
+        message = (
+            f"Both have the scale {a.scale.px_per_mm:.5g} px/mm ({a.scale.source}): an error of it changes both f_EI "
+            "alike and does not show here; the bands contain it twice, so small differences are judged too mildly."
+        )
+        yield Finding("compare/scale-shared", "info", message)
+        return
+    share = 2.0 * float(np.hypot(a.scale.std_relative, b.scale.std_relative))
+    size, std = abs(float(np.log(mean.b / mean.a))), mean.std / mean.a
+    message = (
+        f"The scales come apart ({a.scale.source}; {b.scale.source}); their stated errors make up to "
+        f"{plain(100 * share, 2)} % of f_EI. The mean difference of {plain(100 * size, 2)} % would follow from scales "
+        f"{plain(50 * size, 2)} % apart."
+    )
+    if 2.0 * std < size < 3.0 * share:
+        yield Finding("compare/scale", "warning", message)
+    elif size < 3.0 * share:
+        yield Finding("compare/scale", "info", message)
