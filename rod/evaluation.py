@@ -136,11 +136,13 @@ def _imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Ar
     """Chord imposed on a step, m, and its derivative by all unknowns (q,)."""
     by = np.zeros(model.size)
     if data.chord is not None:
-        left, right = f"left_along/{data.step.step}", f"right_along/{data.step.step}"
         by[model.index("scale")] = data.chord * model.nuisances["scale"]
-        by[model.index(left)], by[model.index(right)] = data.axis_std, -data.axis_std
-        scaled = data.chord * (1.0 + model.nuisance(u, "scale"))
-        return scaled + model.nuisance(u, left) - model.nuisance(u, right), by
+        chord = data.chord * (1.0 + model.nuisance(u, "scale"))
+        for part, sign in (("left_along", 1.0), ("right_along", -1.0)):
+            for name in model.pose_names(part, data.step.step):
+                by[model.index(name)] = sign * model.nuisances[name]
+                chord += sign * model.nuisance(u, name)
+        return chord, by
     moved = data.step.displacement or 0.0
     if model.zero is None:
         arc = _arc(model, u)
@@ -199,11 +201,14 @@ def _step_fit(model: FitModel, u: Array, data: StepData, shape: Simulated, impos
     force = None if data.at_rest else (data.step.force - shape.force, -shape.force_by @ chain)
     photo = None
     if data.midline is not None:
-        names = [f"{name}/{data.step.step}" for name in POSE] + ["scale"]
-        found = distance(data.midline, shape, Pose(*(model.nuisance(u, name) for name in names)), chord)
+        step = data.step.step
+        pose = Pose(*model.pose(u, step), model.nuisance(u, "scale"))
+        found = distance(data.midline, shape, pose, chord)
         by = found.by_model @ chain
-        for name, column in zip(names, found.by_pose.T, strict=True):
-            by[:, model.index(name)] += column * model.nuisances[name]
+        names = (*(model.pose_names(part, step) for part in POSE), ("scale",))
+        for moved_by, column in zip(names, found.by_pose.T, strict=True):
+            for name in moved_by:
+                by[:, model.index(name)] += column * model.nuisances[name]
         photo = (found.value, by, found.s)
     return StepFit(data, shape, chord, photo, force, gap)
 

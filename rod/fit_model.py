@@ -5,8 +5,8 @@ Unknowns u, all of order one:
     z      log f_EI at the knots (tangent reading), so the stiffness is positive
     k0     K0 times the length
     then, in units of their prior standard deviations, the nuisances: the cable's ``length``, the common ``scale`` of
-    the photos, the ``zero`` of displacement (only where a step has no photo), and for each photo the position of both
-    bearing axes, along and across the chord
+    the photos, the ``zero`` of displacement (only where a step has no photo), and the position of both bearing axes,
+    along and across the chord: what all photos have in common, and what each photo adds
 
 Signs and units: `rod.measurement`; SI.
 """
@@ -108,6 +108,16 @@ class FitModel:
         """A nuisance in its own unit."""
         return float(u[self.index(name)]) * self.nuisances[name]
 
+    def pose(self, u: Array, step: int) -> tuple[float, float, float, float]:
+        """Positions of the bearing axes on the photo of a step in the order of `POSE`, m."""
+        parts = [sum(self.nuisance(u, name) for name in self.pose_names(part, step)) for part in POSE]
+        return parts[0], parts[1], parts[2], parts[3]
+
+    def pose_names(self, part: str, step: int) -> tuple[str, ...]:
+        """Nuisances that add up to one of `POSE` on the photo of a step."""
+        own = f"{part}/{step}"
+        return (own, part) if part in self.nuisances else (own,)
+
     def cable_length(self, u: Array) -> float:
         """Length of the cable, m."""
         return self.length + self.nuisance(u, "length")
@@ -179,6 +189,8 @@ def fit_model(test: MeasuredTest, data: tuple[StepData, ...], knots: Array, *, t
     zero = zero_of_displacement(data)
     if zero is not None and any(d.midline is None for d in data):
         nuisances["zero"] = zero[1]
+    if test.axis_std > 0.0:
+        nuisances |= dict.fromkeys(POSE, test.axis_std)
     for d in data:
         if d.midline is not None:
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}

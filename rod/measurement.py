@@ -122,6 +122,8 @@ class MeasuredTest:
     length_std : m
     scale_std : relative
         Common to all photos: every length on the photos may be off by this factor.
+    axis_std : m
+        Of each coordinate of a bearing axis, common to all photos: what is found as the axis is off the pin by this.
     steps : tuple of MeasuredStep
         In the order of the test.
     moving : str
@@ -138,3 +140,4 @@ class MeasuredTest:
     moving: str = "left"
     notes: tuple[str, ...] = field(default=())
     picture_half_diagonal: float | None = None
+    axis_std: float = 0.0

@@ -19,6 +19,12 @@ class IdentifySettings(BaseModel):
     displacement_std_m: float = Field(
         2e-5, gt=0, description="m; a spindle with a dial gauge, against the chord on the photos"
     )
+    axis_std_m: float = Field(
+        2e-5,
+        ge=0,
+        description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by a "
+        "fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
+    )
     elements: int = Field(100, ge=20, description="of the simulated rod; at 100 its force is within 1e-4")
     blocks: int = Field(
         160, ge=20, description="independent data per photo at most; one per correlation length of the midline's error"
