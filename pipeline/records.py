@@ -48,7 +48,7 @@ class CameraSpec:
     scale_px_per_m: float | None = None
     calibration: Path | None = None
     board: Board | None = None
-    distance_m: float | None = None       # camera to calibration plane, for the height of the cable axis
+    distance_m: float | None = None  # camera to calibration plane, for the height of the cable axis
 
 
 @dataclass(frozen=True)
