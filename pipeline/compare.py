@@ -150,8 +150,8 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
 
 
 def _log_curve(curve: Visited) -> LogCurve:
-    """The curve with the covariance of log f; without a factor its errors count as independent, for the band alone."""
-    factor = curve.factor if curve.factor.shape[1] else np.diag(curve.tangent_std)
+    """The curve with the covariance of log f; without a factor all errors have one sign: the widest band of a mean."""
+    factor = curve.factor if curve.factor.shape[1] else curve.tangent_std[:, None]
     relative = factor / curve.tangent[:, None]
     return LogCurve(curve.kappa, curve.tangent, relative @ relative.T)
 
@@ -165,8 +165,8 @@ def _mean(first: LogCurve, second: LogCurve, grid: Array, bands: Array) -> Diffe
 
 
 def _difference(a: float, b: float, std: float) -> Difference:
-    z = abs(b - a) / std if std > 0.0 else (0.0 if a == b else np.inf)
-    return Difference(a, b, b - a, std, float(2.0 * ndtr(-z)))
+    z = abs(b - a) / std if std > 0.0 else (0.0 if a == b else float("inf"))
+    return Difference(a, b, b - a, std, float(2.0 * ndtr(-float(z))))
 
 
 def _verdict(

@@ -43,6 +43,19 @@ Array = NDArray[np.float64]
 Zero = Literal["natural", "length"]
 Status = Literal["predicted", "extrapolated", "refused", "no equilibrium"]
 
+# Arrays of a predicted step along the cable.
+PREDICTED = (
+    "s_m",
+    "x_m",
+    "x_std_m",
+    "y_m",
+    "y_std_m",
+    "theta_rad",
+    "theta_std_rad",
+    "kappa_per_m",
+    "kappa_std_per_m",
+)
+
 # Share of the largest moment band below which a direction of the covariance tells nothing about its link to K0:
 # the integrals are trapezoidal sums, right to about 1e-4.
 RESOLVED = 1e-2
@@ -283,7 +296,7 @@ def _joint_factor(curve: Visited, K0: float, std: float) -> Array:
     Without a factor of f its errors are taken as one common factor on the whole curve: the widest band of a force.
     """
     F = curve.factor if curve.factor.shape[1] else curve.tangent_std[:, None]
-    rise = cumulative_trapezoid(F, curve.kappa, axis=0, initial=0.0)
+    rise = cumulative_trapezoid(F, curve.kappa, axis=0, initial=0)
     rise -= np.array([np.interp(K0, curve.kappa, column) for column in rise.T])  # int_{K0}^{K} of each column
     f0 = float(np.interp(K0, curve.kappa, curve.tangent))
     linked = (np.sum(rise**2, axis=1) + (f0 * std) ** 2 - curve.moment_std**2) / (2.0 * f0)

@@ -9,10 +9,12 @@ keep their names; more stands beside them.
 from __future__ import annotations
 
 from html import escape
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from pipeline.errors import InputError
 from pipeline.rounding import rounded
 
 SCHEMA = "cablebend/result/1"
@@ -343,6 +345,26 @@ def to_json(result: Result) -> str:
 def from_json(text: str) -> Result:
     """Read ``result.json`` back; raises ``pydantic.ValidationError`` for anything that is not one."""
     return Result.model_validate_json(text)
+
+
+def read_result(path: Path | str) -> Result:
+    """Read ``result.json``, or the one in a folder.
+
+    Raises
+    ------
+    InputError
+        ``result/unreadable`` if it cannot be read or is none.
+    """
+    file = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
+    try:
+        return from_json(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"is no readable result ({type(error).__name__})",
+            path=file,
+            code="result/unreadable",
+            remedy="give a result.json that `cablebend run` wrote, or its folder",
+        ) from error
 
 
 def schema() -> dict[str, Any]:

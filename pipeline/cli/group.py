@@ -11,7 +11,7 @@ from pipeline import __version__
 from pipeline.errors import InputError
 
 # command -> module of this room; each module has a function of the command's name
-COMMANDS = ("run", "check", "init", "report", "demo", "simulate", "design", "explain", "paper")
+COMMANDS = ("run", "check", "init", "report", "predict", "compare", "demo", "simulate", "design", "explain", "paper")
 INTERRUPTED = 130
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import pandas as pd
 
+from pipeline.compare import Comparison
+from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
 from pipeline.visited import METHODS, best
@@ -107,4 +109,23 @@ def moment_frame(result: Result) -> pd.DataFrame:
         return pd.DataFrame(columns=["kappa_per_m", "moment_Nm", "moment_std_Nm"])
     return pd.DataFrame(
         {"kappa_per_m": curve.kappa, "moment_Nm": curve.moment, "moment_std_Nm": curve.moment_std},
+    )
+
+
+def prediction_frame(prediction: Prediction) -> pd.DataFrame:
+    """Forces and shapes of a predicted experiment: one row a point of a shape, one row for a step without shape."""
+    ahead = ("displacement_m", "status", "chord_m", "force_N", "force_std_N")
+    parts = []
+    for step in prediction.steps:
+        part = pd.DataFrame({name: getattr(step, name) or [None] for name in PREDICTED}, dtype=float)
+        for place, name in enumerate(ahead):
+            part.insert(place, name, getattr(step, name))
+        parts.append(part.astype({name: float for name in ahead if name != "status"}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def comparison_frame(comparison: Comparison) -> pd.DataFrame:
+    """Ratio of two characteristics along the common range with its standard deviation."""
+    return pd.DataFrame(
+        {"kappa_per_m": comparison.kappa_per_m, "ratio": comparison.ratio, "ratio_std": comparison.ratio_std}
     )

@@ -1,0 +1,89 @@
+"""``cablebend compare``: whether two results differ beyond their bands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pipeline.cli.options import settings_options
+
+if TYPE_CHECKING:
+    from pipeline.compare import Comparison
+
+MISSING = 3
+
+
+@click.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Everything as JSON on stdout.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV of the ratio with its band.")
+@settings_options
+@click.pass_context
+def compare(
+    ctx: click.Context,
+    a: Path,
+    b: Path,
+    as_json: bool,
+    out: Path | None,
+    settings_file: Path | None,
+    assignments: tuple[str, ...],
+) -> None:
+    """Say whether the results A and B differ beyond their bands.
+
+    A and B are result.json files or their folders: before and after a change, two cables, two laboratories. Only
+    curvatures that both visited are compared.
+
+    Exit codes: 0 compared, whatever came out; 3 not comparable.
+    """
+    from pipeline.cli.configuration import read_settings
+    from pipeline.compare import compare as compared
+    from pipeline.result import read_result
+
+    settings = read_settings(settings_file, assignments)
+    comparison = compared(read_result(a), read_result(b), settings=settings.compare)
+    if out is not None:
+        from pipeline.report.files import write_atomic
+        from pipeline.report.frames import comparison_frame
+        from pipeline.report.tables import csv_text
+
+        write_atomic(out, csv_text(comparison_frame(comparison)))
+    if as_json:
+        click.echo(json.dumps(as_document(comparison), indent=1))
+    else:
+        echo_comparison(comparison)
+    ctx.exit(MISSING if comparison.verdict == "not comparable" else 0)
+
+
+def as_document(comparison: Comparison) -> dict[str, object]:
+    """The comparison as plain values."""
+    from dataclasses import asdict
+
+    arrays = ("kappa_per_m", "ratio", "ratio_std")
+    return {**asdict(comparison), **{name: getattr(comparison, name).tolist() for name in arrays}}
+
+
+def echo_comparison(comparison: Comparison) -> None:
+    """The statement, the numbers behind it, and what makes it doubtful."""
+    from pipeline.rounding import plain, rounded
+
+    click.echo(comparison.statement)
+    if comparison.range_per_m is not None:
+        low, high = comparison.range_per_m
+        click.echo(f"compared: {' with '.join(comparison.methods)}, {plain(low)} to {plain(high)} 1/m")
+    mean, rest = comparison.mean_stiffness, comparison.pre_curvature
+    if mean is not None:
+        change = rounded(100 * mean.difference / mean.a, 100 * mean.std / mean.a)
+        click.echo(
+            f"mean stiffness: {plain(1e3 * mean.a, 4)} and {plain(1e3 * mean.b, 4)} mN m², difference {change} %"
+        )
+    if rest is not None:
+        click.echo(f"pre-curvature: difference {rounded(rest.difference, rest.std)} 1/m, p = {rest.p_value:.2g}")
+    if comparison.p_characteristic is not None:
+        p, level = comparison.p_characteristic, comparison.level
+        click.echo(f"characteristic: p = {p:.2g}; level of both tests together {level:g}")
+    for finding in comparison.findings:
+        click.echo(f"{finding.level}: {finding.message} [{finding.code}]", err=True)
