@@ -1,7 +1,7 @@
 """Stages' records to one `Result`: nothing is measured here, only put in its place and dated.
 
-``Specimen, Traces, Identification, diagnosis -> Result``. The provenance holds all that a stranger needs to get the same
-numbers again: versions of the program and its libraries, SHA-256 of every input, the settings, the command. Only
+``Specimen, Traces, Identification, diagnosis -> Result``. The provenance holds all that a stranger needs to get the
+same numbers again: versions of the program and its libraries, SHA-256 of every input, the settings, the command. Only
 ``provenance["clock"]`` differs between two runs over the same input.
 """
 

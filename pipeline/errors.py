@@ -1,7 +1,7 @@
 """The one error a user's file can cause.
 
-Three kinds of trouble are never mixed: a caller's mistake is a ``ValueError``; a user's file is an `InputError`; nature's
-refusal (a blurred photo, no equilibrium, an invisible parameter) is a value that travels to the report.
+Three kinds of trouble are never mixed: a caller's mistake is a ``ValueError``; a user's file is an `InputError`;
+nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a value that travels to the report.
 """
 
 from __future__ import annotations

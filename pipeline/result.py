@@ -254,13 +254,6 @@ class ResidualMap(Part):
     branches: list[str] = []
     shape_sigma: list[list[float | None]]
     force_sigma: list[float | None] = []
-    chord_sigma: list[float | None] = []
-    displacement_m: list[float | None] = []
-    shape_m: list[list[float | None]] = []
-    force_N: list[float | None] = []
-    chord_m: list[float | None] = []
-    chi2: dict[str, float] = Field({}, description="by kind of data")
-    data: dict[str, float] = Field({}, description="number of data by kind")
     shape_m: list[list[float | None]] = []
     force_N: list[float | None] = []
     chord_m: list[float | None] = []

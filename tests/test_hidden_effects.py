@@ -1,7 +1,7 @@
 """Every cause of the contract's table, hidden in data of another solver and discretisation, must be found again.
 
-Truth: `fixtures.continuum` (collocation) read by the rig and camera of `fixtures.hidden` with the noise of real photos. The
-expected answer is the name, the class where physics allows no more, ``adequate`` where nothing is hidden.
+Truth: `fixtures.continuum` (collocation) read by the rig and camera of `fixtures.hidden` with the noise of real photos.
+The expected answer is the name, the class where physics allows no more, ``adequate`` where nothing is hidden.
 """
 
 from functools import cache
@@ -171,7 +171,7 @@ def test_two_causes_are_both_found():
 
 
 def test_an_effect_outside_the_catalogue_is_unexplained():
-    """A cable that jumps sideways by a quarter of a millimetre in the middle of the second step's photo only, and back."""
+    """A cable that jumps sideways by a quarter of a millimetre in the middle of one photo only, and back."""
     from dataclasses import replace
 
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)

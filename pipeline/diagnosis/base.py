@@ -5,10 +5,11 @@ before the diagnosis), on ideal bearings, the displacement counted from the moun
 one and the same law. Beside them, with the prior knowledge the measurement states: where the bearing axes are on all
 photos alike, the scale of the photos and the length of the cable. Every candidate cause is an addition to this.
 
-Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0 (1/m),
-errors of the axes along and across the chord (m; only if the measurement states any), relative error of the stated px/mm, relative error of the stated length. A weak prior keeps the law smooth,
-``int (d^2 log f / dt^2)^2 dt / tau^2`` with t from 0 to 1 over the control points (see `rod.knots`): without a photo of
-the force-free cable, K0 and the stiffness near K0 are else free to run away together.
+Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0
+(1/m), errors of the axes along and across the chord (m; only if the measurement states any), relative error of the
+stated px/mm, relative error of the stated length. A weak prior keeps the law smooth, ``int (d^2 log f / dt^2)^2 dt /
+tau^2`` with t from 0 to 1 over the control points (see `rod.knots`): without a photo of the force-free cable, K0 and
+the stiffness near K0 are else free to run away together.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ class Base:
 
     @property
     def prior(self) -> Array:
-        """Prior knowledge as rows (m, p) of unit variance, centred at zero: scale, length, axes, smoothness of the law."""
+        """Prior knowledge as rows (m, p) of unit variance, around zero: scale, length, axes, smoothness."""
         count, size = len(self.knots), len(self.names)
         rows = [np.eye(size)[-2] / self.scale_std, np.eye(size)[-1] / self.length_std]
         rows += [np.eye(size)[self.names.index(name)] / self.axis_std for name in self.axes]
@@ -112,7 +113,7 @@ class Base:
         return np.r_[np.full(len(self.knots), 1e-4), bend, axes, 1e-6, 1e-6]
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
-        """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m) to go with it."""
+        """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
         return np.r_[np.full(len(self.knots), np.log(stiffness)), rest, np.zeros(len(self.axes)), 0.0, 0.0]
 

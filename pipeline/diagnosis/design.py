@@ -1,9 +1,9 @@
 """What an experiment could see, before it is made.
 
-From a planned cable, protocol and precision to: how well f_EI and K0 will be known, what each cause must measure to be seen
-(at the family-wise threshold, with the stated power), what survives of its trace, its nearest twin, what an unseen one
-would do to f_EI, which causes stay invisible, and which protocol takes which twins apart. Nothing here needs data: all
-follows from the sensitivities of the planned test.
+From a planned cable, protocol and precision to: how well f_EI and K0 will be known, what each cause must measure to be
+seen (at the family-wise threshold, with the stated power), what survives of its trace, its nearest twin, what an unseen
+one would do to f_EI, which causes stay invisible, and which protocol takes which twins apart. Nothing here needs data:
+all follows from the sensitivities of the planned test.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class CausePlan:
-    """What the planned test would show of one cause; ``separated_by`` is the protocol that takes its nearest twin off."""
+    """What the planned test would show of one cause; ``separated_by`` takes its nearest twin off."""
 
     name: str
     unit: str

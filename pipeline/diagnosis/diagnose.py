@@ -1,7 +1,8 @@
 """One specimen: from a measured test to what the simulation gets wrong, named as far as the data allow.
 
-faults of the data -> base model and scores -> (if anything exceeds noise) refits of all suspects -> probabilities and the
-set of names -> a second cause -> what is left -> gain on held-out steps -> the part of the result that says all that.
+faults of the data -> base model and scores -> (if anything exceeds noise) refits of all suspects -> probabilities and
+the set of names -> a second cause -> what is left -> gain on held-out steps -> the part of the result that says all
+that.
 """
 
 from __future__ import annotations

@@ -173,7 +173,7 @@ def _fit_terms(
 def _start(
     extension: Extension, vector: np.ndarray, added: tuple[Term, ...], amounts: tuple[float, ...], share: float
 ) -> np.ndarray:
-    """Start vector: that of the fitted model, then the added terms with a share of their amounts, held to sane sizes."""
+    """Start vector: the fitted model's, then the added terms with a share of their amounts, held to sane sizes."""
     parts = [vector]
     for term, amount in zip(added, amounts, strict=True):
         limit = 5.0 * term.cause.plausible(extension.facts)

@@ -1,9 +1,9 @@
 """Faults of the data, told apart from causes: a mixed-up photo is not physics.
 
 Before anything is fitted, photographed chords are held against the displacement log (order of photos, unit), photos
-against each other (doubled), traced against stated length, and forces against what a cable can do (unit, sign). After the
-base fit, each photo and each hold is left out in turn, to first order: where the rest then agrees with the model and no
-cause explains as much, that one item is at fault, not the model.
+against each other (doubled), traced against stated length, and forces against what a cable can do (unit, sign). After
+the base fit, each photo and each hold is left out in turn, to first order: where the rest then agrees with the model
+and no cause explains as much, that one item is at fault, not the model.
 
 Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/unit``,
 ``log/unit``, ``length/traced``.
@@ -101,8 +101,8 @@ def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
             Finding(
                 "log/unit",
                 "warning",
-                f"the photographed chord changes {-slope:.4g} times as much as the displacement of the log says: the log "
-                f"seems to hold {UNITS[factor]}; displacements were scaled to the photos",
+                f"the photographed chord changes {-slope:.4g} times as much as the displacement of the log says: the "
+                f"log seems to hold {UNITS[factor]}; displacements were scaled to the photos",
             ),
         ),
     )
@@ -269,8 +269,8 @@ def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
     finding = Finding(
         f"{what}/outlier",
         "warning",
-        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is left "
-        "out of the diagnosis",
+        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is "
+        "left out of the diagnosis",
     )
     index = frozenset({outlier.index})
     return Faults(

@@ -1,4 +1,4 @@
-"""Gain on held-out steps, computed: whole levels are left out, both models refitted, and asked for what was left out."""
+"""Gain on held-out steps, computed: whole levels are left out, both models refitted, and asked for the rest."""
 
 from __future__ import annotations
 

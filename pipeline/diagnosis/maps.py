@@ -7,6 +7,7 @@ values within about 2.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,9 @@ def residual_map(test: MeasuredTest, observation: Observation, fitted: Fit) -> d
     Returns
     -------
     dict
-        A `pipeline.result.ResidualMap`: ``s_m`` (c,), and by step: ``steps``, ``branches``, ``displacement_m``, ``force_N``, ``force_sigma``, ``chord_m``,
-        ``chord_sigma``, ``shape_m`` (steps, c), ``shape_sigma`` (steps, c); null where nothing was measured. Beside
-        them ``chi2`` and ``data`` by kind.
+        A `pipeline.result.ResidualMap`: ``s_m`` (c,), and by step: ``steps``, ``branches``, ``displacement_m``,
+        ``force_N``, ``force_sigma``, ``chord_m``, ``chord_sigma``, ``shape_m`` (steps, c), ``shape_sigma`` (steps, c);
+        null where nothing was measured. Beside them ``chi2`` and ``data`` by kind.
     """
     prediction = fitted.run.prediction
     if prediction is None:
@@ -77,7 +78,7 @@ def residual_map(test: MeasuredTest, observation: Observation, fitted: Fit) -> d
 def _cells(s: Array, across: Array, covariance: Array, edges: Array) -> tuple[list[float | None], list[float | None]]:
     means: list[float | None] = []
     sigmas: list[float | None] = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside = np.flatnonzero((s >= low) & (s < high))
         if inside.size == 0:
             means.append(None)

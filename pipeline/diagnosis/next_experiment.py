@@ -1,9 +1,9 @@
 """The cheapest further measurement that separates what these data confuse.
 
-For each protocol that was not made yet the most probable explanation is simulated without noise, each rival is fitted to
-that to first order, and what remains of the rival's misfit (in sigma) says how far the protocol takes the two apart:
-unload in the same steps; photograph the force-free cable; turn the cable end for end and repeat. Where none does, one of
-the rivals is settled by itself (a spirit level, dead weights).
+For each protocol that was not made yet the most probable explanation is simulated without noise, each rival is fitted
+to that to first order, and what remains of the rival's misfit (in sigma) says how far the protocol takes the two apart:
+unload in the same steps; photograph the force-free cable; turn the cable end for end and repeat. Where none does, one
+of the rivals is settled by itself (a spirit level, dead weights).
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """What the measurement scatters: covariance of the sections of a photo, and of the force samples of a hold.
 
 In: the raw midline sections of a `rod.measurement.MeasuredShape` and the samples of each hold. Out: block means of
-sections with their exact covariance, and the noise level of the load cell with the samples behind it. The residuals of a
-fit never set a variance here: only the part of a photo's scatter that no bent cable can follow (faster along s than
+sections with their exact covariance, and the noise level of the load cell with the samples behind it. The residuals of
+a fit never set a variance here: only the part of a photo's scatter that no bent cable can follow (faster along s than
 the smooth basis of the comparison) does, so misfit cannot hide in it.
 
 Notation. A photo has sections with standard deviation sigma(s), correlation exp(-ds / l) and a slow sideways error
-(light) of standard deviation sigma_sys and correlation exp(-ds^2 / (2 l_sys^2)). ``m`` neighbouring sections at pitch D form a
-block; with rho = exp(-D / l) the block means have (AR(1) sums)
+(light) of standard deviation sigma_sys and correlation exp(-ds^2 / (2 l_sys^2)). ``m`` neighbouring sections at pitch D
+form a block; with rho = exp(-D / l) the block means have (AR(1) sums)
 
     variance   sigma^2 / m^2 (m + 2 sum_{j=1}^{m-1} (m - j) rho^j)
     covariance sigma^2 / m^2 rho^{m g} (sum_{j=0}^{m-1} rho^j) (sum_{j=0}^{m-1} rho^-j)      at g blocks apart.
@@ -109,7 +109,7 @@ def block_correlation(count: int, *, members: int, pitch: float, length: float) 
 
 
 def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: float = 1.0) -> Array:
-    """Covariance (k, k) of the block means: random part times ``factor``^2 at a stretched correlation, plus the slow part."""
+    """Covariance (k, k) of the block means: random part times ``factor``^2, stretched along s, plus the slow part."""
     random = block_correlation(
         len(sections.s),
         members=sections.members,
@@ -130,7 +130,7 @@ def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
 
 @dataclass(frozen=True)
 class PhotoNoise:
-    """Correction of the stated noise of sections: standard deviations times ``factor``, correlation length times ``stretch``."""
+    """Correction of the stated noise of sections: std times ``factor``, correlation length times ``stretch``."""
 
     factor: float = 1.0
     stretch: float = 1.0

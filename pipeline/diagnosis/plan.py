@@ -1,7 +1,7 @@
 """A test that was not made: what a model says would be measured, as if it had been.
 
-From a model and circumstances to a `rod.measurement.MeasuredTest` without noise, whose stated uncertainties are those of
-a template. The design of experiments and the choice of the next one work on it with the same code as on real data.
+From a model and circumstances to a `rod.measurement.MeasuredTest` without noise, whose stated uncertainties are those
+of a template. The design of experiments and the choice of the next one work on it with the same code as on real data.
 """
 
 from __future__ import annotations

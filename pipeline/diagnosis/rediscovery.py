@@ -1,8 +1,8 @@
 """From the poorest model to the paper's: a straight cable of constant stiffness, and what must be added to it.
 
-The same scores, refits and held-out gains as in `diagnose`, started from K0 = 0 and one stiffness, on the data in the order
-in which the paper takes them up. Its Eq. (6) has the forces alone: from them follows that the stiffness depends on
-curvature. Its Eq. (7) adds the photos: from them follows that the cable is bent at rest.
+The same scores, refits and held-out gains as in `diagnose`, started from K0 = 0 and one stiffness, on the data in the
+order in which the paper takes them up. Its Eq. (6) has the forces alone: from them follows that the stiffness depends
+on curvature. Its Eq. (7) adds the photos: from them follows that the cable is bent at rest.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Score tests: which direction of misfit points at which cause, before anything is refitted.
 
 In: the whitened residual ``r`` (n,) of the fitted base model, its whitened sensitivities ``J`` (n, p), and one whitened
-column ``S_k`` (n,) for every candidate at amount zero. Out: for every candidate the score ``z_k = u_k . r ~ N(lambda_k, 1)``
-with ``u_k = P S_k / |P S_k|`` and ``P = I - Q Q^T`` projecting the span of J out, the estimate ``z_k / |P S_k|`` of its
-amount, and what does not depend on the data: surviving fraction ``|P S_k| / |S_k|`` and minimal detectable amount.
+column ``S_k`` (n,) for every candidate at amount zero. Out: for every candidate the score ``z_k = u_k . r ~ N(lambda_k,
+1)`` with ``u_k = P S_k / |P S_k|`` and ``P = I - Q Q^T`` projecting the span of J out, the estimate ``z_k / |P S_k|``
+of its amount, and what does not depend on the data: surviving fraction ``|P S_k| / |S_k|`` and minimal detectable
+amount.
 
 Sign: r = data - model, so a positive score asks for a positive amount. Prior knowledge on nuisance parameters enters as
 rows of J and r, so nothing here knows about priors.

@@ -105,8 +105,8 @@ def suspect(
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
     """Whitened column (N,) of one form of a cause, from zero to ``amount``.
 
-    Where that amount leaves no equilibrium, a tenth of it is tried, then the other sign; a column of zeros says that not
-    even a trace can be simulated.
+    Where that amount leaves no equilibrium, a tenth of it is tried, then the other sign; a column of zeros says that
+    not even a trace can be simulated.
     """
     facts = fitted.extension.facts
     trials = (amount, 0.1 * amount) if term.cause.sign else (amount, 0.1 * amount, -0.1 * amount)

@@ -4,8 +4,8 @@ In: the unit directions ``u_k`` of `score.Scores`, and which cause owns each of 
 soft spot at an unknown place, owns several). Out: cosines between causes, the nearest twin of each, and the class of
 names that no amount of looking at these data can tell apart.
 
-Two causes with ``|cos| = c`` are told apart when ``lambda sqrt(1 - c^2)`` exceeds about 4 (lambda: size of the effect in
-sigma); with c = 1 never, whatever the size.
+Two causes with ``|cos| = c`` are told apart when ``lambda sqrt(1 - c^2)`` exceeds about 4 (lambda: size of the effect
+in sigma); with c = 1 never, whatever the size.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """From refitted explanations to a verdict: probabilities, the set of names that cannot be told apart, and the word.
 
-Every explanation (one cause, or two) removes a chi-square ``gain`` from the base model's misfit. With a flat prior on the
-size of an effect in sigma, the weight of an explanation is ``exp(gain / 2)`` times
+Every explanation (one cause, or two) removes a chi-square ``gain`` from the base model's misfit. With a flat prior on
+the size of an effect in sigma, the weight of an explanation is ``exp(gain / 2)`` times
 
 * ``1 / 2`` where the amount may have either sign;
 * the mean over the scanned forms of ``exp(z^2 / 2)`` relative to the best one, so that trying many forms buys nothing;
 * ``exp(-1)`` for every number tuned beyond the amount (Akaike);
 * a loss for amounts beyond any plausible size, by the inverse square.
 
-The gain is divided by the reduced chi-square of the best explanation where that exceeds 1: where even the best form does
-not fit to the noise, a difference between two imperfect forms is no proof.
+The gain is divided by the reduced chi-square of the best explanation where that exceeds 1: where even the best form
+does not fit to the noise, a difference between two imperfect forms is no proof.
 
 The causes that together hold 95 % of the weight form the set. One name: ``named``; several: ``class``.
 """
@@ -53,7 +53,7 @@ class Weighed:
 
 
 def scan_share(statistic: Array) -> float:
-    """Log-mean of ``exp(t^2 / 2)`` over the forms of one cause, relative to the largest; 0 for one form, else negative."""
+    """Log-mean of ``exp(t^2 / 2)`` over the forms of one cause, relative to the largest: 0 for one form."""
     half = 0.5 * np.asarray(statistic) ** 2
     return float(logsumexp(half) - np.log(half.size) - half.max())
 

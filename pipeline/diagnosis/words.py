@@ -91,8 +91,9 @@ def explain(name: str) -> str:
     """Page on one cause: what it is, what shows it, what it is confused with, what to do at the rig."""
     if name == "pre_curvature":
         return (
-            "pre_curvature (K0, 1/m)\n\nThe cable is uniformly bent at rest. K0 is part of the base model and fitted on every "
-            "specimen;\nonly `rediscover`, which starts from a straight cable of constant stiffness, has to find it.\n"
+            "pre_curvature (K0, 1/m)\n\nThe cable is uniformly bent at rest. K0 is part of the base model and fitted "
+            "on every specimen;\nonly `rediscover`, which starts from a straight cable of constant stiffness, has to "
+            "find it.\n"
         )
     cause = cause_by_name(name)
     sign = "not negative" if cause.sign else "either sign"

@@ -155,7 +155,7 @@ def _fit(
 
 
 def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
-    """The best of several starts: a base model that is wrong has false minima, and one start may have no equilibrium."""
+    """The best of several starts: a wrong base model has false minima, and a start may lack equilibrium."""
     best: Fit | None = None
     shift = 0.1 * facts.curvature_scale
     freedom = len(observation.rows.kind) - len(base.names)

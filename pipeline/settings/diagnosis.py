@@ -13,14 +13,14 @@ class DiagnosisSettings(BaseModel):
     # noise
     force_floor: float = Field(
         5e-4,
-        description="share of the largest force; repeatability of a class 0.05 load cell, below it samples repeat digits",
+        description="share of the largest force; repeatability of a class 0.05 load cell; below it digits repeat",
     )
     hold_noise_level: float = Field(
         1e-3, description="probability; holds have noise levels of their own only if equality is refuted at this level"
     )
     chord_std: float = Field(
         3e-5,
-        description="relative; standard deviation of a photographed chord where the photo states none (0.05 px of 1700)",
+        description="relative; std of a photographed chord where the photo states none (0.05 px of 1700)",
     )
     displacement_std: float = Field(
         2e-6,
@@ -80,7 +80,7 @@ class DiagnosisSettings(BaseModel):
     pairs_refitted: int = Field(6, description="best pairs of the exhaustive linear search that are refitted; time")
     pair_share: float = Field(
         0.02,
-        description="share of the chi-square the first cause removes that the second must remove besides being significant",
+        description="share of the first cause's chi-square that a second must remove besides being significant",
     )
     explained_share: float = Field(
         0.10, description="share of the excess misfit a named model may leave; more is `unexplained`"
@@ -107,7 +107,7 @@ class DiagnosisSettings(BaseModel):
     )
     roughness: float = Field(
         10.0,
-        description="prior size of d^2 log f / dt^2 over the control points; a law that falls sixfold by stick and slip has 8",
+        description="prior size of d^2 log f / dt^2 over the control points; a sixfold fall by stick and slip has 8",
     )
     grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
     fits: float = Field(

@@ -22,8 +22,8 @@ class IdentifySettings(BaseModel):
     axis_std_m: float = Field(
         2e-5,
         ge=0,
-        description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by a "
-        "fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
+        description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by "
+        "a fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
     )
     elements: int = Field(100, ge=20, description="of the simulated rod; at 100 its force is within 1e-4")
     blocks: int = Field(

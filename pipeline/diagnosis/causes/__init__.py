@@ -1,7 +1,7 @@
 """The catalogue of causes, one small file a family. A new cause is one new class in the list below, nothing else.
 
-``pre_curvature`` is part of the base model and therefore no candidate; see `pipeline.diagnosis.rediscovery` for where it
-is one.
+``pre_curvature`` is part of the base model and therefore no candidate; see `pipeline.diagnosis.rediscovery` for where
+it is one.
 """
 
 from __future__ import annotations

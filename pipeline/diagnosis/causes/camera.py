@@ -1,8 +1,8 @@
 """What the camera gets wrong: scale, radial distortion, tilt.
 
 All three move points on the plane of the cable, seen from the centre of the picture: true place ``p`` (relative to the
-centre, m) goes to the place that the photo with its stated scale claims. Bearings and cable are moved alike and the chord
-frame is laid through the moved bearings, so chord and shape change together.
+centre, m) goes to the place that the photo with its stated scale claims. Bearings and cable are moved alike and the
+chord frame is laid through the moved bearings, so chord and shape change together.
 
     scale_error      p -> p / (1 + e)                       e: stated px/mm over true px/mm, minus 1
     lens_distortion  p -> p (1 + k1 |p|^2 / R^2)            R: half the picture's diagonal on the plane

@@ -1,7 +1,7 @@
 """What a cause is: one small frozen class that can be put into a model, and can explain itself.
 
-A cause has one amount (in `unit`) and one or more variants: what is scanned because it has no meaning without the cause,
-such as the place of a soft spot or a relaxation time. ``amount = 0`` leaves every model as it was.
+A cause has one amount (in `unit`) and one or more variants: what is scanned because it has no meaning without the
+cause, such as the place of a soft spot or a relaxation time. ``amount = 0`` leaves every model as it was.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ class Cause(Protocol):
     additive : bool
         Whether the amounts of forms acting together add up; else the largest is the size of the cause.
     seat : str
-        Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first kind only.
+        Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first
+        kind only.
     needs : str
         What the data must have for the cause to show at all, in words.
     summary : str

@@ -107,7 +107,7 @@ class Hysteresis:
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that has slipped after a curvature change ``at``; round if it has a width."""
+        """Friction of half width ``amount`` that has slipped after a curvature change ``at``; round if it has one."""
         beside = model.bending.friction
         elements = ROUND if variant.width > 0.0 else 1
         friction = InternalFriction(max(amount, 0.0), variant.at, elements, beside=beside)

@@ -1,8 +1,8 @@
 """What changes along the cable: pre-curvature K0(s) and bending stiffness EI(s).
 
-Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of largest absolute value one. It has mean zero, so
-the amount is the largest deviation from the mean; only a soft spot counts from the cable beside it, whose stiffness is
-the one that is wanted. Forms: growing along the cable, more (or less) in the middle than at the
+Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of largest absolute value one. It has mean zero,
+so the amount is the largest deviation from the mean; only a soft spot counts from the cable beside it, whose stiffness
+is the one that is wanted. Forms: growing along the cable, more (or less) in the middle than at the
 ends, S-shaped, and a spot at a place that is found by scanning. Several forms may add up.
 """
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 PLACES = (0.15, 0.325, 0.5, 0.675, 0.85)
 SPOT_WIDTH = 0.07
-"""Standard deviation of a spot in shares of the length: a splice or a kink of two to three diameters; tuned in a refit."""
+"""Standard deviation of a spot in shares of the length: a splice or kink of some diameters; tuned in a refit."""
 
 
 def forms() -> tuple[Variant, ...]:
@@ -110,12 +110,12 @@ class StiffnessVarying:
     needs: str = "photos under load"
     summary: str = "The bending stiffness varies along the cable: a soft spot, a splice, a stiff label."
     sign_means: str = (
-        "positive: stiffer toward the right end or in the middle, relative to the mean; or in the spot, relative to the "
-        "cable beside it"
+        "positive: stiffer toward the right end or in the middle, relative to the mean; or in the spot, relative to "
+        "the cable beside it"
     )
     apart: str = (
-        "Nothing of it shows without force, and its trace grows with the moment, while a varying pre-curvature is there "
-        "from the start. Turned end for end, the cable takes it along."
+        "Nothing of it shows without force, and its trace grows with the moment, while a varying pre-curvature is "
+        "there from the start. Turned end for end, the cable takes it along."
     )
     remedy: str = "Turn the cable end for end and repeat; look for the spot; test a uniform piece."
     settled_by: str = "the same test with the cable turned end for end"

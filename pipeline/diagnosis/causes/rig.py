@@ -134,8 +134,8 @@ class RigCompliance:
     summary: str = "The frame or the drive yields under force: less of the displacement reaches the cable."
     sign_means: str = "displacement lost per force"
     apart: str = (
-        "What is lost follows the force, so it comes back on unloading; an offset is the same at every step. The forces "
-        "of a soft cable hardly change from step to step: then the two are twins."
+        "What is lost follows the force, so it comes back on unloading; an offset is the same at every step. The "
+        "forces of a soft cable hardly change from step to step: then the two are twins."
     )
     remedy: str = "Use the photographed chord instead of the log; stiffen the drive."
     settled_by: str = "a stiff bar in place of the cable, pushed to the same force"
@@ -231,8 +231,8 @@ class InPlaneLoad:
     summary: str = "A load acts along the cable in the plane of the test: its weight on a tilted table, or a draught."
     sign_means: str = "positive: toward the right bearing (along) or toward the bow (across)"
     apart: str = (
-        "It loses weight against the bending moments as the force grows; a varying pre-curvature or stiffness goes with "
-        "the cable when that is turned end for end, a tilted table does not."
+        "It loses weight against the bending moments as the force grows; a varying pre-curvature or stiffness goes "
+        "with the cable when that is turned end for end, a tilted table does not."
     )
     remedy: str = "Level the table; turn the cable end for end to check."
     settled_by: str = "a spirit level on the table"

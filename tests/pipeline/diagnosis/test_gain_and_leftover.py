@@ -4,7 +4,8 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis.gain import Fold, folds_by_level, held_out, predictive_root
-from pipeline.diagnosis.leftover import smooth_fields, test_leftover as leftover_of
+from pipeline.diagnosis.leftover import smooth_fields
+from pipeline.diagnosis.leftover import test_leftover as leftover_of
 from pipeline.diagnosis.observation import observe
 from pipeline.diagnosis.prediction import facts_of
 from pipeline.settings.diagnosis import DiagnosisSettings
