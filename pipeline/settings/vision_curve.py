@@ -141,5 +141,14 @@ class CurveSettings(BaseModel):
         0.6, gt=0, le=1, description="of the visible sections; with fewer both edges were not found on a cable"
     )
     axis_distance_radii: float = Field(
-        1.0, gt=0, description="of the radius; a centerline that misses the bearing axis by more is not on that bearing"
+        0.25,
+        gt=0,
+        description="of the radius; a centerline that misses a bearing axis by more is worth a warning: over 100"
+        " rendered rigs right ones missed by 0.06 at most",
+    )
+    max_axis_distance_radii: float = Field(
+        0.5,
+        gt=0,
+        description="of the radius; a centerline that misses a cover's axis by more follows a flank, a shadow or a"
+        " stripe: those missed by 0.85 and more, a cable sits in its bearing by a tenth",
     )

@@ -73,6 +73,9 @@ def measure_centerline(
     if refused is not None:
         return refused
     fit = _fit(sections, chord, width, breaks_m, options)
+    refused = _beside_cover(rough, fit, chord, width, options)
+    if refused is not None:
+        return refused
     return _assemble(rough, sections, chord, width, fit, diameter_m, options)
 
 
@@ -153,8 +156,7 @@ def _assemble(
     options: CurveSettings,
 ) -> Centerline:
     """Record of a fitted curve, from foot to foot of the bearing axes."""
-    feet = fit.curve.foot(chord.axes, np.array([0.0, fit.curve.frame.knots[-1]]))
-    misses = np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T)
+    feet, misses = _feet(fit, chord)
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
     metres = float(np.median(width / sections.width))
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
@@ -217,6 +219,29 @@ def _width(width: Array) -> tuple[float, float]:
     """Median width, and its robust relative scatter along s."""
     middle = float(np.median(width))
     return middle, 1.4826 * float(np.median(np.abs(width - middle))) / middle
+
+
+def _feet(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
+    """Arc lengths of the feet of both bearing axes on the curve, and their distances from it."""
+    feet = fit.curve.foot(chord.axes, np.array([0.0, fit.curve.frame.knots[-1]]))
+    return feet, np.asarray(np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T))
+
+
+def _beside_cover(
+    rough: RoughCable, fit: CurveFit, chord: ChordFrame, width: Array, options: CurveSettings
+) -> Rejected | None:
+    """Refuse a curve that passes beside the axis of a cover that was found: it is not the cable's midline."""
+    found = np.array([bearing.kind == "cover" for bearing in (rough.left, rough.right)])
+    share = float((_feet(fit, chord)[1] * found).max()) / (0.5 * _width(width)[0])
+    if share <= options.max_axis_distance_radii:
+        return None
+    return Rejected(
+        rough.image,
+        "photo/bearing",
+        f"what was traced passes {share:.2f} cable radii beside the axis of a bearing cover: it is a flank, a shadow or"
+        " a stripe of the cable, or the cover is not the bearing's",
+        figure={"axis_distance_radii": share},
+    )
 
 
 def _beside(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:

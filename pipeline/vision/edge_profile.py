@@ -114,7 +114,10 @@ def fit_profiles(pixels: Pixels, s: Array, *, ramps: bool, blur: float, settings
         usual = _running_median(np.column_stack([start[:, 1], linear]))
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
         limit = np.maximum(settings.pixel_outlier * np.median(_scatter(residual)), settings.plain_step * usual[:, 2:3])
-        pooled = _pool(offset, value, cell, residual < limit, (2 * count, bins))
+        keep = residual < limit
+        # A window that contradicts its neighbourhood as a whole is judged by itself: nothing of it would be left.
+        keep |= (keep.mean(axis=1) < settings.least_pixel_share)[:, None]
+        pooled = _pool(offset, value, cell, keep, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
     used, linear = (full, full_linear) if ramps else (plain, plain_linear)
@@ -184,7 +187,7 @@ def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple
     place, blur = start[:, 0].copy(), start[:, 1].copy()
     offset, root = pooled.offset, np.sqrt(pooled.count)[:, None, :]
     value = pooled.value[:, None, :] * root
-    total = pooled.count.sum(axis=1)
+    total = np.maximum(pooled.count.sum(axis=1), 1.0)
     low, high = offset.min(axis=1), offset.max(axis=1)
     span = np.maximum(high - low, 1.0)
     linear = np.zeros((len(place), 4))
@@ -255,7 +258,8 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
         rows[..., 1:-1] = np.minimum(rows[..., 1:-1], np.minimum(rows[..., 2:], rows[..., :-2]))
         weighted = basis * weight[:, None, :]
         gram = (weighted @ basis.transpose(0, 2, 1)).astype(np.float64)
-        gram += np.eye(3) * (1e-12 + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None])
+        # Above the rounding of sums in single precision, so that no section of any picture is singular.
+        gram += np.eye(3) * (1e-12 + 1e-6 * gram)
         move = np.linalg.solve(gram, (weighted @ residual[..., None]).astype(np.float64))[..., 0]
         level, step = level + move[:, 0], step + move[:, 1]
         shift = np.clip(move[:, 2], -blur[:, 0], blur[:, 0])

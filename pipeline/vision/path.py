@@ -81,6 +81,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
+    if along[last] - along[first] < settings.least_seen_radii * half_width:
+        return _lost(rough, 0.0)  # too few points to start a curve from
     thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
     points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
     intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
