@@ -1,6 +1,7 @@
 """Comparison of two results: the same cable twice, changed cables, and what makes a comparison doubtful.
 
-Measured with 30 random cables, each measured twice (quadrature, photos with errors): see `pipeline.compare`.
+27 random cables, each measured and identified twice: the characteristic's p-value was below 0.05 for 2 and below 0.5
+for 11, that of K0 for 2 and 17.
 """
 
 import json
