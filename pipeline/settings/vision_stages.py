@@ -211,6 +211,9 @@ class BearingSettings(StageSettings):
         2.5, gt=0, description="ratio to the median slope of the rays; weaker edges are noise and texture"
     )
     pooled_rays: float = Field(1.5, gt=0, description="rays; standard deviation of the pooling along the rim")
+    soft_rim_px: float = Field(
+        2.5, ge=1, description="px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise"
+    )
     aside_std_radii: float = Field(
         0.25,
         gt=0,

@@ -81,11 +81,13 @@ def find_cover(
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius.px)) ** 2 - 0.5 * fall**2)
     # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
-    for cable_from in (0.0, -2.4 * radius.px):
-        on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
-        found = _best_circle(photo, window, radius, on_cable, prior, settings)
-        if found is not None and found.rim >= settings.min_rim:
-            return found
+    # A rim that is not seen as a sharp edge is sought as a soft one: out of focus, or faint in the noise.
+    for softness in (1.0, settings.soft_rim_px):
+        for cable_from in (0.0, -2.4 * radius.px):
+            on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
+            found = _best_circle(photo, window, radius, on_cable, prior, softness, settings)
+            if found is not None and found.rim >= settings.min_rim:
+                return found
     return _by_dot(photo, window, radius.px, along, aside, settings)
 
 
@@ -98,7 +100,7 @@ def _by_dot(
     nowhere = np.zeros(prior.shape, bool)
     # the sizes tried are a third apart
     sizes = [Radius(share * radius_px, 0.08) for share in settings.dot_radii]
-    dots = [_best_circle(photo, window, size, nowhere, prior, settings) for size in sizes]
+    dots = [_best_circle(photo, window, size, nowhere, prior, 1.0, settings) for size in sizes]
     seen = [dot for dot in dots if dot is not None and dot.rim >= settings.sure_rim]
     if not seen:
         return None
@@ -112,6 +114,7 @@ def _best_circle(
     radius: Radius,
     blind: NDArray[np.bool_],
     prior: Array,
+    softness: float,
     settings: BearingSettings,
 ) -> Circle | None:
     """The circle with the most of its rim seen among the best centres of the window."""
@@ -119,7 +122,7 @@ def _best_circle(
     best: Circle | None = None
     for _ in range(settings.candidates):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, settings)
+        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, settings, softness=softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
         if best is not None and best.rim > settings.sure_rim:
@@ -188,11 +191,14 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: B
     return votes
 
 
-def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingSettings) -> Circle | None:
+def fit_circle(
+    photo: Photo, center: Array, expected: Radius, settings: BearingSettings, *, softness: float = 1.0
+) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
     Strategy: radial profiles, each time from the centre and radius fitted before; the edge is the centroid of the
-    slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight.
+    slope about its steepest place; Gauss-Newton on the radial residuals with Tukey's biweight. The slope is taken over
+    ``softness`` px: sought over its own blur, an edge stands out of noise the most.
     """
     radius = expected.px
     count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
@@ -203,16 +209,21 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingS
     # A third of the rays finds the circle, all of them measure it, twice: the first guess may be some pixels off.
     for span_now, every in ((span, 3), (0.5 * span, 1), (0.5 * span, 1)):
         rays, reach = ray[::every], max(3.0, span_now)
-        edge, trust = _radial_edges(photo, parameters, rays, reach, settings)
+        edge, trust = _radial_edges(photo, parameters, rays, reach, softness, settings)
         fitted = _robust_circle(parameters, rays, edge, trust, reach, expected)
         if fitted is None:
             return None
         before, (parameters, covariance) = parameters, fitted
-    off = np.hypot(*(parameters[:2] - center))
-    if off > 0.5 * radius or abs(parameters[2] - radius) > max(4.0 * expected.std * radius, 1.0):
-        return None
     miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
     rim = float(np.mean(np.abs(miss) < max(0.75, settings.rim_tolerance * radius)))
+    off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
+    concentric = other > max(4.0 * expected.std * radius, 1.0)
+    if off > 0.5 * radius or (concentric and (rim < settings.sure_rim or other > 1.2 * span)):
+        return None
+    if concentric:
+        # A bevel or groove turned on the same axis, seen all round: it tells the centre, the radius it does not.
+        std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
+        return Circle((float(parameters[0]), float(parameters[1])), radius, std, 0.1 * radius, rim)
     # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
     excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
     std = float(
@@ -223,7 +234,7 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, settings: BearingS
 
 
 def _radial_edges(
-    photo: Photo, parameters: Array, ray: Array, span: float, settings: BearingSettings
+    photo: Photo, parameters: Array, ray: Array, span: float, softness: float, settings: BearingSettings
 ) -> tuple[Array, Array]:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
 
@@ -231,7 +242,8 @@ def _radial_edges(
     else pass for the rim.
     """
     # The outer halves of the rays tell what is no edge: sheen, texture and noise.
-    offsets = np.arange(-2.0 * span, 2.0 * span + 0.25, 0.5)
+    calm = span + 4.0 * (softness - 1.0)  # a soft edge reaches beyond the range in which it is sought
+    offsets = np.arange(-calm - span, calm + span + 0.25, 0.5)
     points = parameters[:2] + (parameters[2] + offsets)[None, :, None] * ray[:, None, :]
     low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 2, 0)
     high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 3, photo.size)
@@ -241,18 +253,18 @@ def _radial_edges(
     u, v = (points[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
     profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
     # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
-    pooled = gaussian_filter1d(profile, settings.pooled_rays, axis=0, mode="wrap")
-    slope = gaussian_filter1d(np.gradient(pooled, 0.5, axis=1), 2.0, axis=1)
+    pooled = gaussian_filter1d(profile, settings.pooled_rays * softness, axis=0, mode="wrap")
+    slope = gaussian_filter1d(np.gradient(pooled, 0.5, axis=1), 2.0 * softness, axis=1)
     strength = np.sqrt((slope**2).sum(axis=2))
     inner = np.abs(offsets) <= span
     outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
     seen = ~(outside & inner).any(axis=1)
     place = np.argmax(np.where(inner, strength, 0.0), axis=1)
-    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5
+    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5 * softness
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(ray)), place]
-    found = seen & (peak > settings.rim_over_texture * float(np.median(strength[:, ~inner])))
+    found = seen & (peak > settings.rim_over_texture * float(np.median(strength[:, np.abs(offsets) > calm])))
     usual = float(np.percentile(peak[found], 75)) if found.any() else 1.0
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
