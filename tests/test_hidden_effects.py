@@ -4,6 +4,7 @@ Truth: `fixtures.continuum` (collocation) read by the rig and camera of `fixture
 The expected answer is the name, the class where physics allows no more, ``adequate`` where nothing is hidden.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -28,6 +29,10 @@ LAW = {"EI0": 0.018, "EI1": 0.0075, "kc": 4.5}
 
 def growing(amount):
     return lambda u: amount * (2.0 * u - 1.0)
+
+
+def waved(amount):
+    return lambda u: amount * np.sin(2.0 * np.pi * u)
 
 
 def spot(amount):
@@ -56,6 +61,12 @@ HIDE = {
     "camera_tilt": lambda a: (Cable(), Reading(tilt=(a, 0.0))),
 }
 """How an amount of each cause is put into the continuum, the load cell or the camera."""
+
+CLEAREST = {
+    "pre_curvature_varying": lambda a: (Cable(K0_profile=waved(a)), Reading()),
+    "stiffness_varying": lambda a: (Cable(stiffness_profile=waved(a)), Reading()),
+}
+"""The form whose detectable amount is the smallest, where a cause has several."""
 
 NEEDS_THE_WAY_BACK = ("hysteresis", "plastic_set", "bearing_friction")
 
@@ -128,7 +139,7 @@ def test_multiples_of_the_detectable_amount_are_in_the_set(name, times):
     protocol = {2.0: "loop", 4.0: "six"}[times] if name not in NEEDS_THE_WAY_BACK else "loop"
     plausible, detectable = outlook(protocol)[name]
     factor = np.sqrt(times) if name == "rigid_ends" else times  # its trace grows with the square
-    cable, reading = HIDE[name](factor * detectable)
+    cable, reading = CLEAREST.get(name, HIDE[name])(factor * detectable)
     bench = bench_of(hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=int(10 * times), reading=reading))
     found, conclusion = names_found(bench)
     assert name in found and not conclusion.alien
@@ -171,9 +182,7 @@ def test_two_causes_are_both_found():
 
 
 def test_an_effect_outside_the_catalogue_is_unexplained():
-    """A cable that jumps sideways by a quarter of a millimetre in the middle of one photo only, and back."""
-    from dataclasses import replace
-
+    """Waves along the cable that come and go from step to step as no beam's do, a tenth of a millimetre high."""
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)
     steps = list(test.steps)
     for index, size in ((2, 1.2e-4), (4, -1.6e-4), (5, 1.4e-4)):

@@ -110,12 +110,12 @@ class Base:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
         axes = np.full(len(self.axes), 1e-6 * facts.length)
-        return np.r_[np.full(len(self.knots), 1e-4), bend, axes, 1e-6, 1e-6]
+        return np.asarray(np.r_[np.full(len(self.knots), 1e-4), bend, axes, 1e-6, 1e-6])
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
-        return np.r_[np.full(len(self.knots), np.log(stiffness)), rest, np.zeros(len(self.axes)), 0.0, 0.0]
+        return np.asarray(np.r_[np.full(len(self.knots), np.log(stiffness)), rest, np.zeros(len(self.axes)), 0.0, 0.0])
 
     def pre_curvature(self, vector: Array) -> float:
         """K0, 1/m."""
@@ -157,8 +157,8 @@ class Base:
 
 def start(
     test: MeasuredTest, facts: Facts, *, knots: int, elements: int, smoothness: float, straight: bool = False
-) -> tuple[Base, Array]:
-    """Base model and first guess: a constant stiffness by regression of the photographed curvature on the moment P y.
+) -> Base:
+    """Base model with its first guess: a constant stiffness by regression of photographed curvature on the moment P y.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
 

@@ -169,7 +169,7 @@ def _facts(plan: Plan) -> Facts:
         displacement=np.array([d for d, _ in steps]),
         photo_time=np.full(len(steps), times[-1]),
         hold_times=(times,) * len(steps),
-        clock=plan.cycle * np.arange(len(steps)),
+        clock=plan.cycle * np.arange(len(steps), dtype=float),
         picture_centre=np.tile([0.5 * plan.length, 0.5 * bow], (len(steps), 1)),
         half_diagonal=0.65 * plan.length,
         moving="left",

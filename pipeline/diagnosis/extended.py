@@ -61,13 +61,14 @@ def curve(fitted: Fit, *, points: int) -> Curve:
 
 
 def _std(columns: Array, covariance: Array) -> Array:
-    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, covariance, columns), 0.0))
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, covariance, columns), 0.0)))
 
 
 def stiffness_change(before: Fit, after: Fit) -> float:
-    """Root mean square of the relative difference of f_EI at equal curvature, on the range of the model before."""
-    low, high = visited(before)
-    K = np.linspace(low, high, 60)
+    """Root mean square of the relative difference of f_EI at equal curvature, where both models have been bent to."""
+    ranges = [(*visited(m), m.extension.base.pre_curvature(m.vector)) for m in (before, after)]
+    low, high = max(max(low, K0) for low, _, K0 in ranges), min(high for _, high, _ in ranges)
+    K = np.linspace(min(low, high), high, 60)
     f = [
         m.extension.base.characteristic(m.vector).tangent(K, m.extension.base.pre_curvature(m.vector))
         for m in (before, after)

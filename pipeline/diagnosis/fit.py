@@ -20,6 +20,7 @@ from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observation import Observation, residual
 from pipeline.diagnosis.prediction import Facts, Model, Prediction, end_for_end
 from pipeline.diagnosis.simulation import Run, base_derivatives, moved, observed, run
+from rod.characteristic import Characteristic
 from rod.sensitivity import Derivatives
 
 Array = NDArray[np.float64]
@@ -68,7 +69,7 @@ class Extension:
         for term in self.terms:
             added.append(1e-3 * term.cause.plausible(self.facts))
             added.extend(1e-3 * term.variant.scale(name) for name in term.variant.tuned)
-        return np.r_[self.base.steps(self.facts), added]
+        return np.asarray(np.r_[self.base.steps(self.facts), added])
 
     def start(self, vector: Array, amounts: tuple[float, ...]) -> Array:
         """Vector of this extension from one of the base model and an amount for each term."""
@@ -86,7 +87,7 @@ class Extension:
         model = self.base_model(vector) if of is None else of
         for at, term in zip(self.owners, self.terms, strict=True):
             tuned = {name: float(vector[at + 1 + j]) for j, name in enumerate(term.variant.tuned)}
-            model = term.cause.apply(model, float(vector[at]), replace(term.variant, **tuned), self.facts)
+            model = term.cause.apply(model, float(vector[at]), term.variant.moved(tuned), self.facts)
         return end_for_end(model) if self.turned else model
 
     def admissible(self, vector: Array) -> bool:
@@ -155,7 +156,7 @@ def whole_residual(
     """Residual with the rows of prior knowledge at the end; None where the model has no equilibrium."""
     if prediction is None:
         return None
-    return np.r_[residual(observation, prediction), -prior @ vector]
+    return np.asarray(np.r_[residual(observation, prediction), -prior @ vector])
 
 
 def sensitivities(observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run) -> Array:
@@ -196,7 +197,7 @@ def _base_columns(
     by = base_derivatives(here, facts, names)
     law = model.bending.characteristic
     # where a cause has put further control points into the law, a base ordinate moves them along the base spline
-    share = base.law_directions(vector, law.knots)
+    share = base.law_directions(vector, law.knots if isinstance(law, Characteristic) else base.knots)
     count = share.shape[0]
     bent = [name for name in base.names if name not in base.observed]
     change = np.zeros((count + (0 if base.straight else 1) + 1, len(bent)))
@@ -274,27 +275,44 @@ def fit(
         if scaled.expected < tolerance:
             converged = True
             break
-        accepted = None
-        for _ in range(7):
-            trial = _inside(extension, vector, vector + scaled.step(damping))
-            trial_base = extension.base_model(trial)
-            there = run(extension.model(trial, of=trial_base), extension.facts, near=here)
-            found = whole_residual(observation, there.prediction, trial, prior)
-            if found is not None and found @ found < value @ value and extension.admissible(trial):
-                accepted = (trial, there, found, trial_base)
-                break
-            damping = max(10.0 * damping, 1e-4)
+        accepted = _lower(observation, extension, _State(vector, base_model, here, value), scaled, damping)
         if accepted is None:
             converged = scaled.expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
-        fall = float(value @ value - accepted[2] @ accepted[2])
-        vector, here, value, base_model = accepted
+        state, damping = accepted
+        fall = float(value @ value - state.value @ state.value)
+        vector, base_model, here, value = state
         jacobian = sensitivities(observation, extension, vector, base_model, here)
         if fall < tolerance and damping == 0.0:
             converged = True
             break
         damping = 0.1 * damping if damping > 1e-4 else 0.0
     return Fit(extension, vector, here, value, jacobian, converged, "" if converged else "the fit did not settle")
+
+
+class _State(NamedTuple):
+    """A vector with its base model, its run and its residual."""
+
+    vector: Array
+    base_model: Model
+    here: Run
+    value: Array
+
+
+def _lower(
+    observation: Observation, extension: Extension, state: _State, scaled: _Scaled, damping: float
+) -> tuple[_State, float] | None:
+    """First state of lower chi-square with rising damping, and that damping; None where seven trials find none."""
+    for used in (damping, *(max(damping, 1e-5) * 10.0**k for k in range(1, 7))):
+        trial = _inside(extension, state.vector, state.vector + scaled.step(used))
+        if not extension.admissible(trial):
+            continue
+        base_model = extension.base_model(trial)
+        there = run(extension.model(trial, of=base_model), extension.facts, near=state.here)
+        value = whole_residual(observation, there.prediction, trial, extension.prior)
+        if value is not None and value @ value < state.value @ state.value:
+            return _State(trial, base_model, there, value), used
+    return None
 
 
 class _Scaled:

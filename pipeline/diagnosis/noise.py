@@ -105,7 +105,7 @@ def block_correlation(count: int, *, members: int, pitch: float, length: float) 
     ramp = np.sum(rho ** np.arange(members))
     near = np.sum(rho ** (members - 1 - np.arange(members)))
     between = ramp * near * rho ** np.maximum(members * gap - (members - 1), 0) / members**2
-    return np.where(gap == 0, variance, between)
+    return np.asarray(np.where(gap == 0, variance, between))
 
 
 def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: float = 1.0) -> Array:
@@ -125,7 +125,7 @@ def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: floa
 
 def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
     """Legendre polynomials (k, functions) of ``s / length``: every misfit of a bent cable that the data can show."""
-    return np.polynomial.legendre.legvander(2.0 * s / length - 1.0, functions - 1)
+    return np.asarray(np.polynomial.legendre.legvander(2.0 * s / length - 1.0, functions - 1), dtype=float)
 
 
 @dataclass(frozen=True)

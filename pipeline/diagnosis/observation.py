@@ -161,8 +161,8 @@ def _whitening(
 ) -> Array:
     """Root of the information of (chord, shape components): rows have unit variance and compress the sections.
 
-    With joint covariance C of (chord, sections) and design B = diag(1, basis): information B^T C^-1 B = R R^T, and
-    ``R^-1 B^T C^-1`` takes residuals to components of unit variance.
+    With joint covariance C = L L^T of (chord, sections) and design B = diag(1, basis): L^-1 B = Q R, and ``Q^T L^-1``
+    takes residuals to components of unit variance.
     """
     axis = chord_std / np.sqrt(2.0)
     # columns: left axis along x, left and right axis across; right axis along x moves the chord alone
@@ -175,9 +175,10 @@ def _whitening(
     joint[0, 0] = axis**2 + settings.displacement_std**2
     joint += axis**2 * by_axis @ by_axis.T
     design = linalg.block_diag(np.ones((1, 1)), basis)
-    weighted = linalg.cho_solve(linalg.cho_factor(joint, lower=True), design)
-    root = linalg.cholesky(design.T @ weighted, lower=True)
-    return np.asarray(linalg.solve_triangular(root, weighted.T, lower=True))
+    # by orthogonal factors: the polynomials of a cable seen in part are nearly dependent, and squaring them loses that
+    root = linalg.cholesky(joint, lower=True)
+    orthogonal, _ = linalg.qr(linalg.solve_triangular(root, design, lower=True), mode="economic")
+    return np.asarray(linalg.solve_triangular(root, orthogonal, lower=True, trans="T").T)
 
 
 def residual(observation: Observation, prediction: Prediction) -> Array:

@@ -64,4 +64,6 @@ def second_given_first(z: Array, cosine: Array, first: int) -> Array:
     """Scores (k,) of all directions once ``first`` is fitted: ``(z_k - c z_first) / sqrt(1 - c^2)``."""
     c = cosine[first]
     apart = 1.0 - c**2
-    return np.divide(z - c * z[first], np.sqrt(np.maximum(apart, 0.0)), out=np.zeros_like(z), where=apart > 1e-9)
+    return np.asarray(
+        np.divide(z - c * z[first], np.sqrt(np.maximum(apart, 0.0)), out=np.zeros_like(z), where=apart > 1e-9)
+    )

@@ -32,7 +32,7 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
     accepted = conclusion.accepted
     gain, held = measured_gain(bench, accepted.fitted, settings) if accepted else (None, None)
     rows = table(bench, conclusion, settings, heldout=held.removed if held else None)
-    seen = [(row.name, row.minimal_detectable, row.unit) for row in _seen_at_plausible_size(bench, rows)]
+    seen = [(row.name, row.minimal_detectable or 0.0, row.unit) for row in _seen_at_plausible_size(bench, rows)]
     causes = named_causes(bench, conclusion)
     verdict = decide(
         detected=accepted is not None,
@@ -48,7 +48,7 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
         amounts=[(cause.estimate, cause.std, cause.unit) for cause in causes],
         explained=None if gain is None else gain.heldout_excess_removed,
         change=stiffness_change(bench.base, accepted.fitted) if accepted else None,
-        weakest=could_have_been_seen([s for s in seen if s[1] is not None], len(rows)),
+        weakest=could_have_been_seen(seen, len(rows)),
         leftover=leftover["message"],
     )
     return DiagnosisPart(

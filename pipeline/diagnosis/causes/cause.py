@@ -6,7 +6,7 @@ cause, such as the place of a soft spot or a relaxation time. ``amount = 0`` lea
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from pipeline.diagnosis.prediction import Facts, Model
@@ -38,6 +38,10 @@ class Variant:
     def range(self, name: str) -> tuple[float, float]:
         """Range of ``at`` or ``width``."""
         return self.at_range if name == "at" else self.width_range
+
+    def moved(self, places: dict[str, float]) -> Variant:
+        """The same form elsewhere: ``at`` and ``width`` where they are given."""
+        return replace(self, at=places.get("at", self.at), width=places.get("width", self.width))
 
     def scale(self, name: str) -> float:
         """Size of a large change of ``at`` or ``width``."""
@@ -80,18 +84,53 @@ class Cause(Protocol):
         The measurement that settles it, as few words.
     """
 
-    name: str
-    unit: str
-    sign: int
-    combines: bool
-    additive: bool
-    seat: str
-    needs: str
-    summary: str
-    sign_means: str
-    apart: str
-    remedy: str
-    settled_by: str
+    @property
+    def name(self) -> str:
+        """Of the contract's table."""
+
+    @property
+    def unit(self) -> str:
+        """Of the amount."""
+
+    @property
+    def sign(self) -> int:
+        """1 if the amount cannot be negative."""
+
+    @property
+    def combines(self) -> bool:
+        """Whether forms may act together."""
+
+    @property
+    def additive(self) -> bool:
+        """Whether their amounts add up."""
+
+    @property
+    def seat(self) -> str:
+        """Where it sits."""
+
+    @property
+    def needs(self) -> str:
+        """What the data must have."""
+
+    @property
+    def summary(self) -> str:
+        """What it is."""
+
+    @property
+    def sign_means(self) -> str:
+        """What a positive amount means."""
+
+    @property
+    def apart(self) -> str:
+        """What separates it from its twins."""
+
+    @property
+    def remedy(self) -> str:
+        """What to do at the rig."""
+
+    @property
+    def settled_by(self) -> str:
+        """The measurement that settles it."""
 
     def plausible(self, facts: Facts) -> float:
         """Size (positive, in `unit`) that would surprise nobody on such a rig."""
