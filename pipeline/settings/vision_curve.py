@@ -121,6 +121,12 @@ class CurveSettings(BaseModel):
         description="of the seen length; correlation length of the light's error: it follows the cable's"
         " direction, which turns once from end to end",
     )
+    width_excess: float = Field(
+        1.5,
+        ge=1,
+        description="ratio of the errors by the width's variation to those by the scatter about the curve, above which"
+        " the former count: over ten effective parameters chance passes it once in a hundred",
+    )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
     max_blur_radii: float = Field(
         0.4, gt=0, description="of the radius; with more blur the two edges run into each other and move inward"

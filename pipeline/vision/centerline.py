@@ -161,6 +161,8 @@ def _assemble(
     metres = float(np.median(width / sections.width))
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, light_std, light_length)
+    excess = _width_excess(fit, width, options)
+    covariance += (excess**2 - 1.0) * fit.smooth.covariance
     length_std = _length_std(fit, s, covariance)
     # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
     covariance[0, 0] += chord.axis_std**2
@@ -231,7 +233,7 @@ def _beside_cover(
     rough: RoughCable, fit: CurveFit, chord: ChordFrame, width: Array, options: CurveSettings
 ) -> Rejected | None:
     """Refuse a curve that passes beside the axis of a cover that was found: it is not the cable's midline."""
-    found = np.array([bearing.kind == "cover" for bearing in (rough.left, rough.right)])
+    found = np.array([bearing.radius_px is not None for bearing in (rough.left, rough.right)])
     share = float((_feet(fit, chord)[1] * found).max()) / (0.5 * _width(width)[0])
     if share <= options.max_axis_distance_radii:
         return None
@@ -280,6 +282,20 @@ def _with_light(fit: CurveFit, std: float, length: float) -> Array:
     s = fit.s[fit.weight > 0.0]
     light = std**2 * np.exp(-0.5 * ((s[:, None] - s[None, :]) / length) ** 2)
     return np.asarray(fit.smooth.covariance + fit.smooth.gain @ light @ fit.smooth.gain.T)
+
+
+def _width_excess(fit: CurveFit, width: Array, options: CurveSettings) -> float:
+    """Ratio, at least 1, of the errors of the curvature to those that the scatter about the curve tells.
+
+    The cable's width is constant, so half of what the measured width varies is an error of the edges that no bend of
+    the cable can pass for: carried through the fit like the midline's, it is what the midline's errors do to kappa.
+    """
+    used = fit.weight > 0.0
+    half, s = 0.5 * (width - np.median(width))[used], fit.s[used]
+    bend = fit.curve.bases(s)[2]
+    apparent = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half)) ** 2)))
+    stated = float(np.sqrt(np.mean(_std(bend, fit.smooth.covariance) ** 2)))
+    return apparent / stated if apparent > options.width_excess * stated else 1.0
 
 
 def _length_std(fit: CurveFit, s: Array, covariance: Array) -> float:

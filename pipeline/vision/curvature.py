@@ -353,7 +353,20 @@ def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Ar
         null=2 + order,
         std=std[used] / np.sqrt(weight[used]),
         position=s[used],
+        least=_bow_roughness(curve, order),
     )
+
+
+def _bow_roughness(curve: PlaneCurve, order: int) -> float:
+    """``int (d^k kappa / ds^k)^2 ds`` of a half wave from end to end whose curvature varies as much as the curve's.
+
+    An elastica between two bearings obeys ``kappa'' = -(P / EI) kappa``: it is no parabola, however little of the rest
+    the photo shows. A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
+    """
+    knots = curve.frame.knots
+    length = float(knots[-1] - knots[0])
+    amplitude2 = float(np.var(curve.curvature(np.linspace(knots[0], knots[-1], 65)))) / (0.5 - 4.0 / np.pi**2)
+    return amplitude2 * 0.5 * length * float((np.pi / length) ** (2 * order))
 
 
 def _step_to_foot(curve: PlaneCurve, points: Array, s: Array) -> tuple[Array, Array]:

@@ -91,6 +91,8 @@ class _Diagonal:
         Number of data, dimension of what is not penalised.
     noise_log_det : float
         Of the correlation matrix.
+    least : float
+        Squared length of the penalised quantity below which the penalty is not believed, in units of the data.
     """
 
     gamma2: Array
@@ -100,6 +102,7 @@ class _Diagonal:
     count: int
     null: int
     noise_log_det: float
+    least: float
 
     def shrinkage(self, weight: Array) -> Array:
         """Diagonal of the normal matrix at every weight, ``(w, p)``."""
@@ -119,17 +122,21 @@ class _Diagonal:
         sigma2 = np.maximum(left, 1e-20 * self.total) / freedom
         rank = len(self.gamma2) - self.null
         value = freedom * np.log(sigma2) + np.log(share).sum(axis=1) - rank * np.log(weights)
-        return value + self.noise_log_det, sigma2
+        # A weight that leaves less than ``least``: its prior, with rank terms of variance sigma^2 / weight each.
+        believed = weights * self.least <= rank * sigma2
+        believed[0] = True
+        return np.where(believed, value + self.noise_log_det, np.inf), sigma2
 
 
-def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float) -> _Diagonal:
+def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, least: float) -> _Diagonal:
     """Diagonal form of whitened columns ``[design, data]``."""
     size = whitened.shape[1] - 1
     triangle = np.asarray(np.linalg.qr(whitened, mode="r"))  # its last column holds the data: Q itself is never needed
     r, data = triangle[:size, :size], triangle[:, size]
     stacked = np.zeros((size + len(penalty), size))
     stacked[:size] = r
-    stacked[size:, size - penalty.shape[1] :] = penalty * (np.linalg.norm(r) / np.linalg.norm(penalty))
+    gain = np.linalg.norm(r) / np.linalg.norm(penalty)
+    stacked[size:, size - penalty.shape[1] :] = penalty * gain
     length = np.linalg.norm(stacked, axis=0)
     q0, r0 = np.linalg.qr(stacked / length)
     u, gamma, vt = np.linalg.svd(q0[:size])
@@ -141,6 +148,7 @@ def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float) 
         count=len(whitened),
         null=null,
         noise_log_det=noise_log_det,
+        least=float(gain**2 * least),
     )
 
 
@@ -159,6 +167,9 @@ class Problem:
         Relative size of the errors.
     position : (n,)
         Along s, ascending.
+    least : float
+        Squared length of the penalised quantity that is expected at least. Without it correlated errors can take over
+        all that a stiff penalty leaves of the curve, and the bands of a curve too stiff are too narrow.
     """
 
     design: Array
@@ -167,6 +178,7 @@ class Problem:
     null: int
     std: Array
     position: Array
+    least: float = 0.0
 
     @cached_property
     def gaps(self) -> Array:
@@ -224,7 +236,7 @@ class Problem:
     def _diagonal(self, length: float) -> _Diagonal:
         rho = _correlations(self.gaps, length)
         columns = whiten(np.column_stack([self.design, self.data]), self.std, self.gaps, length)
-        return _diagonal(columns, self.penalty, self.null, float(np.log1p(-(rho**2)).sum()))
+        return _diagonal(columns, self.penalty, self.null, float(np.log1p(-(rho**2)).sum()), self.least)
 
 
 def _unwhiten(gain: Array, std: Array, gaps: Array, length: float) -> Array:
