@@ -67,7 +67,7 @@ def judge_strip(
             u_px=float(place[0]),
             v_px=float(place[1]),
         )
-    axes = _axes(photo, standout, reading, strip, cable, settings)
+    axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
@@ -77,10 +77,18 @@ def judge_strip(
 
 
 def _axes(
-    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
+    photo: Photo,
+    standout: Standout,
+    reading: Reading,
+    strip: Strip,
+    cut: CrossCut,
+    cable: Cable,
+    settings: VisionSettings,
 ) -> tuple[Bearing, Bearing] | Rejected:
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
+    if cable.bearings.cover_widths is not None and np.isfinite(cut.width).any():
+        width = float(np.nanmedian(cut.width)) * standout.reduction  # the mask is wider by the shadow, covers would be
     cover = cable.bearings.cover_radius(width)
     ends = (
         find_end(strip.path[::-1], reading, standout, cover, settings.bearings),

@@ -94,6 +94,9 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     lines = tuple(
         _measure(shot.found, calibration.plane, specimen.diameter_m, shot.preview, settings) for shot in named
     )
+    if specimen.camera.scale_px_per_m is not None or specimen.camera.calibration is not None:
+        pairs = zip(named, lines, strict=True)
+        lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     found = [shot.found for shot in named if isinstance(shot.found, RoughCable)]
     findings = (
         *calibration.findings,
@@ -230,6 +233,28 @@ def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
         left=found.right,
         right=found.left,
     )
+
+
+def _without_hidden_ends(
+    found: RoughCable | Rejected,
+    line: Centerline | Rejected,
+    specimen: Specimen,
+    calibration: Calibration,
+    settings: VisionSettings,
+) -> Centerline | Rejected:
+    """Refuse a line from visible end to visible end that is not as long as the cable: bearings hide its ends."""
+    if isinstance(found, Rejected) or isinstance(line, Rejected) or found.left.kind not in ("end", "clamp"):
+        return line
+    ratio = line.traced_length_m / specimen.length_m
+    allowed = max(settings.series.max_length_deviation, 3.0 * calibration.scale.std_relative)
+    if abs(ratio - 1.0) <= allowed:
+        return line
+    reason = (
+        f"from visible end to visible end the cable is {1e3 * line.traced_length_m:.2f} mm long, "
+        f"{100 * (ratio - 1):+.2f} % from length_mm; "
+        "something hides the bearing axes: give bearing_marker_mm or bearings_px"
+    )
+    return Rejected(line.image, "photo/bearing", reason, line.preview, {"length_ratio": ratio})
 
 
 def _check_lengths(
