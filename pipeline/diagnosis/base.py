@@ -23,7 +23,7 @@ from pipeline.diagnosis.causes.camera import axes_off, scaled
 from pipeline.diagnosis.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
-from rod.knots import place_knots, roughness
+from rod.knots import first_slope, place_knots, roughness
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -50,6 +50,8 @@ class Base:
     elements : int
     roughness : float
         tau of the prior on the law.
+    rest_slope : float
+        Standard deviation of d log f / dt at K0: a cable that bends alike to both sides has slope zero there.
     first : 1/m
         K0 of the first guess.
     straight : bool
@@ -66,6 +68,7 @@ class Base:
     first: float = 0.0
     straight: bool = False
     axis_std: float = 0.0
+    rest_slope: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,6 +106,8 @@ class Base:
             weight, mode = np.linalg.eigh(roughness(self.knots))
             kept = weight > 1e-9 * weight[-1]
             bend = np.sqrt(weight[kept])[:, None] * mode.T[kept] / self.roughness
+            if not self.straight:  # only then the control points count from the curvature at rest
+                bend = np.vstack([bend, first_slope(self.knots) / self.rest_slope])
             rows.extend(np.hstack([bend, np.zeros((len(bend), size - count))]))
         return np.array(rows)
 

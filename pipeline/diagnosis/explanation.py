@@ -148,15 +148,17 @@ def _fit_terms(
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
     best: Fit | None = None
-    freedom = len(base.residual) - extension.size
-    # without a photo of the force-free cable K0 has a second, false valley: further starts lie on both sides of it
+    enough = settings.fits * (len(base.residual) - extension.size)
+    # Without a photo of the force-free cable K0 has a second, false valley, as deep as the true one but for some sigma:
+    # further starts lie on both sides of it.
+    at_rest = "mounted" in base.extension.facts.branch
     shift = 0.1 * base.extension.facts.curvature_scale
     guesses = [base.extension.base.neutral(bend=bend) for bend in (shift, -shift)]
     starts = [(1.0, base.vector), (0.3, base.vector)]
     starts += [(1.0, guess) for guess in guesses if len(guess) == len(base.vector)]
     for share, vector in starts:
-        if best is not None and (share < 1.0 or not settings.fits * freedom <= best.chi2 < hopeless):
-            continue  # a further start is worth its time only where the first did not end at the noise
+        if best is not None and (share < 1.0 or best.chi2 >= hopeless or (at_rest and best.chi2 < enough)):
+            continue  # a further start is worth its time only where the first did not end at the noise, or could not tell
         found = fit(
             observation,
             extension,
