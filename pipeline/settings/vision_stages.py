@@ -214,6 +214,13 @@ class BearingSettings(StageSettings):
     soft_rim_px: float = Field(
         2.5, ge=1, description="px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise"
     )
+    min_soft_rim: float = Field(
+        0.5,
+        gt=0,
+        lt=1,
+        description="share of the rim where it is sought as a soft one: neighbouring directions share more, so chance"
+        " gives more; focus lost left 0.6, a moved camera, whose rim is doubled, 0.45",
+    )
     aside_std_radii: float = Field(
         0.25,
         gt=0,

@@ -82,11 +82,11 @@ def find_cover(
     prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius.px)) ** 2 - 0.5 * fall**2)
     # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
     # A rim that is not seen as a sharp edge is sought as a soft one: out of focus, or faint in the noise.
-    for softness in (1.0, settings.soft_rim_px):
+    for softness, least in ((1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)):
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             found = _best_circle(photo, window, radius, on_cable, prior, softness, settings)
-            if found is not None and found.rim >= settings.min_rim:
+            if found is not None and found.rim >= least:
                 return found
     return _by_dot(photo, window, radius.px, along, aside, settings)
 
