@@ -10,7 +10,9 @@ class PredictSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    elements: int = Field(400, ge=20, description="of the simulated rod; its height is then within 1e-6 of the length, a fifth of a good band")
+    elements: int = Field(
+        400, ge=20, description="of the simulated rod; its height is within 1e-6 of the length, a fifth of a good band"
+    )
     range_slack: float = Field(
         0.01,
         ge=0,
