@@ -136,8 +136,7 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
     settings = settings or DiagnosisSettings()
     if not plan.displacements or min(plan.displacements) <= 0.0:
         raise ValueError("plan at least one loading step with a positive displacement")
-    facts = _facts(plan)
-    bench = _bench(plan, facts, settings)
+    bench = planned_bench(plan, settings)
     table = between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
     others = [
         (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
@@ -179,6 +178,11 @@ def _facts(plan: Plan) -> Facts:
         moment_scale=force * bow,
         curvature_scale=np.pi**2 * bow / plan.length**2,
     )
+
+
+def planned_bench(plan: Plan, settings: DiagnosisSettings) -> Workbench:
+    """The planned test made without noise, its base model fitted and all causes scored."""
+    return _bench(plan, _facts(plan), settings)
 
 
 def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:

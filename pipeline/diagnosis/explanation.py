@@ -158,7 +158,7 @@ def _fit_terms(
     starts += [(1.0, guess) for guess in guesses if len(guess) == len(base.vector)]
     for share, vector in starts:
         if best is not None and (share < 1.0 or best.chi2 >= hopeless or (at_rest and best.chi2 < enough)):
-            continue  # a further start is worth its time only where the first did not end at the noise, or could not tell
+            continue  # a further start is worth its time where the first did not end at the noise, or could not tell
         found = fit(
             observation,
             extension,

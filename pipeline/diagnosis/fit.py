@@ -338,7 +338,7 @@ class _Scaled:
 
 
 def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
-    """The trial, taken back into the admissible range: amounts and forms clipped, the rest by halving the step."""
+    """The trial, taken back into its range; the law changes by a factor two at most, K0 by a fifth of the curvatures."""
     clipped = trial.copy()
     for at, term in zip(extension.owners, extension.terms, strict=True):
         if term.cause.sign:
@@ -346,5 +346,8 @@ def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
         for j, name in enumerate(term.variant.tuned):
             clipped[at + 1 + j] = np.clip(clipped[at + 1 + j], *term.variant.range(name))
     count = len(extension.base.knots)
-    clipped[:count] = np.clip(clipped[:count], vector[:count] - 1.5, vector[:count] + 1.5)
+    clipped[:count] = np.clip(clipped[:count], vector[:count] - 0.7, vector[:count] + 0.7)
+    if (bend := extension.base.pre_curvature_index) is not None:
+        reach = 0.2 * extension.facts.curvature_scale
+        clipped[bend] = np.clip(clipped[bend], vector[bend] - reach, vector[bend] + reach)
     return clipped

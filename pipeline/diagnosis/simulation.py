@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.prediction import Facts, Model, Prediction
-from rod.bending_test import simulate
-from rod.equilibrium import Branch, Equilibrium
+from rod.equilibrium import Branch, Equilibrium, solve
 from rod.sensitivity import Derivatives, derivatives
 
 Array = NDArray[np.float64]
@@ -28,6 +27,7 @@ class Run:
     ----------
     model : Model
     steps : tuple of Equilibrium
+        Of all steps; the failed one alone where there is one.
     bare : Prediction or None
         Before any observer; None if a step has no equilibrium.
     prediction : Prediction or None
@@ -100,16 +100,24 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
 
 
 def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
+    """Equilibria of all steps in their order; those up to the first failure where a step has none.
+
+    The search for an equilibrium that does not exist costs a hundred that do, so the first failure ends it.
+    """
     displacement = facts.displacement + model.shift
-    usable = near is not None and len(near.steps[0].angles) == model.bending.rod.edges.size
+    count = model.bending.rod.edges.size
+    usable = near is not None and len(near.steps) == len(displacement) and len(near.steps[0].angles) == count
     found: dict[int, Equilibrium] = {}
     for index, side, free in _groups(model, facts):
-        starts = [near.steps[i] if near.steps[i].good else None for i in index] if near and usable else None
-        if free:
-            done = simulate(model.bending, forces=np.zeros(len(index)), branch=side, starts=starts)
-        else:
-            done = simulate(model.bending, displacement[index], branch=side, starts=starts)
-        found.update(zip(index, done, strict=True))
+        memory, last = model.bending.rod.virgin, None
+        for i in index:
+            start = near.steps[i] if near is not None and usable and near.steps[i].good else last
+            hold = model.bending.hold("forces", 0.0) if free else model.bending.hold("displacements", displacement[i])
+            here = solve(model.bending.rod, hold, memory=memory, start=start, branch=side)
+            if not here.good:
+                return (here,)
+            memory, last = here.after, here
+            found[i] = here
     return tuple(found[i] for i in range(len(facts.branch)))
 
 

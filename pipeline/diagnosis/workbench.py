@@ -169,7 +169,8 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
         )
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
-        if best is not None and best.chi2 < settings.fits * freedom:
+        at_rest = "mounted" in facts.branch  # K0 is then seen directly, and has no second valley
+        if best is not None and (best.chi2 < settings.fits * freedom or (at_rest and best.converged)):
             break
     return found if best is None else best
 
