@@ -338,7 +338,7 @@ class _Scaled:
 
 
 def _inside(extension: Extension, vector: Array, trial: Array) -> Array:
-    """The trial, taken back into its range; the law changes by a factor two at most, K0 by a fifth of the curvatures."""
+    """The trial, taken back into its range; the law changes by a factor two at most, K0 by a fifth of its range."""
     clipped = trial.copy()
     for at, term in zip(extension.owners, extension.terms, strict=True):
         if term.cause.sign:
