@@ -124,7 +124,9 @@ class DiagnosisSettings(BaseModel):
         description="share of the travel; mean mismatch of chord and displacement from which order or unit is doubted",
     )
     doubled_share: float = Field(
-        0.3, description="share of the noise of a section; two photos that differ by less share their noise and are one"
+        0.03,
+        description="share of the scatter of the sections; two photos that differ by less are one, saved twice; light and "
+        "ground that stay make two photos of one shape alike to an eighth",
     )
     stiffness_range: tuple[float, float] = Field(
         (1e-7, 100.0), description="N m^2; EI of cables spans 1e-5 to 1, two decades beyond that is a wrong unit"
