@@ -125,7 +125,7 @@ class DiagnosisSettings(BaseModel):
     )
     doubled_share: float = Field(
         0.03,
-        description="share of the scatter of the sections; two photos that differ by less are one, saved twice; light and "
+        description="share of the scatter of the sections; two photos that differ by less are one photo; light and "
         "ground that stay make two photos of one shape alike to an eighth",
     )
     stiffness_range: tuple[float, float] = Field(
