@@ -105,7 +105,9 @@ def refit_pairs(
     pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
     least = pairs[0].gain - max(settings.refit_least, settings.refit_margin * pairs[0].gain) if pairs else 0.0
     for pair in pairs:
-        refitted = _refit_pair(observation, base, suspicion, pair, settings) if pair.gain > least else None
+        if pair.gain <= least:
+            break
+        refitted = _refit_pair(observation, base, suspicion, pair, settings, hopeless=single.fitted.chi2)
         if refitted is not None:
             found.append(refitted)
     for cause in candidates(second, settings)[:2]:
@@ -117,7 +119,13 @@ def refit_pairs(
 
 
 def _refit_pair(
-    observation: Observation, base: Fit, suspicion: Suspicion, pair: Pair, settings: DiagnosisSettings
+    observation: Observation,
+    base: Fit,
+    suspicion: Suspicion,
+    pair: Pair,
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float,
 ) -> Explanation | None:
     z, c = suspicion.scores.z, float(suspicion.scores.unit[:, pair.first] @ suspicion.scores.unit[:, pair.second])
     norm = suspicion.scores.norm
@@ -125,7 +133,9 @@ def _refit_pair(
         float((z[pair.first] - c * z[pair.second]) / (1.0 - c * c) / norm[pair.first]),
         float((z[pair.second] - c * z[pair.first]) / (1.0 - c * c) / norm[pair.second]),
     )
-    found = _fit_terms(observation, base, suspicion, (pair.first, pair.second), settings, amounts=amounts)
+    found = _fit_terms(
+        observation, base, suspicion, (pair.first, pair.second), settings, amounts=amounts, hopeless=hopeless
+    )
     if found is None:
         return None
     causes = (int(suspicion.owner[pair.first]), int(suspicion.owner[pair.second]))
@@ -157,7 +167,8 @@ def _fit_terms(
     starts = [(1.0, base.vector), (0.3, base.vector)]
     starts += [(1.0, guess) for guess in guesses if len(guess) == len(base.vector)]
     for share, vector in starts:
-        if best is not None and (share < 1.0 or best.chi2 >= hopeless or (at_rest and best.chi2 < enough)):
+        told = best is not None and at_rest and (best.converged or best.chi2 < enough)
+        if best is not None and (share < 1.0 or best.chi2 >= hopeless or told):
             continue  # a further start is worth its time where the first did not end at the noise, or could not tell
         found = fit(
             observation,
