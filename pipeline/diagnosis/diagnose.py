@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.diagnosis.bootstrap import confirmed_limit
 from pipeline.diagnosis.explanation import Explanation, candidates, refit_one, refit_pairs
 from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
@@ -98,7 +99,7 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects, weigh them, look for a second cause and for what is left."""
-    if bench.largest <= bench.limit:
+    if bench.largest <= confirmed_limit(bench, settings):
         left = _left_over(bench, bench.base, settings)
         return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
     singles = _refitted(bench, settings)

@@ -89,6 +89,8 @@ class Observation:
     photo_noise : PhotoNoise
     rows : Row
         Without priors.
+    added : (N,) or 0
+        Whitened values added to the data: how simulated data are made of measured ones.
     """
 
     forces: tuple[Array, ...]
@@ -97,6 +99,7 @@ class Observation:
     photos: tuple[PhotoData, ...]
     photo_noise: PhotoNoise
     rows: Row
+    added: Array | float = 0.0
 
 
 def observe(
@@ -190,7 +193,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     for photo in observation.photos:
         across = normal_distance(photo.sections, prediction, photo.step)
         parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across])
-    return np.concatenate(parts)
+    return np.asarray(np.concatenate(parts) + observation.added)
 
 
 def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:
