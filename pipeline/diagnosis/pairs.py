@@ -58,12 +58,3 @@ def best_pairs(gains: Array, owner: NDArray[np.int_], *, count: int) -> list[Pai
             seen.add(names)
             found.append(Pair(int(row[at]), int(column[at]), float(value[at])))
     return found
-
-
-def second_given_first(z: Array, cosine: Array, first: int) -> Array:
-    """Scores (k,) of all directions once ``first`` is fitted: ``(z_k - c z_first) / sqrt(1 - c^2)``."""
-    c = cosine[first]
-    apart = 1.0 - c**2
-    return np.asarray(
-        np.divide(z - c * z[first], np.sqrt(np.maximum(apart, 0.0)), out=np.zeros_like(z), where=apart > 1e-9)
-    )

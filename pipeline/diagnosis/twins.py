@@ -35,16 +35,3 @@ def nearest(table: Array) -> tuple[NDArray[np.int_], Array]:
     index = np.argmax(others, axis=1)
     value = others[np.arange(len(table)), index]
     return np.where(value > 0.0, index, -1), np.maximum(value, 0.0)
-
-
-def twins_of(direction: int, cosine: Array, owner: Owner, *, limit: float) -> list[int]:
-    """Causes with a direction closer than ``limit`` to the given one, its own cause first."""
-    close = np.abs(cosine[direction]) > limit
-    others = sorted({int(k) for k in owner[close]} - {int(owner[direction])})
-    return [int(owner[direction]), *others]
-
-
-def tellable_size(cosine: float, *, sigma: float) -> float:
-    """Size of an effect in sigma from which it is told apart from a twin at this cosine."""
-    apart = 1.0 - min(cosine * cosine, 1.0)
-    return float("inf") if apart <= 0.0 else sigma / float(np.sqrt(apart))

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.pairs import best_pairs, pair_gains, second_given_first
+from pipeline.diagnosis.pairs import best_pairs, pair_gains
 from pipeline.diagnosis.score import score
-from pipeline.diagnosis.twins import between_causes, cosines, nearest, tellable_size, twins_of
+from pipeline.diagnosis.twins import between_causes, cosines, nearest
 
 
 @pytest.fixture
@@ -38,16 +38,7 @@ def test_forms_of_one_cause_and_wrong_signs_make_no_pair(scored):
     assert gains[0, 1] == 0.0 and gains[2, 4] == 0.0 and gains[2, 3] > 0.0
 
 
-def test_second_score_is_what_the_first_leaves(scored):
-    data, columns, found = scored
-    left = data - found.unit[:, 2] * found.z[2]
-    expected = score(left, columns[:, 2:3], columns).z
-    second = second_given_first(found.z, cosines(found.unit), 2)
-    others = [0, 1, 3, 4, 5]
-    assert np.allclose(second[others], expected[others], atol=1e-9)
-
-
-def test_nearest_twin_and_class():
+def test_nearest_twin():
     angle = np.radians([0.0, 10.0, 60.0, 90.0])
     unit = np.vstack([np.cos(angle), np.sin(angle)])
     owner = np.array([0, 1, 2, 2])
@@ -55,9 +46,3 @@ def test_nearest_twin_and_class():
     index, closeness = nearest(table)
     assert index.tolist() == [1, 0, 1]
     assert closeness[2] == pytest.approx(np.cos(np.radians(50.0)))
-    assert twins_of(0, cosines(unit), owner, limit=0.95) == [0, 1]
-
-
-def test_exact_twins_are_never_told_apart():
-    assert np.isinf(tellable_size(1.0, sigma=4.0))
-    assert tellable_size(0.95, sigma=4.0) == pytest.approx(12.81, abs=0.01)  # 4 / sqrt(1 - 0.95^2)
