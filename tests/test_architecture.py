@@ -23,15 +23,27 @@ ROD = [
     ("parameters",),
     ("sensitivity",),
     ("information",),
-    ("compliance", "whitening", "knots", "options"),
-    ("moment_points", "photo_residual"),
-    ("moment_regression", "fit_model"),
-    ("evaluation",),
-    ("smoothness",),
-    ("control_points", "estimate"),
     ("inverse", "balance", "paper_fit"),
     ("paper",),
 ]
+INSIDE = {
+    "rod.inverse": [
+        ("whitening", "knots", "options"),
+        ("photo_residual", "fit_model"),
+        ("evaluation",),
+        ("smoothness",),
+        ("control_points", "estimate"),
+        ("problem",),
+    ],
+    "rod.balance": [("compliance",), ("moment_points",), ("moment_regression",), ("graph",)],
+    "pipeline.vision.render": [
+        ("lens", "lighting", "sensor", "sheath"),
+        ("ground",),
+        ("strand",),
+        ("clutter",),
+        ("scene",),
+    ],
+}
 PIPELINE = [
     ("errors",),
     ("rounding",),
@@ -100,6 +112,18 @@ def test_imports_run_from_right_to_left_only(path):
         if top in GUESTS:
             assert here in GUESTS[top], f"{top} is a guest of {GUESTS[top]} alone, not of {here}"
         assert package != "rod" or top in {"rod", "numpy", "scipy"} or top in STANDARD, f"rod imports {name}"
+
+
+@pytest.mark.parametrize("package", INSIDE)
+def test_the_files_of_a_package_have_an_order_too(package):
+    order = {name: rank for rank, names in enumerate(INSIDE[package]) for name in names}
+    for path in (ROOT / package.replace(".", "/")).glob("*.py"):
+        if path.stem == "__init__":
+            continue
+        for name in imports(path):
+            target = name.removeprefix(package + ".").split(".")[0]
+            if name.startswith(package + ".") and target != path.stem:
+                assert order[target] < order[path.stem], f"{path.stem} imports {name}, which is not to its left"
 
 
 STANDARD = {"__future__", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"}

@@ -28,7 +28,7 @@ from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.workbench import Workbench, scored
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.knots import place_knots
+from rod.inverse.knots import place_knots
 from rod.laws import StickSlip
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from pipeline.diagnosis.prediction import Facts, facts_of
 from pipeline.diagnosis.score import null_maxima, threshold
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.knots import place_knots
+from rod.inverse.knots import place_knots
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

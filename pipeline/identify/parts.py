@@ -20,12 +20,12 @@ from pipeline.result import (
     StepPart,
 )
 from rod.balance import BalanceGraph
-from rod.evaluation import StepFit
-from rod.fit_model import FitModel
+from rod.balance.moment_points import pointwise_graph
 from rod.inverse import Estimate, InverseOutcome
+from rod.inverse.evaluation import StepFit
+from rod.inverse.fit_model import FitModel
+from rod.inverse.photo_residual import Pose, curve_distance
 from rod.measurement import MeasuredShape
-from rod.moment_points import pointwise_graph
-from rod.photo_residual import Pose, curve_distance
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 
 from pipeline.simulate.experiment import Experiment, State
-from pipeline.vision.lighting import DIRECTIONAL
 from pipeline.vision.render import (
     Camera,
     ChessBoard,
@@ -25,7 +24,8 @@ from pipeline.vision.render import (
     Strand,
     Thing,
 )
-from pipeline.vision.sheath import Sheath
+from pipeline.vision.render.lighting import DIRECTIONAL
+from pipeline.vision.render.sheath import Sheath
 
 ScaleSource = Literal["number", "board", "markers", "bearings"]
 

@@ -21,7 +21,7 @@ from pipeline.simulate.effects import Readings, Setup
 from pipeline.simulate.experiment import Experiment, State, bend
 from pipeline.simulate.photography import Photography
 from pipeline.vision.render import Camera, Picture, render, render_board
-from pipeline.vision.sensor import write_picture
+from pipeline.vision.render.sensor import write_picture
 
 Array = NDArray[np.float64]
 

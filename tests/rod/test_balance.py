@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
+from rod.balance.moment_points import moment_points, pointwise_graph
 from rod.measurement import MeasuredTest
-from rod.moment_points import moment_points, pointwise_graph
 from tests.rod.virtual_cable import StickSlip, bent_by_bvp, equilibrium, force_free
 from tests.rod.virtual_photo import Camera, bending_test, record
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rod.characteristic import Characteristic
-from rod.estimate import invisible_combinations
 from rod.inverse import InverseOutcome, estimate
+from rod.inverse.estimate import invisible_combinations
+from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
-from rod.options import InverseOptions
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
 

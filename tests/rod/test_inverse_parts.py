@@ -8,12 +8,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from rod.control_points import fit
-from rod.evaluation import evaluate
-from rod.fit_model import fit_model, step_data, zero_of_displacement
-from rod.knots import first_slope, place_knots, roughness
-from rod.smoothness import averaged, evidence_of_knots
-from rod.whitening import block_covariance, midline
+from rod.inverse.control_points import fit
+from rod.inverse.evaluation import evaluate
+from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
+from rod.inverse.knots import first_slope, place_knots, roughness
+from rod.inverse.smoothness import averaged, evidence_of_knots
+from rod.inverse.whitening import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
 

@@ -17,11 +17,11 @@ from scipy.interpolate import CubicSpline
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline import measure_centerline
-from pipeline.vision.lighting import EVEN, Light
 from pipeline.vision.plane import PlaneMap
 from pipeline.vision.render import Camera, Curve, Picture, Scene, Sensor, Strand, render
+from pipeline.vision.render.lighting import EVEN, Light
+from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.sheath import Sheath
 from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
 

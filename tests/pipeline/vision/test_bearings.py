@@ -11,8 +11,8 @@ from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
-from pipeline.vision.sheath import Sheath
-from pipeline.vision.strand import Curve
+from pipeline.vision.render.sheath import Sheath
+from pipeline.vision.render.strand import Curve
 
 STAGE = BearingSettings()
 SCALE = 9_000.0

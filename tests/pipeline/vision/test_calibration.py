@@ -15,8 +15,8 @@ from pipeline.vision.board import BoardView, calibrate_by_board, fit_views
 from pipeline.vision.calibration import check_scale, from_found, from_number
 from pipeline.vision.plane import Lens, PlaneMap
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
+from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.strand import Curve
 
 STAGE = CalibrationSettings()
 SETTINGS = VisionSettings()

@@ -12,10 +12,10 @@ from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline import measure_centerline
 from pipeline.vision.chord import chord_frame
-from pipeline.vision.ground import Ground
 from pipeline.vision.plane import Lens, PlaneMap
 from pipeline.vision.render import render
-from pipeline.vision.sheath import WHITE, Sheath
+from pipeline.vision.render.ground import Ground
+from pipeline.vision.render.sheath import WHITE, Sheath
 from tests.pipeline.vision.bow_scene import (
     DIAMETER,
     LENGTH,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.vision.sheath import Sheath
+from pipeline.vision.render.sheath import Sheath
 from tests.pipeline.vision.bow_scene import bow_scene, directional, traced_errors
 
 SCENES = 50

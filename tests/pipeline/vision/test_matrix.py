@@ -19,11 +19,11 @@ from fixtures.scenes import usual_photography
 from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Specimen, Traces
 from pipeline.settings import VisionSettings
 from pipeline.simulate import Experiment, State
-from pipeline.vision.lighting import DIRECTIONAL, EVEN, Light
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Picture, Scene, Sensor, Strand, Thing, render
-from pipeline.vision.sensor import write_picture
+from pipeline.vision.render.lighting import DIRECTIONAL, EVEN, Light
+from pipeline.vision.render.sensor import write_picture
+from pipeline.vision.render.sheath import WHITE, Sheath
 from pipeline.vision.series import trace_series
-from pipeline.vision.sheath import WHITE, Sheath
 
 LENGTH, DIAMETER = 0.181, 0.0046
 BENT = Curve.from_curvature(lambda s: 2.0 + 7.0 * np.sin(np.pi * s / LENGTH), LENGTH)

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.vision.clutter import ChessBoard
-from pipeline.vision.lens import Camera
-from pipeline.vision.lighting import DIRECTIONAL, Light, cylinder
 from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, Thing, render, render_board
-from pipeline.vision.sensor import encode
-from pipeline.vision.sheath import Sheath
-from pipeline.vision.strand import half_plane
+from pipeline.vision.render.clutter import ChessBoard
+from pipeline.vision.render.lens import Camera
+from pipeline.vision.render.lighting import DIRECTIONAL, Light, cylinder
+from pipeline.vision.render.sensor import encode
+from pipeline.vision.render.sheath import Sheath
+from pipeline.vision.render.strand import half_plane
 
 # A black cable on a white sheet, without noise: what is dark is coverage and nothing else.
 LEVEL = 60_000  # a white that 16 bits hold exactly: half a count over 300 px moves a first moment by 4e-3 px

@@ -13,9 +13,9 @@ from pipeline.vision.bearings import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
-from pipeline.vision.sheath import Sheath
 
 SETTINGS = VisionSettings()
 SCALE = 5_500.0

@@ -16,7 +16,7 @@ from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import trace_photo, trace_series
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
-from pipeline.vision.sheath import Sheath
+from pipeline.vision.render.sheath import Sheath
 
 SETTINGS = VisionSettings()
 SCALE, LENGTH, DIAMETER, COVER = 5_500.0, 0.17, 0.0046, 0.012

@@ -32,7 +32,7 @@ class Sheath:
     colour : (r, g, b)
         Reflectance, 0 to 1.
     gloss, shininess : float
-        Highlight; see `pipeline.vision.lighting.cylinder`. Rubber 0.05 and 5, PVC 0.4 and 60.
+        Highlight; see `pipeline.vision.render.lighting.cylinder`. Rubber 0.05 and 5, PVC 0.4 and 60.
     text : str
         Printed along the cable; empty for none.
     text_colour : (r, g, b)

@@ -4,9 +4,10 @@ A `Scene` says everything: the cable's curve in metres (chord frame) and where i
 other objects, camera, sensor, seed. `render` draws it; the same scene gives the same picture. The truth (centerline and
 bearing axes in pixels) comes from the scene's own curve through the scene's own camera, never from tracing.
 
-Pixel (0, 0) is the centre of the top-left pixel. Edges are exact to 1e-3 px (see `pipeline.vision.strand`); brightness
-is linear until the sensor's tone curve. Not modelled: the shift of a thick cable's outline seen from the side
-(radius^2 X / distance^2, 0.03 px for a cable of 4.6 mm, 90 mm off the middle, from 400 mm) and light between objects.
+Pixel (0, 0) is the centre of the top-left pixel. Edges are exact to 1e-3 px (see `pipeline.vision.render.strand`);
+brightness is linear until the sensor's tone curve. Not modelled: the shift of a thick cable's outline seen from the
+side (radius^2 X / distance^2, 0.03 px for a cable of 4.6 mm, 90 mm off the middle, from 400 mm) and light between
+objects.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.vision.clutter import ChessBoard, Cover, Thing, board_layer, cover_layers, thing_layers
-from pipeline.vision.ground import Ground, paint
-from pipeline.vision.lens import Camera
-from pipeline.vision.lighting import EVEN, Light, cast_shadow, sheet
-from pipeline.vision.sensor import Pixels, Sensor, expose
-from pipeline.vision.strand import Curve, Layer, Strand, strand_layer
+from pipeline.vision.render.clutter import ChessBoard, Cover, Thing, board_layer, cover_layers, thing_layers
+from pipeline.vision.render.ground import Ground, paint
+from pipeline.vision.render.lens import Camera
+from pipeline.vision.render.lighting import EVEN, Light, cast_shadow, sheet
+from pipeline.vision.render.sensor import Pixels, Sensor, expose
+from pipeline.vision.render.strand import Curve, Layer, Strand, strand_layer
 
 __all__ = [
     "Camera",

@@ -7,12 +7,12 @@ and the bending stiffness characteristic (tangent reading) is
     f_EI(K) = dm/dK = 1 / c(m),    K(m) = K0 + int_0^m c dm'.
 
 Strategy: the paper differentiates m and K along s and divides (Eq. 14); that graph is kept for comparison
-(`rod.moment_points.pointwise_graph`), but it is 0/0 at mid-span and biased by noise. Here K is regressed on m, once
-over all photos and both halves. The moment is nearly free of error, so there is no attenuation; what error it has
+(`rod.balance.moment_points.pointwise_graph`), but it is 0/0 at mid-span and biased by noise. Here K is regressed on m,
+once over all photos and both halves. The moment is nearly free of error, so there is no attenuation; what error it has
 (force, bearing axes, scale, position) is carried into the covariance of the residual together with the joint covariance
 of the smooth curve. With that covariance the curvatures weigh as much as the positions behind them: no second
-derivative is taken. The compliance is a positive penalised spline (`rod.compliance`), fitted in
-`rod.moment_regression`.
+derivative is taken. The compliance is a positive penalised spline (`rod.balance.compliance`), fitted in
+`rod.balance.moment_regression`.
 
 Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; SI units.
 
@@ -27,10 +27,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.compliance import compliance_basis
-from rod.measurement import MeasuredTest
-from rod.moment_points import MomentPoints, moment_points
-from rod.moment_regression import (
+from rod.balance.compliance import compliance_basis
+from rod.balance.moment_points import MomentPoints, moment_points
+from rod.balance.moment_regression import (
     BOW_TERMS,
     MomentModel,
     Regression,
@@ -38,6 +37,7 @@ from rod.moment_regression import (
     regress,
     uniform_at_rest,
 )
+from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
 Source = tuple[str, int]
@@ -122,8 +122,8 @@ class BalanceGraph:
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
     checks : dict
-        See `rod.moment_regression.assumption_checks`; ``misfit_floor_per_m`` is the curvature within which the photos
-        obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
+        See `rod.balance.moment_regression.assumption_checks`; ``misfit_floor_per_m`` is the curvature within which the
+        photos obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
     """
 
     outcome: BalanceOutcome

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.characteristic import Characteristic
-from rod.evaluation import Evaluation, evaluate
-from rod.fit_model import FitModel
-from rod.options import InverseOptions
-from rod.smoothness import Averaged, averaged
+from rod.inverse.evaluation import Evaluation, evaluate
+from rod.inverse.fit_model import FitModel
+from rod.inverse.options import InverseOptions
+from rod.inverse.smoothness import Averaged, averaged
 
 Array = NDArray[np.float64]
 Source = tuple[str, int]
@@ -75,7 +75,7 @@ class Estimate:
     log_covariance : (n, n)
         Joint covariance of log(tangent) on the grid.
     gains : dict
-        Response of log(tangent) to the sources of error, keyed as in `rod.balance.BalanceGraph`.
+        Response of log(tangent) to the sources of error, keyed as in `rod.balance.graph.BalanceGraph`.
     evidence : dict of int -> float
         Log evidence of each number of control points tried, against the best.
     model, evaluation, unknowns, covariance

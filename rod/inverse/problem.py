@@ -2,8 +2,8 @@
 
 The discrete rod is fitted to the positions of the midlines and to the forces of all steps at once, each residual
 divided by its standard deviation (Eq. (7) with statistical weights in place of w; the paper's own objective is in
-`rod.paper_fit`). Unknowns and data: `rod.fit_model`; residuals and exact jacobian: `rod.evaluation`; scipy's
-trust-region reflective method.
+`rod.paper_fit`). Unknowns and data: `rod.inverse.fit_model`; residuals and exact jacobian: `rod.inverse.evaluation`;
+scipy's trust-region reflective method.
 
 Strategy: (1) a fit with three control points from a straight line of K over P y; (2) a fit with many control points
 over the range that the cable visits, whose linearisation gives the evidence of every smaller number; (3) a fit with the
@@ -23,14 +23,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.control_points import FIRST_BLUR, FIRST_TAU, Fit, chosen_knots, fit
 from rod.equilibrium import Outcome
-from rod.estimate import Estimate, InverseOutcome, read_off
-from rod.evaluation import Evaluation, evaluate
-from rod.fit_model import FitModel, StepData, fit_model, step_data
-from rod.knots import place_knots
+from rod.inverse.control_points import FIRST_BLUR, FIRST_TAU, Fit, chosen_knots, fit
+from rod.inverse.estimate import Estimate, InverseOutcome, read_off
+from rod.inverse.evaluation import Evaluation, evaluate
+from rod.inverse.fit_model import FitModel, StepData, fit_model, step_data
+from rod.inverse.knots import place_knots
+from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
-from rod.options import InverseOptions
 
 __all__ = ["Estimate", "InverseOptions", "InverseOutcome", "estimate"]
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.compliance import ComplianceCurve
+from rod.balance.compliance import ComplianceCurve
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]

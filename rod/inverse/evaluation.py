@@ -1,8 +1,8 @@
 """One evaluation of the inverse problem: simulate all steps, hold them against the data, with exact derivatives.
 
 Residuals, each divided by its standard deviation: distance of the midline from the simulated shape along the normal
-(whitened, `rod.whitening`), force measured minus simulated, the prior of each nuisance, and the smoothness of z
-(`rod.knots`).
+(whitened, `rod.inverse.whitening`), force measured minus simulated, the prior of each nuisance, and the smoothness of z
+(`rod.inverse.knots`).
 
 The chord of a photo is imposed on the simulation as measured, the errors of the axes taken back:
 ``chord = measured (1 + scale) + left_along - right_along``. Steps without a photo are imposed by the displacement log,
@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from rod.bending_test import simulate
 from rod.equilibrium import Equilibrium, Outcome
-from rod.fit_model import POSE, FitModel, StepData
-from rod.knots import first_slope, roughness
-from rod.photo_residual import Pose, Simulated, distance
+from rod.inverse.fit_model import POSE, FitModel, StepData
+from rod.inverse.knots import first_slope, roughness
+from rod.inverse.photo_residual import Pose, Simulated, distance
 from rod.sensitivity import derivatives
 
 Array = NDArray[np.float64]

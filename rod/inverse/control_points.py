@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rod.equilibrium import Equilibrium
-from rod.evaluation import Evaluation, evaluate
-from rod.fit_model import FitModel
-from rod.knots import place_knots
-from rod.options import InverseOptions
-from rod.smoothness import Averaged, averaged, evidence_of_knots
+from rod.inverse.evaluation import Evaluation, evaluate
+from rod.inverse.fit_model import FitModel
+from rod.inverse.knots import place_knots
+from rod.inverse.options import InverseOptions
+from rod.inverse.smoothness import Averaged, averaged, evidence_of_knots
 
 Array = NDArray[np.float64]
 

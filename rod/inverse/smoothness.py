@@ -1,7 +1,7 @@
 """Linearised posterior of the inverse problem, averaged over the smoothness of the law; evidence of fewer knots.
 
 Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every size of the
-priors of the law's form (`rod.knots`) follow from one normal matrix. What the data leave open about those sizes
+priors of the law's form (`rod.inverse.knots`) follow from one normal matrix. What the data leave open about those sizes
 widens the bands.
 The same matrix, projected on splines through fewer control points, gives the evidence of their number without a fit.
 """
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rod.evaluation import Evaluation
-from rod.fit_model import FitModel
-from rod.knots import first_slope, log_prior_volume, roughness
+from rod.inverse.evaluation import Evaluation
+from rod.inverse.fit_model import FitModel
+from rod.inverse.knots import first_slope, log_prior_volume, roughness
 
 Array = NDArray[np.float64]
 

@@ -29,9 +29,9 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
-from pipeline.vision.lens import Camera
-from pipeline.vision.lighting import Light, cylinder
-from pipeline.vision.sheath import Sheath, albedo, ink
+from pipeline.vision.render.lens import Camera
+from pipeline.vision.render.lighting import Light, cylinder
+from pipeline.vision.render.sheath import Sheath, albedo, ink
 
 Array = NDArray[np.float64]
 

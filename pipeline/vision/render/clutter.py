@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline.vision.lens import Camera
-from pipeline.vision.lighting import Light
-from pipeline.vision.sheath import Colour, ink
-from pipeline.vision.strand import Layer, disc_cover
+from pipeline.vision.render.lens import Camera
+from pipeline.vision.render.lighting import Light
+from pipeline.vision.render.sheath import Colour, ink
+from pipeline.vision.render.strand import Layer, disc_cover
 
 Array = NDArray[np.float64]
 

@@ -1,9 +1,10 @@
 """Regression of curvature on moment over all points of all photos: the numerical part of the balance way.
 
-Unknowns, in this order: coefficients of log c (see `rod.compliance`), the pre-curvature K0, the common scale error of
-the photos, and Legendre coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual depends on the
-compliance and is renewed in each iteration. The posterior is an average over the prior size of the roughness of log c,
-weighted by its evidence (Laplace), so that the bands hold what the data do not know about the form of the law.
+Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the common scale
+error of the photos, and Legendre coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual
+depends on the compliance and is renewed in each iteration. The posterior is an average over the prior size of the
+roughness of log c, weighted by its evidence (Laplace), so that the bands hold what the data do not know about the form
+of the law.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from rod.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
-from rod.moment_points import MomentPoints, Residual, residual
+from rod.balance.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
+from rod.balance.moment_points import MomentPoints, Residual, residual
 
 Array = NDArray[np.float64]
 

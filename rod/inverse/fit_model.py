@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
+from rod.inverse.whitening import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
-from rod.whitening import Midline, midline
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class FitModel:
         As told.
     knots : (k,) 1/m
     tau, slope : float
-        Prior standard deviations of d^2 log f / dt^2, and of d log f / dt at the first knot; see `rod.knots`.
+        Prior standard deviations of d^2 log f / dt^2, and of d log f / dt at the first knot; see `rod.inverse.knots`.
     elements : int
         Of the simulated rod.
     zero : m or None

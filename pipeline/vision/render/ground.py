@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.vision.sheath import Colour, ink
+from pipeline.vision.render.sheath import Colour, ink
 
 Image = NDArray[np.float32]
 Rng = np.random.Generator
