@@ -12,6 +12,7 @@ import pytest
 
 from fixtures.continuum import Cable, Slipping
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
+from fixtures.make import hidden_specimen
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
@@ -19,7 +20,12 @@ from pipeline.diagnosis.faults import faults_of_input
 from pipeline.diagnosis.score import sigma_needed
 from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.workbench import prepare
+from pipeline.identify import measured_test
+from pipeline.intake.folder import read_specimen
+from pipeline.settings import Settings
 from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.simulate import Experiment
+from pipeline.vision.series import trace_series
 
 SETTINGS = DiagnosisSettings()
 PROTOCOLS = {"three": THREE, "six": SIX, "loop": LOOP}
@@ -198,3 +204,29 @@ def test_an_effect_outside_the_catalogue_is_unexplained():
     part, _ = diagnose(replace(test, steps=tuple(steps)), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
     assert "shapes" in part.leftover["message"]
+
+
+RENDERED = {
+    "adequate": ({}, (0.0, 0.0046, 0.0092, 0.0138)),
+    "stiffness_varying": ({"stiffness_varying": (-0.15, 0.6)}, (0.0, 0.0046, 0.0092, 0.0138)),
+    "bearing_friction": ({"bearing_friction": 2e-3}, (0.0, 0.0069, 0.0138, 0.0092, 0.0046)),
+    "camera_tilt": ({"camera_tilt": (0.05, 0.0)}, (0.0, 0.0046, 0.0092, 0.0138)),
+}
+
+
+@pytest.mark.parametrize("name", RENDERED)
+def test_through_rendered_photos(tmp_path, name):
+    """From pictures of collocation solutions, light from one side, through the whole vision stage."""
+    effects, displacements = RENDERED[name]
+    experiment = Experiment(id=name, displacements_m=displacements, effects=effects, seed=17)
+    folder = hidden_specimen(tmp_path / name, experiment).folder
+    settings = Settings()
+    specimen = read_specimen(folder, settings.intake)
+    test = measured_test(specimen, trace_series(specimen, settings.vision), settings.identify)
+    part, findings = diagnose(test, None, settings.diagnosis)
+    assert findings == ()
+    if name == "adequate":
+        assert part.verdict == "adequate", part.headline
+    else:
+        assert part.verdict in ("named", "class") and name in part.causes[0].class_, part.headline
+        assert f_error(part.extended) < 0.02

@@ -73,21 +73,41 @@ def refit_one(
     from other starts and with further forms.
     """
     hopeless = rival + settings.refit_least + settings.hopeless * base.chi2
-    own = suspicion.of(cause)
-    ranked = own[np.argsort(-suspicion.statistic[own], kind="stable")]
+    enough = settings.fits * (len(base.residual) - base.extension.size)
     best: Fit | None = None
-    for direction in ranked[:2]:
-        weaker = suspicion.statistic[direction] < 0.8 * suspicion.statistic[ranked[0]]
-        if best is not None and (weaker or best.chi2 > hopeless):
+    for direction in _first_forms(suspicion, cause):
+        if best is not None and best.chi2 < enough:
             break
-        found = _fit_terms(observation, base, suspicion, (int(direction),), settings, hopeless=hopeless)
-        if found is not None and (best is None or found.chi2 < best.chi2):
+        found = _fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
+        if found is not None and (best is None or _cost(found) < _cost(best)):
             best = found
     if best is None:
         return None
     if suspicion.causes[cause].combines and best.chi2 < hopeless:
         best = _with_more_forms(observation, best, suspicion.causes[cause].name, suspicion, settings)
     return _explanation((cause,), base, best, suspicion)
+
+
+def _cost(fitted: Fit) -> float:
+    """Chi-square plus two for every parameter."""
+    return fitted.chi2 + 2.0 * fitted.extension.size
+
+
+def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
+    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of the other kind.
+
+    A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
+    """
+    own = suspicion.of(cause)
+    ranked = [int(k) for k in own[np.argsort(-suspicion.statistic[own], kind="stable")]]
+    least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]
+    loud = [k for k in ranked[:4] if suspicion.statistic[k] >= least]
+    other = [k for k in ranked if suspicion.terms[k].variant.tuned != suspicion.terms[ranked[0]].variant.tuned]
+    return list(dict.fromkeys([*loud, *other[:1]]))
+
+
+NEARLY_AS_LOUD = 0.75
+"""Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
 
 
 def refit_pairs(
