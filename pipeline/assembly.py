@@ -51,7 +51,8 @@ def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str
         "python": platform.python_version(),
         "libraries": {name: importlib.metadata.version(name) for name in LIBRARIES},
         "inputs_sha256": specimen.hashes,
-        "settings": settings.model_dump(mode="json"),
+        # the language of a report changes no result: the same numbers are the same bytes in every one
+        "settings": settings.model_dump(mode="json", exclude={"report": {"language"}}),
         "command": command or f"{PROGRAM} run {specimen.folder} -o OUT",
         "clock": {"created_utc": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")},
     }

@@ -171,7 +171,7 @@ def test_report_draws_again_without_measuring(cheap, monkeypatch):
 
     redrawing = Stages(None, write, stages.write_index)
     monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: redrawing))
-    done = call("report", "out", "--set", "report.language=de")
+    done = call("report", "out", "--language", "de")
     assert done.exit_code == 0
     assert drawn == [("a", "de"), ("c", "de")]
     assert "b: result.json cannot be read" in done.stderr
@@ -249,6 +249,28 @@ def test_explain_knows_every_cause_of_the_contract():
     assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 20
     page = call("explain", "rig_compliance").stdout
     assert page.startswith("rig_compliance (m/N")
+    german = call("explain", "rig_compliance", "--language", "de").stdout
+    assert german.startswith("rig_compliance: Nachgiebigkeit der Anlage (m/N, nicht negativ)")
+    assert "An der Anlage:    Die fotografierte Sehne statt des Protokolls verwenden" in german
+
+
+def test_language_reaches_the_reports_and_no_result(cheap, monkeypatch):
+    written = []
+    stages = cheap_stages()
+
+    def write(result, folder, settings):
+        written.append(settings.report.language)
+        stages.write(result, folder, settings)
+
+    speaking = Stages(stages.measure, write, stages.write_index)
+    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: speaking))
+    results = []
+    for language in ("de", "en"):
+        assert call("run", "batch/a", "-o", "out", "--language", language, *IN_PROCESS).exit_code == 0
+        results.append((cheap / "out/a/result.json").read_bytes())
+    assert written == ["de", "en"]
+    assert results[0] == results[1]
+    assert call("run", "batch/a", "-o", "out", "--language", "fr").exit_code == 2
 
 
 def test_simulated_specimen_is_read_like_any_other_and_keeps_its_truth_apart(tmp_path):

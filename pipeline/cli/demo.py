@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import chosen_language, language_option, settings_options
 
 if TYPE_CHECKING:
     from pipeline.result import Curve, Result
@@ -21,9 +21,17 @@ COMPARED = 5  # places along the visited range at which f_EI is laid beside the 
     help="Folder for the specimen, its truth and the results.",
 )  # fmt: skip
 @click.option("--seed", default=0, show_default=True, help="Chooses the cable, the camera and the noise.")
+@language_option
 @settings_options
 @click.pass_context
-def demo(ctx: click.Context, out: Path, seed: int, settings_file: Path | None, assignments: tuple[str, ...]) -> None:
+def demo(
+    ctx: click.Context,
+    out: Path,
+    seed: int,
+    language: str | None,
+    settings_file: Path | None,
+    assignments: tuple[str, ...],
+) -> None:
     """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
     from pipeline.batch import run_batch
     from pipeline.cli.configuration import as_options, read_settings
@@ -32,7 +40,7 @@ def demo(ctx: click.Context, out: Path, seed: int, settings_file: Path | None, a
     from pipeline.result import from_json
     from pipeline.simulate import demo_specimen
 
-    settings = read_settings(settings_file, assignments)
+    settings = read_settings(settings_file, (*assignments, *chosen_language(language)))
     specimen = out / "specimen" / f"demo-{seed}"
     specimen.mkdir(parents=True, exist_ok=True)
     click.echo("simulating and photographing the specimen", err=True)

@@ -23,3 +23,17 @@ def settings_options(command: Command) -> Command:
         metavar="FILE",
         help="Settings in TOML; `cablebend init --settings` prints all with default, unit and reason.",
     )(command)
+
+
+def language_option(command: Command) -> Command:
+    """Add ``--language``, as ``language``; it is the setting ``report.language`` under a name one remembers."""
+    return click.option(
+        "--language",
+        type=click.Choice(["de", "en"]),
+        help="Language of what is written; English by default.",
+    )(command)
+
+
+def chosen_language(language: str | None) -> tuple[str, ...]:
+    """The option as an assignment of a setting. It changes no result, so it is no part of the command in one."""
+    return () if language is None else (f"report.language={language}",)

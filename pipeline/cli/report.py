@@ -6,20 +6,23 @@ from pathlib import Path
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import chosen_language, language_option, settings_options
 from pipeline.errors import InputError
 
 
 @click.command()
 @click.argument("out", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@language_option
 @settings_options
 @click.pass_context
-def report(ctx: click.Context, out: Path, settings_file: Path | None, assignments: tuple[str, ...]) -> None:
-    """Draw everything in the results folder OUT again, for instance with `--set report.language=de`."""
+def report(
+    ctx: click.Context, out: Path, language: str | None, settings_file: Path | None, assignments: tuple[str, ...]
+) -> None:
+    """Draw everything in the results folder OUT again without measuring, for instance with `--language de`."""
     from pipeline.batch import redraw
     from pipeline.cli.configuration import read_settings
 
-    settings = read_settings(settings_file, assignments)
+    settings = read_settings(settings_file, (*assignments, *chosen_language(language)))
     drawn = 0
     for name, trouble in redraw(out, settings):
         drawn += trouble is None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import chosen_language, language_option, settings_options
 from pipeline.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
 @click.option("--timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Limit per specimen.")
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON on stdout.")
+@language_option
 @settings_options
 @click.pass_context
 def run(
@@ -35,6 +36,7 @@ def run(
     scheduler: str | None,
     timeout: float | None,
     as_json: bool,
+    language: str | None,
     settings_file: Path | None,
     assignments: tuple[str, ...],
 ) -> None:
@@ -50,7 +52,7 @@ def run(
     given = {"batch.workers": workers, "batch.timeout_s": timeout}
     limits = [f"{name}={value}" for name, value in given.items() if value is not None]
     options = as_options(settings_file, assignments)
-    settings = read_settings(settings_file, (*assignments, *limits))
+    settings = read_settings(settings_file, (*assignments, *limits, *chosen_language(language)))
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))

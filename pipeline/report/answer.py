@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
-from pipeline.result import DiagnosisPart, Result
+from pipeline.result import Result
 from pipeline.settings import ReportSettings
 from pipeline.visited import best, curves
 
@@ -85,7 +85,7 @@ def _sentence(result: Result, words: Words) -> str:
     if curve is None:
         reason = next((f.message for f in result.findings if f.level == "error"), "")
         key = "answer_failed" if result.status == "failed" and reason else "answer_none"
-        return words(key, id=name, reason=reason) if key == "answer_failed" else words(key, id=name)
+        return words(key, id=name, reason=words.said(reason)) if key == "answer_failed" else words(key, id=name)
     unit = stiffness_unit(result, words)
     change = curve.tangent[-1] - curve.tangent[0]
     beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
@@ -125,22 +125,13 @@ def _agreement(result: Result, words: Words) -> str:
 def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
     """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
     if result.diagnosis is not None:
-        return _diagnosed(result.diagnosis, words), result.diagnosis.verdict == "adequate"
+        return words.said(result.diagnosis.headline).text, result.diagnosis.verdict == "adequate"
     misfit = result.inverse.misfit if result.inverse else None
     if misfit is None or misfit.degrees_of_freedom <= 0:
         return words("model_unknown"), False
     ratio, std = misfit.chi2 / misfit.degrees_of_freedom, math.sqrt(2.0 / misfit.degrees_of_freedom)
     good = ratio < 1.0 + settings.misfit_sigma * std
     return words("model_ok" if good else "model_bad", chi2=words.number(ratio), std=words.number(std, 2)), good
-
-
-def _diagnosed(diagnosis: DiagnosisPart, words: Words) -> str:
-    """Headline of the diagnosis, which is English; in another language the verdict with the causes it names."""
-    if words.language == "en":
-        return diagnosis.headline
-    names = ", ".join(words.cause(cause.name) for cause in diagnosis.causes)
-    verdict = words(f"verdict_{diagnosis.verdict}")
-    return f"{verdict[:1].upper()}{verdict[1:]}{': ' + names if names else ''}."
 
 
 def _advice(result: Result, words: Words) -> str:
@@ -150,7 +141,8 @@ def _advice(result: Result, words: Words) -> str:
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)
-        what = experiment.what[:1].upper() + experiment.what[1:]
+        what = words.said(experiment.what).text
+        what = what[:1].upper() + what[1:]
         return words("next_what", what=what, causes=names) if names else what
     if any(finding.level != "info" for finding in result.findings):
         return words("next_findings")

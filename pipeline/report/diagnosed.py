@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import map_rms
@@ -20,10 +21,19 @@ SHARE_DIGITS = 2
 
 
 @dataclass(frozen=True)
+class NamedCause:
+    """A cause that was found: its size and probability in a line, what it is, and what to do about it (English)."""
+
+    line: str
+    summary: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
 class DiagnosisView:
     """Texts, rows and figures of the section on the diagnosis."""
 
-    named: list[str] = field(default_factory=list)
+    named: list[NamedCause] = field(default_factory=list)
     gain: list[str] = field(default_factory=list)
     rows: list[list[str]] = field(default_factory=list)
     blind_spots: list[str] = field(default_factory=list)
@@ -48,20 +58,21 @@ def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> Di
                 "blind_row",
                 name=words.cause(spot.name),
                 bias=words.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), SHARE_DIGITS),
-                settled=spot.settled_by,
+                settled=words.said(spot.settled_by),
             )
             for spot in part.blind_spots
         ],
-        next_what=following.what if following else "",
+        next_what=words.said(following.what).text if following else "",
         next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
-        leftover=_sentences(part.leftover) if part.verdict != "adequate" else [],
+        leftover=_sentences(part.leftover, words) if part.verdict != "adequate" else [],
         figures=_figures(part, words, settings),
     )
 
 
-def _named(part: DiagnosisPart, words: Words) -> list[str]:
-    """One line a cause: name, probability, estimate, and what it cannot be told from."""
-    lines = []
+def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
+    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says."""
+    catalogue = {cause.name: cause for cause in CATALOGUE}
+    named = []
     for cause in part.causes:
         size = suited([cause.estimate], cause.unit, decimal=words.decimal) if cause.unit[:1] == "N" else None
         estimate = (
@@ -72,8 +83,9 @@ def _named(part: DiagnosisPart, words: Words) -> list[str]:
         share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
-        lines.append(f"{words.cause(cause.name)}: {estimate} ({share}){tail}")
-    return lines
+        line, known = f"{words.cause(cause.name)}: {estimate} ({share}){tail}", catalogue.get(cause.name)
+        named.append(NamedCause(line, known.summary, known.remedy) if known else NamedCause(line))
+    return named
 
 
 def _gain(part: DiagnosisPart, result: Result, words: Words) -> list[str]:
@@ -121,11 +133,11 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     ]
 
 
-def _sentences(leftover: dict[str, Any] | None) -> list[str]:
+def _sentences(leftover: dict[str, Any] | None, words: Words) -> list[str]:
     """Sentences of the leftover; its arrays are drawn."""
     if not leftover:
         return []
-    return [str(leftover[key]) for key in ("message", "noise") if leftover.get(key)]
+    return [words.said(str(leftover[key])).text for key in ("message", "noise") if leftover.get(key)]
 
 
 def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:

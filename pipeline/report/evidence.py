@@ -179,7 +179,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
         photo.step,
         photo.image,
         photo.status,
-        photo.reason or "",
+        words.said(photo.reason or "").text,
         photo.preview,
         seen,
         hidden,
@@ -223,7 +223,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
             [
                 str(photo.step),
                 photo.image,
-                words(f"status_{photo.status}") + (f": {photo.reason}" if photo.reason else ""),
+                words(f"status_{photo.status}") + (f": {words.said(photo.reason)}" if photo.reason else ""),
                 *(millimetres.number(_times(1e3, v), _times(1e3, std)) for v, std in lengths),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]

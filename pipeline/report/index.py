@@ -232,7 +232,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> dict[str, object]:
         "photos": f"{row.photos_used} / {row.photos_given}",
         "photos_used": row.photos_used,
         "troubles": row.warnings + row.errors,
-        "reason": row.reason,
+        "reason": words.said(row.reason),
         "shapes": row.shapes,
     }
 

@@ -169,8 +169,7 @@ def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> She
         sheet.text(words("nav_findings"), bold=True)
         for finding in troubles:
             if sheet.room() > 30.0:
-                message = finding.message.replace("+-", "±")
-                sheet.text(f"{words(f'level_{finding.level}')}: {message}", size=9.0)
+                sheet.text(f"{words(f'level_{finding.level}')}: {words.said(finding.message)}", size=9.0)
     return sheet
 
 
@@ -272,10 +271,10 @@ def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings
     """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
     sheet, view = Sheet(_head(result)), diagnosis_view(result, words, settings)
     sheet.text(words("nav_diagnosis"), size=13.0, bold=True)
-    sheet.text(part.headline, bold=True)
+    sheet.text(words.said(part.headline).text, bold=True)
     if view is None:
         return sheet
-    for line in (*view.named, *view.gain, *view.leftover):
+    for line in (*(cause.line for cause in view.named), *view.gain, *view.leftover):
         sheet.text(line)
     if part.table:
         height = min(ranking.ranking_height(part, settings), 280.0)

@@ -61,7 +61,7 @@ def specimen_rows(result: Result, words: Words) -> list[tuple[str, str]]:
         rows.append((words("moving"), words(part.moving_bearing)))
     if result.scale is not None:
         scale = words.measured(result.scale.px_per_mm, result.scale.px_per_mm * result.scale.std_relative)
-        rows.append((words("scale"), f"{scale} px/mm {words('scale_from', source=result.scale.source)}"))
+        rows.append((words("scale"), f"{scale} px/mm {words('scale_from', source=words.said(result.scale.source))}"))
     return rows + list(part.description.items())
 
 
@@ -71,11 +71,11 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     if part is None:
         return []
     rows = [
-        (words("fit_outcome"), f"{part.outcome} {part.advice}".strip()),
+        (words("fit_outcome"), words.said(part.advice or part.outcome).text),
         (words("fit_iterations"), f"{part.iterations} ({words('exact')})"),
     ]
     if part.knots_chosen_by:
-        rows.append((words("fit_knots"), part.knots_chosen_by))
+        rows.append((words("fit_knots"), words.said(part.knots_chosen_by).text))
     if part.misfit is not None:
         misfit, force = part.misfit, force_unit(result, words)
         length = suited([misfit.shape_rmse_m], "m", decimal=words.decimal)

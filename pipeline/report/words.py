@@ -1,7 +1,8 @@
 """The words of report and index in English and German; the numbers in the reader's format.
 
 The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences
-made by other rooms (findings, headline of the diagnosis) are English and are marked as such on a German page.
+made by other rooms (findings, headline of the diagnosis) are stored in English; `Words.said` gives them in the reader's
+language, see `pipeline.report.german`. One that has no German twin stays English and is marked as such on the page.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.report.german import in_german
 from pipeline.rounding import plain, rounded
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
@@ -21,6 +23,24 @@ LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 @cache
 def _table() -> dict[str, dict[str, list[str]]]:
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))
+
+
+@cache
+def _german_causes() -> dict[str, str]:
+    """German names of the causes by their names of the contract, with and without underscores, and by the English."""
+    rows = _table()["causes"].items()
+    return {english: row[1] for name, row in rows for english in (name, name.replace("_", " "), row[0])}
+
+
+@dataclass(frozen=True)
+class Said:
+    """A sentence of another room as the reader gets it, and the language it is in."""
+
+    text: str
+    language: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
 @dataclass(frozen=True)
@@ -62,6 +82,14 @@ class Words:
         """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
         row = _table()["causes"].get(name)
         return row[LANGUAGES[self.language][0]] if row else name.replace("_", " ")
+
+    def said(self, sentence: str) -> Said:
+        """A stored sentence (finding, reason, headline, advice) in this language, as far as it is known."""
+        text, language = sentence.replace("+-", "±"), "en"
+        if self.language == "de":
+            text, known = in_german(sentence, _german_causes())
+            text, language = text.replace("+-", "±"), "de" if known else "en"
+        return Said(text, language)
 
     def branch(self, name: str) -> str:
         """Branch of the test; a name the table does not have stays as it is."""

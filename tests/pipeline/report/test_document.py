@@ -9,6 +9,7 @@ import pytest
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, write_report
 from pipeline.report.pdf import pdf_bytes
+from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
 
 VOID = {"meta", "link", "img", "input", "br", "hr"}
@@ -175,8 +176,17 @@ def test_german_page_has_german_words_and_numbers(full_result):
 
 
 def test_german_page_says_the_verdict_in_german(diagnosed):
-    text = Page(report_html(diagnosed("class"), ReportSettings(language="de"))).text
-    assert "Eine Ursache, mehrere Namen: Hysterese." in text
+    result = diagnosed("class")
+    told = {"headline": "The simulation lacks hysteresis (0.0049 ± 0.0002 N m)."}
+    finding = FindingPart(code="photo/empty", level="warning", message="the file is empty")
+    strange = FindingPart(code="my/own", level="warning", message="The moon is full.")
+    changed = {"diagnosis": result.diagnosis.model_copy(update=told), "findings": [finding, strange]}
+    page = report_html(result.model_copy(update=changed), ReportSettings(language="de"))
+    text = Page(page).text
+    assert "Der Simulation fehlt: Hysterese (0,0049 ± 0,0002 N m)." in text
+    assert "<span>die Datei ist leer</span>" in page
+    assert '<span lang="en">The moon is full.</span>' in page
+    assert "Drähte reiben aneinander" in text
     assert "hier nicht zu trennen von Lagerreibung" in text
 
 

@@ -1,0 +1,227 @@
+"""German twins: every sentence that can get into a result has one, none is left over, and stored ones find theirs.
+
+The truth is the code itself: its strings are read from the syntax tree, so a finding written tomorrow without its
+German twin fails here.
+"""
+
+import ast
+import re
+import string
+from pathlib import Path
+
+import pytest
+
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.words import could_have_been_seen, headline
+from pipeline.errors import InputError
+from pipeline.report.german import EDGES, entries
+from pipeline.report.words import Words
+from rod.balance import BalanceOutcome
+from rod.inverse import InverseOutcome
+
+ROOT = Path(__file__).resolve().parents[3]
+# What is written there never gets into a result: the command line speaks English, and so do its own files.
+ELSEWHERE = (
+    "pipeline/__init__.py",
+    "pipeline/batch/batch.py",
+    "pipeline/batch/orders.py",
+    "pipeline/batch/store.py",
+    "pipeline/cli/",
+    "pipeline/compare.py",
+    "pipeline/diagnosis/rediscovery.py",
+    "pipeline/diagnosis/study",
+    "pipeline/intake/template.py",
+    "pipeline/predict.py",
+    "pipeline/report/",
+    "pipeline/result.py",
+    "pipeline/rounding.py",
+    "pipeline/settings/",
+    "pipeline/simulate/",
+    "pipeline/vision/render/",
+    "rod/paper.py",
+)
+# Patterns, lists of synonyms and commands are no sentences.
+NO_SENTENCES = re.compile(r"\||\\d|-o OUT")
+GERMAN = dict(entries())
+
+
+def shown(text):
+    """A string of the code as the catalogue has it: gaps side by side are one, edges and a pair of brackets are off."""
+    text = re.sub(r"(\{\})+", "{}", text).strip(EDGES)
+    return text[1:-1] if text[:1] == "(" and text[-1:] == ")" else text
+
+
+def template(node):
+    """String of a node with {} for each value; None if it is no string."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return re.sub(r"([{}])", r"\1\1", node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(template(part) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    return None
+
+
+def no_messages(node):
+    """Whether strings below a node are documentation, or for the caller of a function."""
+    if isinstance(node, ast.Expr):
+        return isinstance(node.value, ast.Constant)
+    if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+        return getattr(node.exc.func, "id", "InputError") != "InputError"
+    return isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Field"
+
+
+def strings(path):
+    """All strings of a module that are no documentation, as templates."""
+    tree, skipped = ast.parse(path.read_text(encoding="utf-8")), set()
+    for node in ast.walk(tree):
+        if no_messages(node):
+            skipped.update(map(id, ast.walk(node)))
+        elif isinstance(node, ast.JoinedStr):  # its parts are no strings of their own, what is put in may hold some
+            skipped.update(id(part) for part in node.values if isinstance(part, ast.Constant))
+            formats = [part.format_spec for part in node.values if isinstance(part, ast.FormattedValue)]
+            skipped.update(id(inner) for spec in formats if spec is not None for inner in ast.walk(spec))
+    for node in ast.walk(tree):
+        text = None if id(node) in skipped else template(node)
+        if text:
+            yield shown(text)
+
+
+def modules():
+    for path in sorted((*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "rod").rglob("*.py"))):
+        name = path.relative_to(ROOT).as_posix()
+        if not name.startswith(ELSEWHERE):
+            yield name, set(strings(path))
+
+
+CODE = dict(modules())
+
+
+@pytest.mark.parametrize("module", CODE)
+def test_every_sentence_has_a_german_twin(module):
+    sentences = {
+        text
+        for text in CODE[module]
+        if len(re.findall(r"[A-Za-z]{2,}", text)) > 1 and re.search(r"[\w)}] [\w({]", text)
+        if not NO_SENTENCES.search(text)
+    }
+    assert not sentences - GERMAN.keys(), "write its German twin into pipeline/report/templates/german"
+
+
+def test_no_twin_is_left_over():
+    assert not GERMAN.keys() - set().union(*CODE.values())
+
+
+def test_both_have_the_same_gaps():
+    def gaps(text):
+        return sum(field is not None for _, field, _, _ in string.Formatter().parse(text))
+
+    assert [english for english, german in GERMAN.items() if gaps(english) != gaps(german)] == []
+    assert [german for german in GERMAN.values() if german != german.rstrip(" .")] == []
+
+
+SIZES = [(0.00488, 0.00017, "N m"), (0.7, 0.0014, "1/m")]
+FOUND = {"explained": 0.94, "change": 0.2, "weakest": "", "leftover": ""}
+SEEN = could_have_been_seen([("stiffness_varying", 0.00051, "-"), ("displacement_offset", 3.5e-6, "m")], 19)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "names", "values", "told"),
+    [
+        (
+            "named",
+            [["hysteresis"]],
+            {},
+            "Der Simulation fehlt: Hysterese (0,00488 ± 0,00017 N m); auf Schritten, die das Modell nicht kannte, "
+            "beseitigt das 94 % der Abweichung, und f_EI ändert sich um 20 % (eff.).",
+        ),
+        (
+            "class",
+            [["bearing_friction", "hysteresis", "plastic_set"]],
+            {"change": None},
+            "Eine Ursache, die diese Daten nicht sicher benennen können: Lagerreibung, Hysterese oder bleibende "
+            "Verformung (als Lagerreibung: 0,00488 ± 0,00017 N m); auf Schritten, die das Modell nicht kannte, "
+            "beseitigt das 94 % der Abweichung.",
+        ),
+        (
+            "two_causes",
+            [["hysteresis"], ["pre_curvature_varying"]],
+            {"explained": None, "change": None},
+            "Zwei Ursachen wirken zusammen: Hysterese (0,00488 ± 0,00017 N m) und veränderliche Vorkrümmung "
+            "(0,7000 ± 0,0014 1/m).",
+        ),
+        (
+            "adequate",
+            [],
+            {"weakest": SEEN},
+            "Nichts jenseits des Rauschens: Die Simulation erklärt Kräfte und Fotos; 2 von 19 Ursachen hätten sich "
+            "bei plausibler Größe gezeigt, etwa veränderliche Steifigkeit ab 0,00051, Wegnullpunkt ab 3,5·10⁻⁶ m.",
+        ),
+    ],
+)
+def test_headline_of_the_diagnosis(verdict, names, values, told):
+    sentence = headline(verdict, names=names, amounts=SIZES[: len(names)], **{**FOUND, **values})
+    assert Words("de").said(sentence).text == told
+
+
+@pytest.mark.parametrize(
+    ("sentence", "told"),
+    [
+        (
+            "inverse problem: " + InverseOutcome.NOT_VISIBLE.value + "; open: f_EI at 3.4 1/m; "
+            "f_EI at 5.2 1/m (+- 0.3 in the logarithm)",
+            "inverses Problem: die Daten legen nicht jeden Parameter fest (die offenen Kombinationen stehen daneben); "
+            "weiter biegen, Schritte oder ein Foto des kraftfreien Kabels ergänzen; offen: f_EI bei 3,4 1/m; "
+            "f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
+        ),
+        (
+            InputError("key 'lenght_mm' is not known in [specimen]", path="a b/specimen.toml", line=3, code="x",
+                       remedy="rename it to length_mm or remove it").sentence,
+            "a b/specimen.toml, Zeile 3: der Schlüssel 'lenght_mm' ist in [specimen] nicht bekannt; "
+            "in length_mm umbenennen oder entfernen.",
+        ),
+        (
+            "force.csv, line 4: force '1.2.3' is no number (numbers of this file have a decimal point); "
+            "correct the cell or remove the row.",
+            "force.csv, Zeile 4: Kraft '1.2.3' ist keine Zahl (Zahlen dieser Datei haben als Dezimalzeichen: Punkt); "
+            "die Zelle berichtigen oder die Zeile entfernen.",
+        ),
+        (
+            "force.csv: no repeated samples; standard deviation of a force taken as 0.5% of the largest force, 0.002 N",
+            "force.csv: keine wiederholten Messwerte; als Standardabweichung einer Kraft gilt 0,5 % der größten Kraft, "
+            "0,002 N",
+        ),
+        (
+            "The left bearing moves on the photos, specimen.toml says moving_bearing = \"right\"; the camera may be "
+            "turned by 180 degrees or the photos mirrored.",
+            "Auf den Fotos bewegt sich das Lager links, specimen.toml sagt moving_bearing = \"right\"; die Kamera "
+            "kann um 180 Grad gedreht sein, oder die Fotos sind gespiegelt.",
+        ),
+        ("a tape measure (length_error)", "ein Maßband (Längenfehler)"),
+    ],
+)  # fmt: skip
+def test_sentences_put_together_are_taken_apart(sentence, told):
+    assert str(Words("de").said(sentence)) == told
+    assert Words("de").said(sentence).language == "de"
+
+
+@pytest.mark.parametrize("outcome", [*InverseOutcome, *BalanceOutcome], ids=lambda outcome: outcome.name)
+def test_outcomes_are_known_whole(outcome):
+    told = Words("de").said(f"No characteristic was measured: {outcome.value}.").text
+    assert told == f"Keine Kennlinie wurde gemessen: {GERMAN[shown(outcome.value)]}."
+
+
+def test_causes_are_explained_in_german():
+    said = Words("de").said
+    for cause in CATALOGUE:
+        for text in (cause.summary, cause.sign_means, cause.needs, cause.apart, cause.remedy, cause.settled_by):
+            assert said(text).text.rstrip(".") == GERMAN[shown(text)]
+
+
+@pytest.mark.parametrize("text", ["My own cause: the moon is full.", "fotos/a and b 1.5.png", "2.1.0", "–"])
+def test_what_is_not_known_stays_and_is_called_english(text):
+    said = Words("de").said(text)
+    assert (said.text, said.language) == (text, "en")
+
+
+def test_english_stays_english():
+    said = Words("en").said("f_EI at 5.2 1/m (+- 0.3 in the logarithm)")
+    assert (said.text, said.language) == ("f_EI at 5.2 1/m (± 0.3 in the logarithm)", "en")
