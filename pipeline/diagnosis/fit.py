@@ -238,6 +238,8 @@ def fit(
     tolerance: float,
     near: Run | None = None,
     cutoff: float = 1e-7,
+    begin: Fit | None = None,
+    kept: NDArray[np.bool_] | None = None,
 ) -> Fit:
     """Gauss-Newton with shortened steps from ``start``.
 
@@ -254,40 +256,50 @@ def fit(
         Run of a similar model, for warm starts.
     cutoff : float
         Combinations of parameters that show less than this share of the clearest one stay where they are.
+    begin : Fit or None
+        Fit of this model to this observation, to go on from: nothing is computed anew at its vector.
+    kept : (N,) bool or None
+        Rows the model is fitted to; all of them are predicted.
 
     Returns
     -------
     Fit
         ``converged`` is False if the iterations ran out or the start has no equilibrium.
     """
-    prior = extension.prior
-    vector = np.asarray(start, dtype=float)
-    base_model = extension.base_model(vector)
-    here = run(extension.model(vector, of=base_model), extension.facts, near=near)
-    value = whole_residual(observation, here.prediction, vector, prior)
-    if value is None:
-        empty = np.zeros((0, extension.size))
-        return Fit(extension, vector, here, np.zeros(0), empty, False, here.advice)
-    jacobian = sensitivities(observation, extension, vector, base_model, here)
+    if begin is not None:
+        state, jacobian = (
+            _State(begin.vector, extension.base_model(begin.vector), begin.run, begin.residual),
+            begin.jacobian,
+        )
+    else:
+        vector = np.asarray(start, dtype=float)
+        base_model = extension.base_model(vector)
+        here = run(extension.model(vector, of=base_model), extension.facts, near=near)
+        value = whole_residual(observation, here.prediction, vector, extension.prior)
+        if value is None:
+            empty = np.zeros((0, extension.size))
+            return Fit(extension, vector, here, np.zeros(0), empty, False, here.advice)
+        state = _State(vector, base_model, here, value)
+        jacobian = sensitivities(observation, extension, vector, base_model, here)
+    rows = np.ones(len(state.value), dtype=bool) if kept is None else kept
     converged, damping = False, 0.0
     for _ in range(iterations):
-        scaled = _Scaled(jacobian, value, cutoff)
+        scaled = _Scaled(jacobian[rows], state.value[rows], cutoff)
         if scaled.expected < tolerance:
             converged = True
             break
-        accepted = _lower(observation, extension, _State(vector, base_model, here, value), scaled, damping)
+        accepted = _lower(observation, extension, state, scaled, damping, rows)
         if accepted is None:
             converged = scaled.expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
-        state, damping = accepted
-        fall = float(value @ value - state.value @ state.value)
-        vector, base_model, here, value = state
-        jacobian = sensitivities(observation, extension, vector, base_model, here)
-        if fall < tolerance and damping == 0.0:
+        before, (state, damping) = state, accepted
+        jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.here)
+        if before.cost(rows) - state.cost(rows) < tolerance and damping == 0.0:
             converged = True
             break
         damping = 0.1 * damping if damping > 1e-4 else 0.0
-    return Fit(extension, vector, here, value, jacobian, converged, "" if converged else "the fit did not settle")
+    advice = "" if converged else "the fit did not settle"
+    return Fit(extension, state.vector, state.here, state.value, jacobian, converged, advice)
 
 
 class _State(NamedTuple):
@@ -298,9 +310,18 @@ class _State(NamedTuple):
     here: Run
     value: Array
 
+    def cost(self, rows: NDArray[np.bool_]) -> float:
+        """Sum of squares of the named rows."""
+        return float(np.sum(self.value[rows] ** 2))
+
 
 def _lower(
-    observation: Observation, extension: Extension, state: _State, scaled: _Scaled, damping: float
+    observation: Observation,
+    extension: Extension,
+    state: _State,
+    scaled: _Scaled,
+    damping: float,
+    rows: NDArray[np.bool_],
 ) -> tuple[_State, float] | None:
     """First state of lower chi-square with rising damping, and that damping; None where seven trials find none."""
     for used in (damping, *(max(damping, 1e-5) * 10.0**k for k in range(1, 7))):
@@ -310,7 +331,7 @@ def _lower(
         base_model = extension.base_model(trial)
         there = run(extension.model(trial, of=base_model), extension.facts, near=state.here)
         value = whole_residual(observation, there.prediction, trial, extension.prior)
-        if value is not None and value @ value < state.value @ state.value:
+        if value is not None and np.sum(value[rows] ** 2) < state.cost(rows):
             return _State(trial, base_model, there, value), used
     return None
 

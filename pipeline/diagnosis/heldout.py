@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.diagnosis.fit import Fit, fit, sensitivities, whole_residual
+from pipeline.diagnosis.fit import Fit, fit
 from pipeline.diagnosis.gain import Fold, HeldOut, folds_by_level, held_out
 from pipeline.diagnosis.maps import rms_errors
-from pipeline.diagnosis.observation import Observation, observe
+from pipeline.diagnosis.observation import Observation
 from pipeline.diagnosis.workbench import Workbench
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -26,22 +27,11 @@ def measured_gain(
     )
     if len(groups) < 2:
         return None, None
-    used_photos = {photo.step for photo in observation.photos}
     folds, errors = [], []
     for group in groups:
-        inside = observe(
-            bench.test,
-            settings,
-            photo_noise=observation.photo_noise,
-            without_photos=frozenset(i for i in range(len(bench.test.steps)) if i in group or i not in used_photos),
-            without_forces=frozenset(
-                i for i in range(len(bench.test.steps)) if i in group or not len(observation.forces[i])
-            ),
-        )
-        before, after = (_refit(inside, model, settings) for model in (bench.base, extended))
-        if before.run.prediction is None or after.run.prediction is None:
-            continue
-        folds.append(_fold(observation, group, before, after))
+        left_out = np.isin(observation.rows.step, group)
+        before, after = (_refit(observation, model, left_out, settings) for model in (bench.base, extended))
+        folds.append(_fold(before, after, left_out))
         errors.append([rms_errors(observation, model, group) for model in (before, after)])
     found = held_out(folds, draws=settings.gain_draws, rng=np.random.default_rng(settings.seed)) if folds else None
     if found is None:
@@ -57,30 +47,25 @@ def measured_gain(
     return part, found
 
 
-def _refit(inside: Observation, model: Fit, settings: DiagnosisSettings) -> Fit:
+def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_], settings: DiagnosisSettings) -> Fit:
+    """The model fitted to the rows that stay, from where it was with all."""
+    priors = np.ones(len(model.residual) - len(left_out), dtype=bool)
     return fit(
-        inside,
+        observation,
         model.extension,
         model.vector,
-        iterations=settings.iterations,
+        iterations=settings.gain_iterations,
         tolerance=settings.tolerance,
-        near=model.run,
         cutoff=1e-4,  # what the remaining steps cannot tell stays where it was, and counts for neither model
+        begin=model,
+        kept=np.r_[~left_out, priors],
     )
 
 
-def _fold(observation: Observation, group: list[int], before: Fit, after: Fit) -> Fold:
-    rows = np.isin(observation.rows.step, group)
-    residuals = [
-        whole_residual(observation, model.run.prediction, model.vector, model.extension.prior)
-        for model in (before, after)
-    ]
-    jacobian = sensitivities(
-        observation, after.extension, after.vector, after.extension.base_model(after.vector), after.run
-    )
-    outside = np.r_[rows, np.zeros(len(jacobian) - len(rows), dtype=bool)]
-    base, extended = (np.asarray(value)[: len(rows)][rows] for value in residuals)
-    return Fold(base, extended, jacobian[~outside], jacobian[outside])
+def _fold(before: Fit, after: Fit, left_out: NDArray[np.bool_]) -> Fold:
+    outside = np.r_[left_out, np.zeros(len(after.jacobian) - len(left_out), dtype=bool)]
+    base, extended = (model.residual[: len(left_out)][left_out] for model in (before, after))
+    return Fold(base, extended, after.jacobian[~outside], after.jacobian[outside])
 
 
 def _rms(values: np.ndarray) -> float:

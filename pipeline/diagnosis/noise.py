@@ -164,14 +164,14 @@ def calibrate_photo_noise(
     -------
     PhotoNoise
     """
+    contrasts = [linalg.qr(basis)[0][:, basis.shape[1] :] for basis in bases]
+    fast = [contrast.T @ residual for contrast, residual in zip(contrasts, residuals, strict=True)]
     best, likelihood = PhotoNoise(), -np.inf
     for stretch in stretches:
         square, freedom, determinant = prior_weight, prior_weight, 0.0
-        for residual, block, basis in zip(residuals, sections, bases, strict=True):
-            contrast = linalg.qr(basis)[0][:, basis.shape[1] :]
-            inner = contrast.T @ section_covariance(block, stretch=stretch) @ contrast
-            root = linalg.cholesky(inner, lower=True)
-            square += float(np.sum(linalg.solve_triangular(root, contrast.T @ residual, lower=True) ** 2))
+        for part, block, contrast in zip(fast, sections, contrasts, strict=True):
+            root = linalg.cholesky(contrast.T @ section_covariance(block, stretch=stretch) @ contrast, lower=True)
+            square += float(np.sum(linalg.solve_triangular(root, part, lower=True) ** 2))
             freedom += contrast.shape[1]
             determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
         value = -0.5 * (determinant + freedom * np.log(square / freedom))

@@ -15,6 +15,8 @@ Sign: residual = (data - model) / sigma.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +102,17 @@ class Observation:
     photo_noise: PhotoNoise
     rows: Row
     added: Array | float = 0.0
+
+    @cached_property
+    def all_sections(self) -> _Places:
+        """Sections of all photos, one after the other."""
+        parts = [photo.sections for photo in self.photos]
+        ends = np.cumsum([0, *(len(part.s) for part in parts)])
+        return _Places(
+            np.repeat([photo.step for photo in self.photos], np.diff(ends)).astype(int),
+            *(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in ("s", "x", "y")),
+            tuple(slice(low, high) for low, high in pairwise(ends.tolist())),
+        )
 
 
 def observe(
@@ -190,36 +203,55 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
         (data - model[: len(data)]) / std
         for data, model, std in zip(observation.forces, prediction.samples, observation.force_std, strict=True)
     ]
-    for photo in observation.photos:
-        across = normal_distance(photo.sections, prediction, photo.step)
-        parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across])
+    sections = observation.all_sections
+    across = _distance(sections, prediction)
+    for photo, own in zip(observation.photos, sections.of_photo, strict=True):
+        parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across[own]])
     return np.asarray(np.concatenate(parts) + observation.added)
 
 
 def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:
-    """Distance (k,) m of the sections from the predicted curve, positive along its normal.
+    """Distance (k,) m of the sections from the predicted curve, positive along its normal."""
+    steps = np.full(len(sections.s), step)
+    return _distance(_Places(steps, sections.s, sections.x, sections.y, ()), prediction)
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where sections of several photos lie, one after the other; all arrays (k,); ``of_photo``: which are whose."""
+
+    step: NDArray[np.int_]
+    s: Array
+    x: Array
+    y: Array
+    of_photo: tuple[slice, ...]
+
+
+def _distance(places: _Places, prediction: Prediction) -> Array:
+    """Distance (k,) m from the predicted curves, of all photos at once.
 
     The foot point is found by two Newton steps on the curve (cubic Hermite between its points) from the section's own
     arc length; what is left along the curve enters the distance by its square only.
     """
-    s, theta = prediction.s, prediction.theta[step]
-    x, y = prediction.x[step], prediction.y[step]
-    at = sections.s
+    at = places.s
     for _ in range(3):
-        foot_x, foot_y, direction = _hermite(at, s, x, y, theta)
+        foot_x, foot_y, direction = _hermite(at, places.step, prediction)
         tangent_x, tangent_y = np.cos(direction), np.sin(direction)
-        gap_x, gap_y = sections.x - foot_x, sections.y - foot_y
+        gap_x, gap_y = places.x - foot_x, places.y - foot_y
         at = at + tangent_x * gap_x + tangent_y * gap_y
     return np.asarray(-tangent_y * gap_x + tangent_x * gap_y)
 
 
-def _hermite(at: Array, s: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array, Array]:
-    """Point and direction of the curve at arc length ``at``: Hermite cubic from positions and directions."""
-    left = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
-    width = s[left + 1] - s[left]
+def _hermite(at: Array, step: NDArray[np.int_], prediction: Prediction) -> tuple[Array, Array, Array]:
+    """Point and direction of the curves at arc length ``at``: Hermite cubic from positions and directions."""
+    s, x, y, theta = prediction.s, prediction.x, prediction.y, prediction.theta
+    left = np.minimum(np.maximum(np.searchsorted(s, at, side="right") - 1, 0), len(s) - 2)
+    right = left + 1
+    width = s[right] - s[left]
     t = (at - s[left]) / width
-    a, b = theta[left], theta[left + 1]
-    h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, -t * t * (1.0 - t) * width
-    px = x[left] + (x[left + 1] - x[left]) * h1 + np.cos(a) * h2 + np.cos(b) * h3
-    py = y[left] + (y[left + 1] - y[left]) * h1 + np.sin(a) * h2 + np.sin(b) * h3
+    rest = 1.0 - t
+    a, b, x0, y0 = theta[step, left], theta[step, right], x[step, left], y[step, left]
+    h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * rest * rest * width, -t * t * rest * width
+    px = x0 + (x[step, right] - x0) * h1 + np.cos(a) * h2 + np.cos(b) * h3
+    py = y0 + (y[step, right] - y0) * h1 + np.sin(a) * h2 + np.sin(b) * h3
     return px, py, a + (b - a) * t

@@ -93,6 +93,9 @@ class DiagnosisSettings(BaseModel):
         0.01, description="share of the travel; loading and unloading steps closer than this are left out together"
     )
     gain_draws: int = Field(2000, description="draws behind the interval of the gain; its ends are then known to 2 %")
+    gain_iterations: int = Field(
+        4, description="Gauss-Newton steps of a refit without one level, from the fit with it; two settle it usually"
+    )
     powerless: float = Field(
         0.34, description="share of the causes; `underpowered` if fewer would have shown at a plausible size"
     )
