@@ -1,13 +1,16 @@
 """Comparison of two ways to one characteristic: same quantity, same range, joint uncertainty.
 
-Both ways read the same photos and forces, so their errors are correlated; each way states how its log f answers to
-every source of error (curve of each photo, each force, the scale), and the covariance of the difference follows:
+Both ways read the same photos and forces and smooth the same law, so their errors are correlated. To first order both
+are linear, in the errors of the data and in the form of the law. Each way states how its log f answers to every source
+of error (`gains`: curve of each photo, each force, scale, axes, length) and by how much its prior makes it fall short
+of a given law (`shortfall`). The covariance of the difference of both follows from the same errors and the same laws
+sent through both,
 
-    V = N_1 + N_2 - X - X^T + (1 - common) (R_1 + R_2),   N_i = sum G_i S G_i^T,  X = sum G_1 S G_2^T,  R_i = C_i - N_i
+    V = sum (G_1 - G_2) S (G_1 - G_2)^T + (B_1 - B_2) F F^T (B_1 - B_2)^T + W_1 + W_2
 
-over the sources of error with covariance S and gains G. What remains of each band, R, is mostly what no data tell about
-the form of the law; both ways smooth the same law, so a part ``common`` of it is the same error in both (measured with
-the accuracy study: 0.6; with none the test would never reject).
+over the sources with covariance S (of photos, forces, nuisances), for laws with the spread F that the smoothness prior
+gives them (`rod.inverse.knots.prior_forms`, at the size that the data chose). W is the part of each band that the
+choice of that size adds; the ways choose apart. A level, and what both miss alike, cancels.
 
 The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
 """
@@ -22,6 +25,7 @@ from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
+from rod.inverse.knots import prior_forms
 from rod.measurement import MeasuredTest
 
 Source = tuple[str, int]
@@ -29,10 +33,12 @@ Source = tuple[str, int]
 
 @dataclass(frozen=True)
 class Characterised:
-    """What a way hands to the comparison: log f on a grid with covariance and gains, and K0."""
+    """What a way hands to the comparison: log f on a grid with covariance, gains and shortfall, and K0."""
 
     curve: LogCurve
     gains: dict[Source, Array]
+    shortfall: Array
+    size_covariance: Array
     pre_curvature: float
     pre_curvature_std: float
 
@@ -40,13 +46,17 @@ class Characterised:
     def of_inverse(way: Estimate) -> Characterised:
         """Of the inverse problem."""
         curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(curve, way.gains, way.pre_curvature, way.pre_curvature_std)
+        return Characterised(
+            curve, way.gains, way.shortfall, way.size_covariance, way.pre_curvature, way.pre_curvature_std
+        )
 
     @staticmethod
     def of_balance(way: BalanceGraph) -> Characterised:
         """Of the balance equations."""
         curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(curve, way.gains, way.pre_curvature, way.pre_curvature_std)
+        return Characterised(
+            curve, way.gains, way.shortfall, way.size_covariance, way.pre_curvature, way.pre_curvature_std
+        )
 
 
 @dataclass(frozen=True)
@@ -76,24 +86,16 @@ class Agreement:
     hints: tuple[str, ...] = ()
 
 
-def compare(
-    test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float, common: float
-) -> Agreement | None:
-    """Compare both ways; None if they visited no common curvature. `common`: see the module."""
+def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
+    """Compare both ways; None if they visited no common curvature."""
     one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
     grid = one.curve.common_grid(two.curve)
-    if grid is None:
+    if grid is None or inverse.model is None:
         return None
     ratio = one.curve.log_on(grid) - two.curve.log_on(grid)
-    first, second = one.curve.contraction(grid), two.curve.contraction(grid)
-    shared = first @ cross_covariance(test, one.gains, two.gains) @ second.T
-    noises = (
-        first @ cross_covariance(test, one.gains, one.gains) @ first.T,
-        second @ cross_covariance(test, two.gains, two.gains) @ second.T,
-    )
-    bands = one.curve.parts_covariance(grid), two.curve.parts_covariance(grid)
-    covariance = common * sum(noises) + (1.0 - common) * sum(bands) - shared - shared.T
-    p = p_value(parts_difference(one.curve, two.curve, grid), covariance)
+    model = inverse.model
+    forms = tuple(prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.curve.kappa) for way in (one, two))
+    p = p_value(parts_difference(one.curve, two.curve, grid), difference_covariance(test, one, two, forms, grid))
     return Agreement(
         range_per_m=(float(grid[0]), float(grid[-1])),
         rms_relative=float(np.sqrt(np.mean(ratio**2))),
@@ -105,19 +107,32 @@ def compare(
     )
 
 
-def cross_covariance(test: MeasuredTest, one: dict[Source, Array], two: dict[Source, Array]) -> Array:
-    """Covariance between two estimates by the errors of the data that both read, (n_1, n_2)."""
-    total: Array = np.zeros((next(iter(one.values())).shape[0], next(iter(two.values())).shape[0]))
-    for step in test.steps:
-        force, curve = ("force", step.step), ("curve", step.step)
-        if force in one and force in two:
-            total += step.force_std**2 * one[force] @ two[force].T
-        if curve in one and curve in two and step.shape is not None:
-            total += one[curve] @ step.shape.covariance @ two[curve].T
-    scale = ("scale", -1)
-    if scale in one and scale in two:
-        total += test.scale_std**2 * one[scale] @ two[scale].T
-    return total
+def difference_covariance(
+    test: MeasuredTest, one: Characterised, two: Characterised, forms: tuple[Array, Array], grid: Array
+) -> Array:
+    """Covariance of the difference of two ways, mean over each part of the grid, (parts, parts); see the module.
+
+    `forms` are the laws sent through both, each on the way's own grid, (n, p).
+    """
+    first, second = one.curve.contraction(grid), two.curve.contraction(grid)
+    total: Array = first @ one.size_covariance @ first.T + second @ two.size_covariance @ second.T
+    for source in one.gains | two.gains:
+        moved = first @ one.gains[source] if source in one.gains else 0.0
+        if source in two.gains:
+            moved = moved - second @ two.gains[source]
+        total += moved @ source_covariance(test, source, moved.shape[1]) @ moved.T
+    short = first @ one.shortfall @ forms[0] - second @ two.shortfall @ forms[1]
+    return np.asarray(total + short @ short.T)
+
+
+def source_covariance(test: MeasuredTest, source: Source, size: int) -> Array:
+    """Covariance of one source of error (size, size) in the units of its gains."""
+    step = next((step for step in test.steps if step.step == source[1]), None)
+    if source[0] == "force" and step is not None:
+        return np.full((1, 1), step.force_std**2)
+    if source[0] == "curve" and step is not None and step.shape is not None:
+        return step.shape.covariance
+    return np.eye(size)
 
 
 def rest_curvature(test: MeasuredTest) -> tuple[float, float] | None:
@@ -151,7 +166,7 @@ def difference_hints(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph)
     stretch = one.curve.onto(grid) @ one.gains["scale", -1] - two.curve.onto(grid) @ two.gains["scale", -1]
     hints = [
         f"reading one curve as a secant and the other as a tangent would make {np.abs(reading).max():.0%}",
-        f"a scale wrong by 1 % would make {0.01 * np.abs(stretch).max():.1%}",
+        f"a scale wrong by 1 % would make {0.01 / test.scale_std * np.abs(stretch).max():.1%}",
     ]
     z = graph.checks.get("left_right_z", 0.0)
     hints.append(f"a pre-curvature that varies along the cable: the halves differ by {abs(z):.1f} standard deviations")

@@ -91,7 +91,7 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
         rest=rest_curvature(test),
     )
     if inverse.characteristic is not None and graph.measured:
-        agreement = compare(test, inverse, graph, level=settings.agreement_level, common=settings.agreement_common_form)
+        agreement = compare(test, inverse, graph, level=settings.agreement_level)
         found = replace(found, agreement=agreement)
     return replace(found, findings=identification_findings(found, settings))
 

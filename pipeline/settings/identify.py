@@ -38,12 +38,6 @@ class IdentifySettings(BaseModel):
     )
     grid: int = Field(61, ge=11, description="points of a reported curve")
     agreement_level: float = Field(0.05, gt=0, lt=1, description="level of the test whether both ways agree")
-    agreement_common_form: float = Field(
-        0.6,
-        ge=0,
-        le=1,
-        description="share of the uncertainty of the law's form that both ways have in common; measured",
-    )
     pre_curvature_sigma: float = Field(
         3.5, gt=0, description="standard deviations; K0 from photo, balance and inverse: three pairs, one false in 700"
     )

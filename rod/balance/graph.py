@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.balance.compliance import compliance_basis
-from rod.balance.moment_points import MomentPoints, moment_points
+from rod.balance.moment_points import CommonErrors, MomentPoints, moment_points
 from rod.balance.moment_regression import (
     BOW_TERMS,
     MomentModel,
@@ -115,9 +115,14 @@ class BalanceGraph:
     log_covariance : (n, n)
         Joint covariance of log(tangent) on the grid.
     gains : dict
-        Response of log(tangent) on the grid to the sources of error, keyed ``("curve", step)`` (n, p),
-        ``("force", step)`` (n, 1), ``("scale", -1)`` (n, 1): what a comparison with another
-        way through the same data needs for the joint uncertainty.
+        Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
+        same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
+        ``("force", step)`` (n, 1) per N; then, per standard deviation of what is wrong on all photos alike,
+        ``("scale", -1)`` (n, 1) and ``("axes", -1)`` (n, 2), left and right across the chord.
+    shortfall : (n, n)
+        Error of log(tangent) on the grid by the roughness prior, per log(tangent) of the true law there.
+    size_covariance : (n, n)
+        Part of ``log_covariance`` that comes from not knowing the size of that prior.
     points : tuple of MomentPoints
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
@@ -140,6 +145,8 @@ class BalanceGraph:
     secant_std: Array = field(default_factory=_none)
     log_covariance: Array = field(default_factory=_none)
     gains: dict[Source, Array] = field(default_factory=dict)
+    shortfall: Array = field(default_factory=_none)
+    size_covariance: Array = field(default_factory=_none)
     points: tuple[MomentPoints, ...] = ()
     varying: tuple[float, ...] = (0.0,) * BOW_TERMS
     checks: dict[str, float] = field(default_factory=dict)
@@ -174,7 +181,8 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
         return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
     basis = compliance_basis(float(m.min()), float(m.max()), unit=slope, coefficients=options.coefficients)
     floor = options.floor * slope * (basis.high - basis.low)
-    model = MomentModel(data, basis, test.scale_std, floor, options.roughness)
+    common = CommonErrors(test.scale_std, test.axis_std, test.axis_std)
+    model = MomentModel(data, basis, common, floor, options.roughness)
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa.mean())
     at_rest = 1.0 if rest is None else uniform_at_rest(rest, floor)
@@ -205,7 +213,7 @@ def _regress_in_spite_of_misfit(
             # A raised floor is noise in every row, not only in those that the photo's noise fills.
             all_rows = model.floor > photos_noise
             rows = sum(float(row.value.size) if all_rows else row.informative for row in found.rows)
-            if chi2 <= 4.0 * max(rows - found.size, 1.0):
+            if chi2 <= 4.0 * max(rows - model.size, 1.0):
                 return model, found
         model = replace(model, floor=4.0 * model.floor)
     return None
@@ -213,9 +221,9 @@ def _regress_in_spite_of_misfit(
 
 def _graph(model: MomentModel, found: Regression, checks: dict[str, float], points: int) -> BalanceGraph:
     """Read moment, tangent and secant off the compliance on a grid of curvature, with bands by propagation."""
-    curve, p = found.curve, found.size
-    K0, scale = float(found.unknowns[p]), float(found.unknowns[p + 1])
-    met = np.concatenate([d.moment * (1.0 + scale) for d in model.data])
+    curve, p = found.curve, model.size
+    K0, errors = float(found.unknowns[p]), model.errors(found.unknowns)
+    met = np.concatenate([d.true_moment(errors) for d in model.data])
     low, high = K0 + curve.excess(np.array([met.min(), met.max()]))
     kappa = np.linspace(float(low), float(high), points)
     m = curve.moment(kappa - K0)
@@ -254,20 +262,24 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
         secant_std=std(by_secant),
         log_covariance=by_log @ covariance @ by_log.T,
         gains=_gains(model, found, by_log),
+        # Coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis.
+        shortfall=by_log @ found.posterior.shrinkage @ np.linalg.pinv(curve.basis.at(m)),
+        size_covariance=by_log @ (covariance - found.posterior.response) @ by_log.T,
         points=model.data,
-        varying=tuple(float(v) for v in found.unknowns[p + 2 :]),
+        varying=tuple(float(v) for v in model.bow(found.unknowns)),
         checks=checks,
     )
 
 
 def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source, Array]:
     """Response of log(tangent) to every source of error: the estimate moves by -response J^T W d(residual)."""
-    gains: dict[Source, Array] = {("scale", -1): np.zeros((by_log.shape[0], 1))}
+    # With the normal matrix A and a common error e of prior variance 1 the law is off by (A^-1 (A - 1) e) = -A^-1 e.
+    common = -by_log @ found.posterior.response[:, model.common]
+    gains: dict[Source, Array] = {("scale", -1): common[:, :1], ("axes", -1): common[:, 1:]}
     for data, row in zip(model.data, found.rows, strict=True):
         response = -by_log @ found.posterior.response @ model.columns(data, row).T
         for name, columns in row.by_source.items():
             gains[name, data.step.step] = response @ row.whitener @ columns
-        gains["scale", -1] -= response @ row.jacobian[:, [found.size + 1]]
     return gains
 
 
@@ -280,4 +292,5 @@ def _loaded_pre_curvature(model: MomentModel, found: Regression) -> tuple[float,
         value = np.concatenate([found.rows[k].value for k in loaded])
         J = np.vstack([model.columns(model.data[k], found.rows[k]) for k in loaded])
         posterior = replace(model, varying=False).posterior(found.unknowns, value, J)
-    return float(posterior.mean[found.size]), float(np.sqrt(posterior.covariance[found.size, found.size]))
+    p = model.size
+    return float(posterior.mean[p]), float(np.sqrt(posterior.covariance[p, p]))

@@ -2,9 +2,9 @@
 
 One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
 (Eq. 13). The residual against a compliance curve, ``rho = K - K0 - excess(m)``, is moved by the parameters of the
-smooth curve (through K and y together), by the force and by the scale of the photos; their derivatives here are the
-ingredients of its covariance. Errors of the bearing axes across the chord are part of the covariance of the curve: they
-shift and turn the whole chord frame.
+smooth curve (through K and y together), by the force, and by what all photos have in common: their scale and the
+errors of the bearing axes across the chord (`CommonErrors`). What each photo adds to the errors of the axes is part of
+the covariance of its curve: it shifts and turns the whole chord frame.
 
 Axes and signs: chord frame of `rod.measurement`; SI units.
 """
@@ -12,6 +12,7 @@ Axes and signs: chord frame of `rod.measurement`; SI units.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,17 @@ from rod.balance.compliance import ComplianceCurve
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
+
+
+class CommonErrors(NamedTuple):
+    """What is wrong on all photos alike: ``true y = (1 + scale) y + left_across (1 - x/chord) + right_across x/chord``.
+
+    ``scale`` is relative, the axes in m; signs as in the chord frame. Along the chord the axes move no moment.
+    """
+
+    scale: float
+    left_across: float
+    right_across: float
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,8 @@ class MomentPoints:
     s : (n,) m
     kappa : (n,) 1/m
     y : (n,) m
+    along : (n,)
+        Place on the chord, x / chord.
     force, force_std : N
         Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
     by_curve_kappa : (n, p) 1/m, by_curve_y : (n, p) m
@@ -45,6 +59,7 @@ class MomentPoints:
     s: Array
     kappa: Array
     y: Array
+    along: Array
     force: float
     force_std: float
     by_curve_kappa: Array
@@ -53,8 +68,13 @@ class MomentPoints:
 
     @property
     def moment(self) -> Array:
-        """Bending moment P y, N m."""
+        """Bending moment P y as photographed, N m."""
         return self.force * self.y
+
+    def true_moment(self, errors: CommonErrors) -> Array:
+        """Bending moment P y with the common errors taken back, N m."""
+        lift = errors.left_across * (1.0 - self.along) + errors.right_across * self.along
+        return self.force * (self.y * (1.0 + errors.scale) + lift)
 
 
 @dataclass(frozen=True)
@@ -87,12 +107,14 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
     keep = np.unique(np.round(np.linspace(0, seen.size - 1, min(points, seen.size))).astype(int))
     at = seen[keep]
     mounted = step.branch == "mounted"
+    chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0])) if step.chord is None else step.chord
     return MomentPoints(
         step=step,
         length=float(shape.s[-1]),
         s=shape.s[at],
         kappa=shape.kappa[at],
         y=shape.y[at],
+        along=shape.x[at] / chord,
         force=0.0 if mounted else step.force,
         force_std=0.0 if mounted else step.force_std,
         by_curve_kappa=shape.basis_kappa[at],
@@ -102,7 +124,13 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
 
 
 def residual(
-    data: MomentPoints, curve: ComplianceCurve, pre_curvature: float, *, varying: Array, scale: float, floor: float
+    data: MomentPoints,
+    curve: ComplianceCurve,
+    pre_curvature: float,
+    *,
+    varying: Array,
+    errors: CommonErrors,
+    floor: float,
 ) -> Residual:
     """Whitened residual of one photo.
 
@@ -110,30 +138,36 @@ def residual(
     ----------
     varying : (n,) 1/m
         K0(s) minus its mean.
-    scale : relative
-        Every length on the photos is to be multiplied by 1 + scale.
+    errors : CommonErrors
     floor : 1/m
         Standard deviation of the curvature that no photo resolves.
 
     Returns
     -------
     Residual
-        Columns of the jacobian: coefficients of log c (p), K0, scale.
+        Columns of the jacobian: coefficients of log c (p), K0, then `CommonErrors` in their units.
     """
-    kappa, y = data.kappa / (1.0 + scale), data.y * (1.0 + scale)
-    m = data.force * y
+    kappa, m = data.kappa / (1.0 + errors.scale), data.true_moment(errors)
     c = curve.compliance(m)
     rho = kappa - pre_curvature - varying - curve.excess(m)
     stiff = (c * data.force)[:, None]
     by_source = {
         "curve": data.by_curve_kappa - stiff * data.by_curve_y,
-        "force": -(c * y)[:, None],
+        "force": -(c * data.y)[:, None],
     }
     covariance = by_source["curve"] @ data.curve_covariance @ by_source["curve"].T
     covariance += data.force_std**2 * by_source["force"] @ by_source["force"].T
     covariance[np.diag_indices_from(covariance)] += floor**2
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-    columns = np.column_stack([-curve.excess_by_coefficients(m), -np.ones(m.size), -(kappa + c * m)])
+    columns = np.column_stack(
+        [
+            -curve.excess_by_coefficients(m),
+            -np.ones(m.size),
+            -(kappa + c * data.moment),
+            -stiff * (1.0 - data.along[:, None]),
+            -stiff * data.along[:, None],
+        ]
+    )
     informative = m.size - floor**2 * float(np.sum(whitener**2))
     return Residual(whitener @ rho, whitener @ columns, whitener, by_source, informative)
 

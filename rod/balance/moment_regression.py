@@ -1,7 +1,8 @@
 """Regression of curvature on moment over all points of all photos: the numerical part of the balance way.
 
-Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the common scale
-error of the photos, and Legendre coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual
+Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the errors common
+to all photos (`rod.balance.moment_points.CommonErrors`, each in units of its standard deviation), and Legendre
+coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual
 depends on the compliance and is renewed in each iteration. The posterior is an average over the prior size of the
 roughness of log c, weighted by its evidence (Laplace), so that the bands hold what the data do not know about the form
 of the law.
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from rod.balance.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
-from rod.balance.moment_points import MomentPoints, Residual, residual
+from rod.balance.moment_points import CommonErrors, MomentPoints, Residual, residual
 
 Array = NDArray[np.float64]
 
@@ -29,11 +30,22 @@ ROUGHNESS_STEPS = 25
 
 @dataclass(frozen=True)
 class Posterior:
-    """Average over the roughness: mean and covariance of the unknowns, mean of the inverse normal matrices."""
+    """Average over the roughness.
+
+    Attributes
+    ----------
+    mean : (q,)
+    covariance : (q, q)
+    response : (q, q)
+        Mean of the inverse normal matrices.
+    shrinkage : (q, p)
+        By how much the mean falls short of a law with the coefficients a of log c, per unit of a.
+    """
 
     mean: Array
     covariance: Array
     response: Array
+    shrinkage: Array
 
 
 @dataclass(frozen=True)
@@ -58,11 +70,6 @@ class Regression:
     rows: tuple[Residual, ...]
     jacobian: Array
 
-    @property
-    def size(self) -> int:
-        """Number of coefficients of log c: the index of K0; the scale and K0(s) follow."""
-        return self.curve.coefficients.size
-
 
 @dataclass(frozen=True)
 class MomentModel:
@@ -72,7 +79,8 @@ class MomentModel:
     ----------
     data : tuple of MomentPoints
     basis : ComplianceBasis
-    scale_std : relative
+    common_std : CommonErrors
+        Standard deviations of what is wrong on all photos alike.
     floor : 1/m
         Curvature that no photo resolves.
     roughness : (low, high)
@@ -83,37 +91,62 @@ class MomentModel:
 
     data: tuple[MomentPoints, ...]
     basis: ComplianceBasis
-    scale_std: float
+    common_std: CommonErrors
     floor: float
     roughness: tuple[float, float]
     varying: bool = False
 
     def rows(self, unknowns: Array) -> tuple[ComplianceCurve, tuple[Residual, ...]]:
         """Compliance curve and whitened residuals at the given unknowns."""
-        p = self.basis.table.shape[1]
-        curve = compliance_curve(self.basis, unknowns[:p])
-        K0, scale, bow = float(unknowns[p]), float(unknowns[p + 1]), unknowns[p + 2 :]
-        return curve, tuple(
-            residual(d, curve, K0, varying=bow_terms(d) @ bow, scale=scale, floor=self.floor) for d in self.data
+        curve, K0, errors = (
+            compliance_curve(self.basis, unknowns[: self.size]),
+            unknowns[self.size],
+            self.errors(unknowns),
         )
+        bow = self.bow(unknowns)
+        return curve, tuple(
+            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, floor=self.floor)
+            for d in self.data
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients of log c: the place of K0; the common errors and K0(s) follow."""
+        return int(self.basis.table.shape[1])
+
+    @property
+    def common(self) -> slice:
+        """Place of the common errors among the unknowns."""
+        return slice(self.size + 1, self.size + 1 + len(self.common_std))
+
+    def errors(self, unknowns: Array) -> CommonErrors:
+        """The common errors in their units."""
+        return CommonErrors(*(float(v) for v in unknowns[self.common] * np.array(self.common_std)))
+
+    def bow(self, unknowns: Array) -> Array:
+        """Legendre coefficients of K0(s) - K0, (4,) 1/m."""
+        return unknowns[self.common.stop :]
 
     def columns(self, data: MomentPoints, row: Residual) -> Array:
         """Whitened jacobian of one photo with respect to all unknowns, (n, q)."""
-        return np.hstack([row.jacobian, -row.whitener @ bow_terms(data)])
+        columns = np.hstack([row.jacobian, -row.whitener @ bow_terms(data)])
+        columns[:, self.common] *= np.array(self.common_std)
+        return columns
 
     def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
         """Mean and covariance of the unknowns, averaged over the roughness with its evidence as the weight."""
-        p, size = self.basis.table.shape[1], J.shape[1]
+        p, size = self.size, J.shape[1]
         prior = np.zeros(size)
-        prior[p + 1] = 1.0 / max(self.scale_std, 1e-9) ** 2
+        prior[self.common] = 1.0
         if not self.varying:  # a prior far sharper than any photo switches them off
-            prior[p + 2 :] = (1e6 / self.floor) ** 2
+            prior[self.common.stop :] = (1e6 / self.floor) ** 2
         penalty = np.zeros((size, size))
         penalty[:p, :p] = self.basis.roughness
         normal, pull = J.T @ J + np.diag(prior), J.T @ (J @ unknowns - value)
-        evidence, means, inverses = [], [], []
+        evidence, means, inverses, shrunk = [], [], [], []
         for log_tau in np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS):
-            A = normal + penalty * np.exp(-2.0 * log_tau)
+            sized = penalty * np.exp(-2.0 * log_tau)
+            A = normal + sized
             unit = 1.0 / np.sqrt(np.diag(A))  # unknowns of very different size
             scaled = unit[:, None] * A * unit
             inverse = unit[:, None] * np.linalg.inv(scaled) * unit
@@ -123,11 +156,12 @@ class MomentModel:
             evidence.append(0.5 * (pull @ mean - log_det) - (p - 2) * log_tau)
             means.append(mean)
             inverses.append(inverse)
+            shrunk.append(inverse @ sized[:, :p])
         weight = np.exp(np.array(evidence) - max(evidence))
         weight /= weight.sum()
-        mean, response = np.tensordot(weight, means, 1), np.tensordot(weight, inverses, 1)
+        mean, response, shrinkage = (np.tensordot(weight, parts, 1) for parts in (means, inverses, shrunk))
         spread = np.array(means) - mean
-        return Posterior(mean, response + (weight[:, None] * spread).T @ spread, response)
+        return Posterior(mean, response + (weight[:, None] * spread).T @ spread, response, shrinkage)
 
 
 def bow_terms(data: MomentPoints) -> Array:
@@ -138,8 +172,8 @@ def bow_terms(data: MomentPoints) -> Array:
 
 def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -> Regression | None:
     """Fit by Gauss-Newton from a straight line of compliance; None if it does not settle."""
-    p = model.basis.table.shape[1]
-    unknowns = np.concatenate([np.zeros(p), [pre_curvature, 0.0], np.zeros(BOW_TERMS)])
+    p = model.size
+    unknowns = np.concatenate([np.zeros(p), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
     for _ in range(iterations):
         curve, rows = model.rows(unknowns)
         value = np.concatenate([row.value for row in rows])

@@ -75,7 +75,12 @@ class Estimate:
     log_covariance : (n, n)
         Joint covariance of log(tangent) on the grid.
     gains : dict
-        Response of log(tangent) to the sources of error, keyed as in `rod.balance.graph.BalanceGraph`.
+        Response of log(tangent) to the sources of error, keyed and in units as in `rod.balance.graph.BalanceGraph`;
+        beside these ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` (-1: common to all photos).
+    shortfall : (n, n)
+        Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
+    size_covariance : (n, n)
+        Part of ``log_covariance`` that comes from not knowing the size of that prior.
     evidence : dict of int -> float
         Log evidence of each number of control points tried, against the best.
     model, evaluation, unknowns, covariance
@@ -103,6 +108,8 @@ class Estimate:
     secant_std: Array = field(default_factory=_none)
     log_covariance: Array = field(default_factory=_none)
     gains: dict[Source, Array] = field(default_factory=dict)
+    shortfall: Array = field(default_factory=_none)
+    size_covariance: Array = field(default_factory=_none)
     evidence: dict[int, float] = field(default_factory=dict)
     model: FitModel | None = None
     evaluation: Evaluation | None = None
@@ -162,6 +169,8 @@ def read_off(
         secant_std=std(by_secant),
         log_covariance=by_log @ covariance @ by_log.T,
         gains=_gains(model, found, by_log @ posterior.response),
+        shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
+        size_covariance=by_log @ (covariance - posterior.response) @ by_log.T,
         model=model,
         evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
         unknowns=u,
@@ -189,12 +198,28 @@ def _is_rest(model: FitModel, block: str) -> bool:
     return kind in ("shape", "chord") and any(d.at_rest and str(d.step.step) == step for d in model.data)
 
 
+def _at_knots(kappa: Array, knots: Array) -> Array:
+    """Values at the knots of a curve given on a grid, (k, n), by linear interpolation."""
+    return np.stack([np.interp(knots, kappa, column) for column in np.eye(kappa.size)], axis=1)
+
+
+def _source(name: str) -> Source | None:
+    """Source of error of a nuisance; None for what a photo adds across the chord, which is an error of its curve."""
+    part, _, step = name.partition("/")
+    if part.endswith("_across"):
+        return None if step else ("axes", -1)
+    return ("along", int(step or -1)) if part.endswith("_along") else (part, -1)
+
+
 def _gains(model: FitModel, found: Evaluation, response: Array) -> dict[Source, Array]:
     """Response of log(tangent) to every source of error; `response` (n, q) is its derivative by -J^T dr."""
     gains: dict[Source, Array] = {}
-    stretched = found.jacobian[:, [model.index("scale")]].copy()
-    stretched[found.blocks["prior"]] = 0.0  # the data are stretched, the prior is not
-    gains["scale", -1] = -response @ (found.jacobian.T @ stretched) / model.nuisances["scale"]
+    for name in model.nuisances:
+        source = _source(name)
+        if source is not None:
+            # With the normal matrix A and a nuisance e of prior variance 1: A^-1 (A - 1) e - e = -A^-1 e.
+            column = -response[:, [model.index(name)]]
+            gains[source] = np.hstack([gains[source], column]) if source in gains else column
     for fit in found.steps:
         step = fit.data.step
         if fit.force is not None:

@@ -62,3 +62,15 @@ def first_slope(knots: Array) -> Array:
 def log_prior_volume(S: Array) -> float:
     """Half the log determinant of S between fixed end knots: what the prior's density has for tau = 1."""
     return 0.5 * float(np.linalg.slogdet(S[1:-1, 1:-1])[1]) if S.shape[0] > 2 else 0.0
+
+
+def prior_forms(knots: Array, *, tau: float, slope: float, at: Array) -> Array:
+    """Independent draws' directions of log f at the curvatures `at` (n,) 1/m under both priors, (n, k - 1).
+
+    Their outer product is the covariance of what the priors say about the form; the level, of which they say nothing,
+    has none.
+    """
+    g = first_slope(knots)
+    values, vectors = np.linalg.eigh(roughness(knots) / tau**2 + np.outer(g, g) / slope**2)
+    spline = CubicSpline(knots, vectors[:, 1:] / np.sqrt(values[1:]), bc_type="natural")
+    return np.asarray(spline(at))

@@ -38,6 +38,9 @@ class Averaged:
     covariance : (q, q)
     response : (q, q)
         Mean inverse normal matrix: a change dr of the whitened data residual moves the mean by -response J^T dr.
+    shrinkage : (q, k)
+        By how much the mean falls short of a law with the values z at its k knots, per unit of z: zero for every
+        straight line whose slope the data show.
     tau, slope : float
         Sizes of roughness and of the slope at K0 of largest evidence.
     log_evidence : float
@@ -47,6 +50,7 @@ class Averaged:
     mean: Array
     covariance: Array
     response: Array
+    shrinkage: Array
     tau: float
     slope: float
     log_evidence: float
@@ -99,7 +103,7 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
     grid = np.linspace(np.log(taus[0]), np.log(taus[1]), TAU_STEPS)
     slopes = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
     unit = 1.0 / np.sqrt(np.diag(schur))
-    evidence, moves, inverses, sizes = [], [], [], []
+    evidence, moves, inverses, shrunk, sizes = [], [], [], [], []
     for log_tau, log_slope in itertools.product(grid, slopes):
         prior = S * np.exp(-2.0 * log_tau) + np.outer(g, g) * np.exp(-2.0 * log_slope)
         scaled = unit[:, None] * (schur + prior) * unit
@@ -111,12 +115,13 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
         evidence.append(-0.5 * (misfit + log_det + log_det_rest) + volume - (k - 2) * log_tau - log_slope)
         moves.append(move)
         inverses.append(inverse)
+        shrunk.append(inverse @ prior)
         sizes.append((float(np.exp(log_tau)), float(np.exp(log_slope))))
     top = max(evidence)
     share = np.exp(np.array(evidence) - top)
     log_evidence = float(top + np.log(share.mean()))
     share /= share.sum()
-    move, response = np.tensordot(share, moves, 1), np.tensordot(share, inverses, 1)
+    move, response, shrinkage = (np.tensordot(share, parts, 1) for parts in (moves, inverses, shrunk))
     spread = np.array(moves) - move
     covariance = response + (share[:, None] * spread).T @ spread
     whole = np.concatenate([move, inner @ pull[rest] + back @ move])
@@ -125,6 +130,7 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
         unknowns + whole,
         _extended(covariance, inner, back),
         _extended(response, inner, back),
+        np.vstack([shrinkage, back @ shrinkage])[:, :k],
         tau,
         slope,
         log_evidence,

@@ -11,7 +11,7 @@ from rod.inverse.estimate import invisible_combinations
 from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
-from tests.rod.virtual_photo import Camera, bending_test
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -114,6 +114,23 @@ def test_gains_tell_how_a_force_moves_the_estimate():
     seen = np.log(np.interp(result.kappa, moved.kappa, moved.tangent) / result.tangent)
     # A gain holds the sizes of the priors; their own answer to the data is a fifth of it here.
     assert np.allclose(seen[3:-3], told[3:-3], atol=0.25 * np.abs(told).max())
+
+
+def test_gains_tell_how_common_errors_move_the_estimate():
+    """Sign and size: both ways answer to one scale and to the same axes, and their comparison needs the difference."""
+    test = replace(measured(), axis_std=2e-5)
+    result = estimate(test, options=QUICK)
+    cases = [
+        (stretched(test, 1.0005), result.gains["scale", -1][:, 0] * -5e-4 / test.scale_std),
+        (moved_axes(test, 2e-5, 2e-5), result.gains["axes", -1].sum(axis=1)),
+    ]
+    for moved, told in cases:
+        found = estimate(moved, options=QUICK)
+        seen = np.log(np.interp(result.kappa, found.kappa, found.tangent) / result.tangent)
+        size, wanted = np.linalg.norm(seen[3:-3]), np.linalg.norm(told[3:-3])
+        # As above the priors' sizes answer too, here to changes of a few 1e-4.
+        assert seen[3:-3] @ told[3:-3] > 0.8 * size * wanted
+        assert 0.6 < size / wanted < 1.6
 
 
 def test_forces_scale_the_stiffness_only():

@@ -1,13 +1,14 @@
 """Photos with known errors for the tests of both ways, and whole bending tests of random cables.
 
 The photo is the noise model of real photos: raw midline sections with errors correlated along s, bearing axes with
-errors of their own, a scale error common to all photos, covers over the ends. The smooth curve is the generalised least
-squares fit of a cubic curvature spline to those sections, linearised about the truth, with its exact covariance.
+errors of their own and errors common to all photos, a common scale error, covers over the ends. The smooth curve is the
+generalised least squares fit of a cubic curvature spline to those sections, linearised about the truth, with its exact
+covariance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -17,17 +18,19 @@ from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 from tests.rod.virtual_cable import StickSlip, TrueShape, equilibrium, force_free
 
 MM = 1e-3
+SECTION_PLACES = ("section_s", "section_x", "section_y")
 
 
 @dataclass(frozen=True)
 class Camera:
-    """How the photos err: standard deviations of sections, axes, scale and length."""
+    """How the photos err: standard deviations of sections, axes (own, and common to all photos), scale and length."""
 
     px: float = MM / 11
     spacing_px: float = 3.0  # between sections: a third of the correlation length tells all there is to tell
     section_px: float = 0.05
     correlation_px: float = 10.0
     axis_px: float = 0.05
+    common_axis: float = 0.0
     scale: float = 3e-4
     length: float = 5e-5
     systematic_px: float = 0.0
@@ -81,10 +84,10 @@ def axes_covariance(shape, std):
     return std**2 * by_axes @ by_axes.T
 
 
-def photograph(shape, camera, rng, *, scale=0.0, points=181):
-    """MeasuredShape, chord and its std of a true shape on a photo with errors; `scale` is the common error."""
+def photograph(shape, camera, rng, *, scale=0.0, common=0.0, points=181):
+    """MeasuredShape, chord and its std of a true shape on a photo; `scale`, `common` (axes): errors of all photos."""
     length = shape.s[-1]
-    axes = rng.normal(0, camera.axis_px * camera.px, (2, 2))  # left, right; along, across
+    axes = rng.normal(0, camera.axis_px * camera.px, (2, 2)) + common  # left, right; along, across
     grid = np.linspace(0, length, points)
     s = np.linspace(
         camera.cover, length - camera.cover, int((length - 2 * camera.cover) / (camera.spacing_px * camera.px))
@@ -133,6 +136,28 @@ def photograph(shape, camera, rng, *, scale=0.0, points=181):
     return measured, shrink * np.hypot(*(right - left)), np.sqrt(2) * camera.axis_px * camera.px
 
 
+def stretched(test, factor):
+    """The test with every length on every photo multiplied by `factor`, as a wrong scale does."""
+    steps = []
+    for step in test.steps:
+        shape = step.shape
+        lengths = {name: getattr(shape, name) * factor for name in ("s", "x", "y", *SECTION_PLACES)}
+        steps.append(
+            replace(step, chord=step.chord * factor, shape=replace(shape, kappa=shape.kappa / factor, **lengths))
+        )
+    return replace(test, steps=tuple(steps))
+
+
+def moved_axes(test, left, right):
+    """The test with both bearing axes found too far toward the bow, by `left` and `right` (m), on every photo."""
+    steps = []
+    for step in test.steps:
+        shape, roll = step.shape, (right - left) / step.chord
+        lower = {"y": shape.y - left - roll * shape.x, "section_y": shape.section_y - left - roll * shape.section_x}
+        steps.append(replace(step, shape=replace(shape, theta=shape.theta - roll, **lower)))
+    return replace(test, steps=tuple(steps))
+
+
 def random_cable(rng, *, law=StickSlip):
     """Law, length and chords of a random test: EI from 1e-5 to 1 N m^2, EI0/EI1 from 1 to 6, three to eight steps."""
     length = rng.uniform(0.15, 0.25)
@@ -156,14 +181,15 @@ def record(shapes, natural, rng, *, camera=Camera(), force_noise=3e-3, unloading
     """MeasuredTest of true shapes: photos, forces with relative noise, displacement from the chord `natural`."""
     length = shapes[0].s[-1]
     scale = rng.normal(0, camera.scale)
+    common = rng.normal(0, camera.common_axis, (2, 2)) if camera.common_axis else 0.0
     strongest = max(shape.force for shape in shapes)
     steps = []
     for k, shape in enumerate(shapes):
         loaded = "unloading" if k >= len(shapes) - unloading else "loading"
         branch = loaded if shape.force else "mounted"
         std = force_noise * (shape.force or strongest)
-        photo, chord, chord_std = photograph(shape, camera, rng, scale=scale)
+        photo, chord, chord_std = photograph(shape, camera, rng, scale=scale, common=common)
         force = shape.force + rng.normal(0, std)
         steps.append(MeasuredStep(k, branch, natural - shape.chord, force, std, chord, chord_std, photo, 60.0 * k))
     told = length + rng.normal(0, camera.length)
-    return MeasuredTest(told, camera.length, camera.scale, tuple(steps)), tuple(shapes)
+    return MeasuredTest(told, camera.length, camera.scale, tuple(steps), axis_std=camera.common_axis), tuple(shapes)

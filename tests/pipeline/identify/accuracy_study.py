@@ -1,10 +1,11 @@
 """Accuracy of both ways over random cables with known truth: errors, coverage of the bands, false alarms.
 
-    python -m tests.pipeline.identify.accuracy_study --cables 200 --seed 1 [--law fading]
+    python -m tests.pipeline.identify.accuracy_study --cables 200 --seed 1 [--law fading] [--axes 2e-5]
 
 Cables: stick-slip laws that are not splines, EI0 from 1e-5 to 1 N m^2, EI0/EI1 from 1 to 6, three to eight loading
 steps, every second test with a force-free photo. Data: exact quadrature, photos with 0.05 px at 11 px/mm correlated
-over 10 px, forces with 0.3 %, errors of axes, scale and length (see `tests.rod.virtual_photo.Camera`).
+over 10 px, forces with 0.3 %, errors of axes, scale and length (see `tests.rod.virtual_photo.Camera`); ``--axes``
+adds an error of the bearing axes (m) that all photos of a test have in common.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from pipeline.identify import identify_test
 from pipeline.settings import IdentifySettings
 from tests.rod.virtual_cable import Fading, StickSlip
-from tests.rod.virtual_photo import bending_test, random_cable
+from tests.rod.virtual_photo import Camera, bending_test, random_cable
 
 LAWS = {"stick-slip": StickSlip, "fading": Fading}
 
@@ -60,12 +61,12 @@ class Case:
     alarms: tuple[str, ...]
 
 
-def case(seed, number, *, kind="stick-slip"):
+def case(seed, number, *, kind="stick-slip", axes=0.0):
     """Cable `number` of the study with this seed; every second one has a force-free photo."""
     rng = np.random.default_rng([seed, number])
     law, length, chords = random_cable(rng, law=LAWS[kind])
     mounted = number % 2 == 0
-    test, _ = bending_test(law, length, chords, rng, mounted=mounted)
+    test, _ = bending_test(law, length, chords, rng, mounted=mounted, camera=Camera(common_axis=axes))
     found = identify_test(test, IdentifySettings())
     return Case(
         mounted,
@@ -119,9 +120,11 @@ def main(write):
     parser.add_argument("--cables", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--law", choices=sorted(LAWS), default="stick-slip")
+    parser.add_argument("--axes", type=float, default=0.0)
     parser.add_argument("--first", type=int, default=0)
     asked = parser.parse_args()
-    cases = [case(asked.seed, number, kind=asked.law) for number in range(asked.first, asked.first + asked.cables)]
+    numbers = range(asked.first, asked.first + asked.cables)
+    cases = [case(asked.seed, number, kind=asked.law, axes=asked.axes) for number in numbers]
     for line in lines(cases):
         write(line + "\n")
 
