@@ -131,9 +131,6 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
             except (OSError, ValueError) as error:
                 yield name, f"result.json cannot be read ({type(error).__name__}); run the specimen again"
                 continue
-            if result.status == "failed":
-                yield name, result.headline
-                continue
             with store.staging() as staged:
                 stages.write(result, staged, settings)
                 shutil.copy(store.out / name / ENTRY, staged / ENTRY)

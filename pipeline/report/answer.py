@@ -83,9 +83,13 @@ def _sentence(result: Result, words: Words) -> str:
     """f_EI at both ends of the visited range and K0."""
     name, curve = result.specimen.id, best(result)
     if curve is None:
+        refused = _refused(result)
+        if refused:
+            return words("answer_refused", id=name, count=len(result.photos), reason=words.said(refused))
         reason = next((f.message for f in result.findings if f.level == "error"), "")
-        key = "answer_failed" if result.status == "failed" and reason else "answer_none"
-        return words(key, id=name, reason=words.said(reason)) if key == "answer_failed" else words(key, id=name)
+        if result.status == "failed" and reason:
+            return words("answer_failed", id=name, reason=words.said(reason))
+        return words("answer_none", id=name)
     unit = stiffness_unit(result, words)
     change = curve.tangent[-1] - curve.tangent[0]
     beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
@@ -102,6 +106,13 @@ def _sentence(result: Result, words: Words) -> str:
     ways = ("photo",) if curve.method == "extended" else ("inverse", "balance", "photo")
     way = next((way for way in ways if way in known), None)
     return text if way is None else f"{text} {words('answer_pre_curvature', value=words.measured(*known[way]))}"
+
+
+def _refused(result: Result) -> str:
+    """Why the first photo was refused, if all of them were."""
+    if any(photo.status == "traced" for photo in result.photos):
+        return ""
+    return next((photo.reason for photo in result.photos if photo.reason), "")
 
 
 def _agreement(result: Result, words: Words) -> str:
@@ -137,7 +148,7 @@ def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str,
 def _advice(result: Result, words: Words) -> str:
     """The next experiment, else the warnings, else nothing."""
     if result.status == "failed":
-        return words("next_failed")
+        return words("next_refused" if _refused(result) else "next_failed")
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -24,6 +24,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextToPath
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from pipeline.rounding import plain
@@ -52,6 +54,8 @@ STEP_LEVELS = 24  # neighbours of a longer test share a colour; no eye tells mor
 
 # Room above the axes for a legend, in px.
 ONE_ROW, TWO_ROWS = 22.0, 38.0
+# Between the labels of an axis and both its sides, in px.
+LABEL_GAP = 10.0
 
 # Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.
 FONT = "DejaVu Sans"
@@ -185,6 +189,13 @@ def plot_area(
     return figure.add_axes(
         (left / width, bottom / height, (width - left - right) / width, (height - top - bottom) / height)
     )
+
+
+def label_width(labels: Iterable[str], *, most: float) -> float:
+    """Room in px that labels of an axis need, at most so much: names differ in length from language to language."""
+    properties = FontProperties(family=FONT, size=STYLE["font.size"])
+    widths = (TextToPath().get_text_width_height_descent(label, properties, ismath=False)[0] for label in labels)
+    return min(most, max(widths, default=0.0) + LABEL_GAP)
 
 
 def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes:

@@ -42,6 +42,11 @@ class DiagnosisView:
     leftover: list[str] = field(default_factory=list)
     figures: dict[str, Drawing] = field(default_factory=dict)
 
+    @property
+    def examined(self) -> bool:
+        """Whether there is more to show than the headline."""
+        return bool(self.rows or self.figures or self.blind_spots or self.leftover or self.next_what)
+
 
 def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> DiagnosisView | None:
     """Everything the page says about the diagnosis; None if there was none."""
@@ -62,7 +67,7 @@ def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> Di
             )
             for spot in part.blind_spots
         ],
-        next_what=words.said(following.what).text if following else "",
+        next_what=words.said(following.what).sentence if following else "",
         next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
         leftover=_sentences(part.leftover, words) if part.verdict != "adequate" else [],
         figures=_figures(part, words, settings),
@@ -78,7 +83,7 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         estimate = (
             size.text(cause.estimate, cause.std)
             if size
-            else f"{words.measured(cause.estimate, cause.std)} {cause.unit if cause.unit != '-' else ''}".rstrip()
+            else f"{words.measured(cause.estimate, cause.std)}{words.unit(cause.unit)}"
         )
         share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
@@ -118,7 +123,7 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     def percent(value: float | None) -> str:
         return "–" if value is None else words.number(100.0 * value, SHARE_DIGITS)
 
-    unit = "" if row.unit == "-" else f" {row.unit.replace('^2', '²')}"
+    unit = words.unit(row.unit)
     twin = f"{words.cause(row.nearest_twin)} ({words.number(abs(row.twin_cosine), 3)})" if row.nearest_twin else "–"
     return [
         words.cause(row.name),
@@ -137,7 +142,7 @@ def _sentences(leftover: dict[str, Any] | None, words: Words) -> list[str]:
     """Sentences of the leftover; its arrays are drawn."""
     if not leftover:
         return []
-    return [words.said(str(leftover[key])).text for key in ("message", "noise") if leftover.get(key)]
+    return [words.said(str(leftover[key])).sentence for key in ("message", "noise") if leftover.get(key)]
 
 
 def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:

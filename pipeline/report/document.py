@@ -80,7 +80,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     """
     settings = settings or ReportSettings()
     words = Words(settings.language)
-    main = main_figure(result, words, settings)
+    main, diagnosis = main_figure(result, words, settings), diagnosis_view(result, words, settings)
     levels = {level: [f for f in result.findings if f.level == level] for level in ("error", "warning", "info")}
     return (
         environment()
@@ -91,11 +91,15 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             settings=settings,
             answer=answer(result, words, settings),
             main=main,
+            shown={
+                "photos": bool(result.photos) or result.status != "failed",
+                "diagnosis": diagnosis is not None and diagnosis.examined,
+            },
             pointer=pointer_data(result, main, words, settings),
             levels=levels,
             photos=photo_views(result, words, settings),
             figures=mechanics_figures(result, words, settings),
-            diagnosis=diagnosis_view(result, words, settings),
+            diagnosis=diagnosis,
             tables={
                 "forces": force_rows(result, words),
                 "photos": photo_rows(result, words),

@@ -162,6 +162,11 @@ def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[
     return [_photo_view(index, photo, words, settings) for index, photo in enumerate(result.photos)]
 
 
+def _reason(photo: PhotoPart, words: Words) -> str:
+    """Why a photo was not used, without its name, which stands beside it."""
+    return words.said((photo.reason or "").removeprefix(f"{photo.image}: ")).text
+
+
 def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
     seen, hidden = photos.overlay_paths(photo)
     kappa, seen_kappa = None, seen_range(photo)
@@ -179,7 +184,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
         photo.step,
         photo.image,
         photo.status,
-        words.said(photo.reason or "").text,
+        _reason(photo, words),
         photo.preview,
         seen,
         hidden,
@@ -223,7 +228,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
             [
                 str(photo.step),
                 photo.image,
-                words(f"status_{photo.status}") + (f": {words.said(photo.reason)}" if photo.reason else ""),
+                words(f"status_{photo.status}") + (f": {_reason(photo, words)}" if photo.reason else ""),
                 *(millimetres.number(_times(1e3, v), _times(1e3, std)) for v, std in lengths),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]

@@ -169,15 +169,26 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
 
 def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
-    height = figure.bbox.height
-    axes = plot_area(figure, bottom=0.38 * height)
-    rest = plot_area(figure, top=0.68 * height)
-    unit, half = force_unit(result, words), band_width(settings)
+    height, unit = figure.bbox.height, force_unit(result, words)
+    fitted = [step for step in result.steps if step.force_fit_N is not None]
+    axes = plot_area(figure, bottom=0.38 * height) if fitted else plot_area(figure)
     for branch in MARKERS:
         steps = [step for step in result.steps if step.branch == branch]
         if steps:
-            _branch(axes, rest, branch, steps, unit, half, words)
-    fitted = [step for step in result.steps if step.force_fit_N is not None]
+            _branch(axes, branch, steps, unit, band_width(settings), words)
+    under = "" if fitted else words("axis_displacement")
+    if fitted:
+        _simulated(axes, fitted, unit, words)
+        rest = plot_area(figure, top=0.68 * height)
+        rest.sharex(axes)
+        _force_rest(rest, result, words, settings)
+    finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
+    axes.tick_params(labelbottom=not fitted)
+    return axes
+
+
+def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, words: Words) -> None:
+    """Simulated forces, loading and unloading."""
     for branch in ("loading", "unloading"):
         line = _line_of_branch(fitted, branch)
         axes.plot(
@@ -191,28 +202,36 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
             ls="-" if branch == "loading" else (0, (4, 2)),
             label=words("simulated") if branch == "loading" else None,
         )
+
+
+def _force_rest(rest: Axes, result: Result, words: Words, settings: ReportSettings) -> None:
+    """Measured minus simulated force in standard deviations."""
     noise = settings.residual_noise_sigma
+    for branch in MARKERS:
+        steps = [step for step in result.steps if step.branch == branch]
+        left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
+        rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **_marks(branch))
     rest.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in fitted)])
+    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in result.steps)])
     rest.set_ylim(-limit, limit)
-    rest.sharex(axes)
     finish(rest, x=words("axis_displacement"), y=words("axis_sigma"), decimal=words.decimal)
     rest.yaxis.set_major_locator(MaxNLocator(4, integer=True))
-    finish(axes, x="", y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
-    axes.tick_params(labelbottom=False)
-    return axes
 
 
-def _branch(axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words) -> None:
-    """Measured forces of one branch with error bars, and their residuals below."""
-    look: dict[str, Any] = {
+def _marks(branch: str) -> dict[str, Any]:
+    """How the points of a branch look."""
+    return {
         "ls": "none",
         "marker": MARKERS[branch],
         "ms": 5.5,
         "color": LIGHT["measured"],
         "mfc": LIGHT["paper"] if branch == "unloading" else LIGHT["measured"],
     }
+
+
+def _branch(axes: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words) -> None:
+    """Measured forces of one branch with error bars."""
     axes.errorbar(
         [1e3 * step.displacement_m for step in steps],
         [unit.factor * step.force_N for step in steps],
@@ -220,10 +239,8 @@ def _branch(axes: Axes, rest: Axes, branch: str, steps: list[StepPart], unit: Un
         capsize=3.0,
         elinewidth=1.2,
         label=words.branch(branch),
-        **look,
+        **_marks(branch),
     )
-    left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
-    rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **look)
 
 
 def _line_of_branch(steps: list[StepPart], branch: str) -> list[StepPart]:

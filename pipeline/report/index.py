@@ -2,7 +2,8 @@
 
 Results are read one by one and only a row of each is kept, so memory does not grow with photos: some kilobytes a
 specimen. The page holds everything it needs: search, filters, sorting, characteristics of selected specimens laid
-over each other, repeat specimens of a type pooled. A failed specimen is a row with its reason.
+over each other, repeat specimens of a type pooled. A failed specimen is a row with its reason and a report that says
+what to do.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.answer import pre_curvatures
-from pipeline.report.document import asset, environment, palette_css
+from pipeline.report.document import asset, environment, palette_css, write_report
 from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
 from pipeline.report.repeats import repeats
@@ -152,15 +153,20 @@ def write_index(
     """
     settings, out = settings or ReportSettings(), Path(out)
     pairs = read_results(Path(results)) if isinstance(results, str | Path) else ((r, r.specimen.id) for r in results)
-    rows = [index_row(result, _report(result, folder, out), settings) for result, folder in pairs]
+    rows = [index_row(result, _report(result, folder, out, settings), settings) for result, folder in pairs]
     page = write_atomic(out / "index.html", index_html(rows, settings))
     return page, write_atomic(out / "summary.csv", csv_text(summary_frame(rows)))
 
 
-def _report(result: Result, folder: str, out: Path) -> str:
-    """Path of a report relative to the index; a failed specimen may have none."""
-    path = f"{folder}/report.html"
-    return path if result.status != "failed" or (out / path).exists() else ""
+def _report(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
+    """Path of a report relative to the index, empty if there is none.
+
+    A specimen that failed may have left none (its process died, its description could not be read): it is drawn here.
+    """
+    path = out / folder / "report.html"
+    if result.status == "failed" and path.parent.is_dir() and not path.exists():
+        write_report(result, path.parent, settings)
+    return f"{folder}/report.html" if result.status != "failed" or path.exists() else ""
 
 
 def summary_frame(rows: list[IndexRow]) -> pd.DataFrame:

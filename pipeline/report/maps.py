@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from numpy.typing import NDArray
 
-from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, number_ticks, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, number_ticks, plot_area
 from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import ResidualMap, Result
@@ -46,7 +46,7 @@ def measured_map(result: Result) -> ResidualMap | None:
 
 def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
-    axes = plot_area(figure, left=92.0, right=70.0, top=20.0 if title else 8.0)
+    axes = plot_area(figure, left=92.0, right=84.0, top=20.0 if title else 8.0)
     s = 1e3 * np.asarray(residuals.s_m)
     columns = np.linspace(s[0], s[-1], settings.map_columns)
     table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
@@ -117,10 +117,12 @@ def _scale(figure: Area, axes: Axes, image: ScalarMappable, label: str, words: W
 def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
     """Draw how alike the signatures of causes are: |cos| = 1 cannot be told apart by this test."""
     names = list(dict.fromkeys([*cosines, *(other for row in cosines.values() for other in row)]))
-    axes = plot_area(figure, left=134.0, right=64.0, top=8.0, bottom=108.0)
+    labels = [words.cause(name) for name in names]
+    longest = label_width(labels, most=0.45 * figure.bbox.width)
+    # Labels of the columns lean by 40 degrees: two thirds of their length go down.
+    axes = plot_area(figure, left=longest, right=64.0, top=8.0, bottom=0.68 * longest + 8.0)
     table = np.array([[_cosine(cosines, a, b) for b in names] for a in names])
     image = axes.imshow(np.ma.masked_invalid(table), cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
-    labels = [words.cause(name) for name in names]
     axes.set_xticks(range(len(names)), labels, rotation=40, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(len(names)), labels)
     axes.tick_params(length=0)

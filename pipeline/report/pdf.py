@@ -169,7 +169,7 @@ def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> She
         sheet.text(words("nav_findings"), bold=True)
         for finding in troubles:
             if sheet.room() > 30.0:
-                sheet.text(f"{words(f'level_{finding.level}')}: {words.said(finding.message)}", size=9.0)
+                sheet.text(f"{words(f'level_{finding.level}')}: {words.said(finding.message).sentence}", size=9.0)
     return sheet
 
 
@@ -271,7 +271,7 @@ def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings
     """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
     sheet, view = Sheet(_head(result)), diagnosis_view(result, words, settings)
     sheet.text(words("nav_diagnosis"), size=13.0, bold=True)
-    sheet.text(words.said(part.headline).text, bold=True)
+    sheet.text(words.said(part.headline).sentence, bold=True)
     if view is None:
         return sheet
     for line in (*(cause.line for cause in view.named), *view.gain, *view.leftover):

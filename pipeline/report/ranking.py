@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
-from pipeline.report.canvas import LIGHT, Area, finish, plot_area
+from pipeline.report.canvas import LIGHT, Area, finish, label_width, plot_area
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart
 from pipeline.settings import ReportSettings
@@ -31,7 +31,8 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings:
     """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
     rows, width = ranked(diagnosis, settings), figure.bbox.width
     named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}
-    left = 134.0
+    labels = [words.cause(row.name) for row in rows]
+    left = label_width(labels, most=0.45 * width)
     middle = left + 0.5 * (width - left - 12.0)
     pull = plot_area(figure, left=left, right=width - middle + 6.0, top=8.0)
     impact = plot_area(figure, left=middle + 6.0, top=8.0)
@@ -53,6 +54,6 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(axis="y", visible=False)
         axes.axvline(0.0, color=LIGHT["muted"], lw=0.8)
-        axes.set_yticks(list(places), [words.cause(row.name) for row in rows] if axes is pull else [])
+        axes.set_yticks(list(places), labels if axes is pull else [])
     pull.tick_params(axis="y", length=0)
     return pull

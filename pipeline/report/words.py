@@ -42,6 +42,13 @@ class Said:
     def __str__(self) -> str:
         return self.text
 
+    @property
+    def sentence(self) -> str:
+        """The text as a sentence of its own: a capital at its start, unless it starts with a file or a symbol."""
+        first = self.text.split(maxsplit=1)[:1]
+        plain_word = bool(first) and first[0].rstrip(",;:").isalpha() and first[0].islower()
+        return f"{self.text[0].upper()}{self.text[1:]}" if plain_word else self.text
+
 
 @dataclass(frozen=True)
 class Words:
@@ -112,4 +119,9 @@ class Words:
 
     def measured(self, value: float | None, std: float | None) -> str:
         """A measured number with its standard deviation."""
-        return rounded(value, std, decimal=self.decimal)
+        text = rounded(value, std, decimal=self.decimal)
+        return f"{text.partition(' (')[0]} ({self('exact')})" if std == 0.0 else text
+
+    def unit(self, unit: str) -> str:
+        """A unit of the contract as one writes it, with the blank before it; none for a plain number."""
+        return "" if unit == "-" else f" {unit.replace('^2', '²').replace(' per ', self('per'))}"

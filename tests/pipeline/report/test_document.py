@@ -9,7 +9,7 @@ import pytest
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, write_report
 from pipeline.report.pdf import pdf_bytes
-from pipeline.result import FindingPart
+from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
 
 VOID = {"meta", "link", "img", "input", "br", "hr"}
@@ -130,7 +130,7 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert ("A hump at mid-span" in text) == (verdict == "unexplained")
     assert ('id="leftover"' in page) == (verdict == "unexplained")
     assert ('id="force-rest"' in page) == found
-    assert ("turn the cable end for end" in text) == (verdict != "adequate")
+    assert ("Turn the cable end for end" in text) == (verdict != "adequate")
     assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
 
 
@@ -154,7 +154,25 @@ def test_nothing_of_a_user_is_markup(partial_result):
 def test_failed_specimen_says_why(failed_result):
     text = Page(report_html(failed_result)).text
     assert "cable-13 was not measured: force.csv: the log is empty; export it again." in text
-    assert "Mend what is named below" in text
+    assert "Mend that and run the same command again" in text
+
+
+def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
+    refused = [
+        PhotoPart(image=photo.image, step=photo.step, status="rejected", reason=f"{photo.image}: the file is empty")
+        for photo in full_result.photos[:2]
+    ]
+    steps = [step.model_copy(update={"force_fit_N": None}) for step in full_result.steps]
+    nothing = dict.fromkeys(("inverse", "balance", "agreement")) | {"status": "failed"}
+    nothing |= {"photos": refused, "steps": steps}
+    page = report_html(full_result.model_copy(update=nothing), ReportSettings(language="de"))
+    heading = re.search(r"<h1>(.*?)</h1>", page, re.DOTALL)[1]
+    assert heading == (
+        f"cable-07 wurde nicht vermessen: Keines seiner 2 Fotos war verwendbar. Das erste: {refused[0].image}: "
+        "die Datei ist leer"
+    )
+    assert "Sie danach neu aufnehmen" in page
+    assert "simuliert</text>" not in page
 
 
 def test_disagreement_and_misfit_are_said(full_result):
@@ -184,7 +202,7 @@ def test_german_page_says_the_verdict_in_german(diagnosed):
     page = report_html(result.model_copy(update=changed), ReportSettings(language="de"))
     text = Page(page).text
     assert "Der Simulation fehlt: Hysterese (0,0049 ± 0,0002 N m)." in text
-    assert "<span>die Datei ist leer</span>" in page
+    assert "<span>Die Datei ist leer</span>" in page
     assert '<span lang="en">The moon is full.</span>' in page
     assert "Drähte reiben aneinander" in text
     assert "hier nicht zu trennen von Lagerreibung" in text

@@ -6,7 +6,6 @@ import re
 import pandas as pd
 import pytest
 
-from pipeline.report.document import write_report
 from pipeline.report.index import write_index
 from pipeline.report.tables import write_result
 from pipeline.settings import ReportSettings
@@ -93,7 +92,13 @@ def test_rows_stand_in_the_order_people_count_and_hidden_folders_stay_out(failed
     assert list(pd.read_csv(write_index(tmp_path, tmp_path)[1]).id) == ["Cable-1", "cable-2", "cable-10"]
 
 
-def test_failed_specimen_is_linked_only_if_it_has_a_report(failed_result, tmp_path):
+def test_failed_specimen_gets_a_report_that_says_why_and_what_to_do(failed_result, tmp_path):
+    write_result(failed_result, tmp_path / "cable-13")
+    page = write_index(tmp_path, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
+    assert 'href="cable-13/report.html"' in page
+    report = (tmp_path / "cable-13/report.html").read_text(encoding="utf-8")
+    assert "Das beheben und denselben Befehl noch einmal ausführen" in report
+
+
+def test_no_link_leads_nowhere(failed_result, tmp_path):
     assert "<a href" not in write_index([failed_result], tmp_path)[0].read_text(encoding="utf-8")
-    write_report(failed_result, tmp_path / failed_result.specimen.id)
-    assert 'href="cable-13/report.html"' in write_index([failed_result], tmp_path)[0].read_text(encoding="utf-8")
