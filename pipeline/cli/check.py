@@ -13,7 +13,7 @@ from pipeline.cli.run import found, nothing_found
 from pipeline.errors import InputError
 
 
-@click.command()
+@click.command(short_help="What would run and what is wrong.")
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
 @settings_options
@@ -64,21 +64,12 @@ def checked(folder: Path, settings: Any) -> dict[str, Any]:
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:
-    """A table for people: a line a specimen, its findings below it."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
+    """A line a specimen, below it a line for each thing that was inferred or is wrong, never broken into columns."""
     colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}
-    table = Table(box=SIMPLE_HEAD)
-    for name in ("specimen", "state", "steps", "photos", "what is inferred or wrong"):
-        table.add_column(name, justify="right" if name in ("steps", "photos") else "left")
     for row in rows:
-        notes = Text("\n").join(
-            Text.assemble((finding["level"], colours[finding["level"]]), f" {finding['message']} [{finding['code']}]")
-            for finding in row["findings"]
-        )
-        state = Text(row["status"], colours[row["status"]])
-        table.add_row(Text(row["id"] or row["folder"]), state, str(row["steps"]), str(row["photos"]), notes)
-    Console(soft_wrap=False).print(table)
+        state = click.style(f"{row['status']:<8}", colours[row["status"]])
+        counts = "" if row["status"] == "error" else f": {row['steps']} steps, {row['photos']} photos"
+        click.echo(f"{state} {row['id'] or row['folder']}{counts}")
+        for finding in row["findings"]:
+            level = click.style(finding["level"], colours[finding["level"]])
+            click.echo(f"{'':8} {level}: {finding['message']} [{finding['code']}]")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MISSING = 3
 
 
-@click.command()
+@click.command(short_help="Whether two results differ.")
 @click.argument("a", type=click.Path(path_type=Path))
 @click.argument("b", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Everything as JSON on stdout.")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 COMPARED = 5  # places along the visited range at which f_EI is laid beside the truth
 
 
-@click.command()
+@click.command(short_help="Measure a simulated specimen of known truth.")
 @click.option(
     "-o", "--out", default="cablebend-demo", type=click.Path(path_type=Path, file_okay=False), show_default=True,
     help="Folder for the specimen, its truth and the results.",

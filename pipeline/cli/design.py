@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pipeline.diagnosis.design import Design
 
 
-@click.command()
+@click.command(short_help="What a planned test could see.")
 @click.option("--length-mm", default=181.0, show_default=True, help="Cable length between the bearing axes.")
 @click.option("--ei-rest", default=0.018, show_default=True, help="Expected bending stiffness at rest, N m^2.")
 @click.option("--ei-far", default=0.008, show_default=True, help="Expected bending stiffness far from rest, N m^2.")

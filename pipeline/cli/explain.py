@@ -7,7 +7,7 @@ import click
 from pipeline.cli.options import language_option
 
 
-@click.command()
+@click.command(short_help="What a cause is and what to do.")
 @click.argument("name", required=False)
 @language_option
 def explain(name: str | None, language: str | None) -> None:

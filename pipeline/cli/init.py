@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 
-@click.command()
+@click.command(short_help="Write a specimen.toml to fill in.")
 @click.argument("folders", nargs=-1, type=click.Path(path_type=Path), metavar="[FOLDER]...")
 @click.option("--settings", "as_settings", is_flag=True, help="Print all settings, with default, unit and reason.")
 def init(folders: tuple[Path, ...], as_settings: bool) -> None:
@@ -15,6 +15,7 @@ def init(folders: tuple[Path, ...], as_settings: bool) -> None:
 
     With --settings print all settings as TOML instead, to be saved and given to `cablebend run --settings FILE`.
     """
+    from pipeline.batch.orders import quoted
     from pipeline.intake.template import write_template
     from pipeline.settings import Settings
 
@@ -27,4 +28,4 @@ def init(folders: tuple[Path, ...], as_settings: bool) -> None:
         raise click.UsageError("give a FOLDER of photos, or --settings")
     for folder in folders:
         path = write_template(folder, Settings().intake)
-        click.echo(f"{path}: fill in length_mm and diameter_mm, then `cablebend check {folder}`")
+        click.echo(f"{path}: fill in length_mm and diameter_mm, then `cablebend check {quoted(folder)}`")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 
-@click.command()
+@click.command(short_help="The source paper's virtual experiments.")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
 def paper(out: Path) -> None:
     """Compute everything of the paper that needs no real cable: paper.json, paper.html and figures."""

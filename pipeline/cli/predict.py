@@ -24,7 +24,7 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, text: str) -> li
         raise click.BadParameter(f"{text!r} is no list of numbers such as 5,10,15.") from error
 
 
-@click.command()
+@click.command(short_help="Forces and shapes of a new experiment.")
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option(
     "--displacement-mm", "displacements_mm", required=True, callback=millimetres, metavar="MM[,MM...]",

@@ -10,7 +10,7 @@ from pipeline.cli.options import chosen_language, language_option, settings_opti
 from pipeline.errors import InputError
 
 
-@click.command()
+@click.command(short_help="Draw reports again without measuring.")
 @click.argument("out", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @language_option
 @settings_options

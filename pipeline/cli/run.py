@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipeline.batch import Tally
 
 
-@click.command()
+@click.command(short_help="Measure specimens and write their reports.")
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
 @click.option(
     "-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the results."

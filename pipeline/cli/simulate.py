@@ -18,7 +18,7 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
         raise click.BadParameter(f"{error}.") from error
 
 
-@click.command()
+@click.command(short_help="A virtual experiment as a specimen folder.")
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 @click.option(
     "--hide", "effects", multiple=True, metavar="NAME=VALUE", callback=effect,

@@ -13,6 +13,7 @@ from pipeline.result import Result
 from pipeline.settings import ReportSettings
 from pipeline.visited import best, curves
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
 
@@ -96,8 +97,8 @@ def _sentence(result: Result, words: Words) -> str:
     text = words(
         "answer_constant" if not beyond else "answer_falls" if change < 0.0 else "answer_rises",
         id=name,
-        first=unit.text(curve.tangent[0], curve.tangent_std[0]),
-        last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
+        first=_together(unit.text(curve.tangent[0], curve.tangent_std[0])),
+        last=_together(unit.text(curve.tangent[-1], curve.tangent_std[-1])),
         low=words.curvature(curve.kappa[0]),
         high=words.curvature(curve.kappa[-1]),
     )
@@ -106,6 +107,11 @@ def _sentence(result: Result, words: Words) -> str:
     ways = ("photo",) if curve.method == "extended" else ("inverse", "balance", "photo")
     way = next((way for way in ways if way in known), None)
     return text if way is None else f"{text} {words('answer_pre_curvature', value=words.measured(*known[way]))}"
+
+
+def _together(quantity: str) -> str:
+    """A quantity that no line break takes apart."""
+    return quantity.replace(" ", NO_BREAK)
 
 
 def _refused(result: Result) -> str:

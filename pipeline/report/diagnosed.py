@@ -48,8 +48,10 @@ class DiagnosisView:
         return bool(self.rows or self.figures or self.blind_spots or self.leftover or self.next_what)
 
 
-def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> DiagnosisView | None:
-    """Everything the page says about the diagnosis; None if there was none."""
+def diagnosis_view(
+    result: Result, words: Words, settings: ReportSettings, *, figures: bool = True
+) -> DiagnosisView | None:
+    """Everything the page says about the diagnosis, its figures only if asked for; None if there was none."""
     part = result.diagnosis
     if part is None:
         return None
@@ -70,7 +72,7 @@ def diagnosis_view(result: Result, words: Words, settings: ReportSettings) -> Di
         next_what=words.said(following.what).sentence if following else "",
         next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
         leftover=_sentences(part.leftover, words) if part.verdict != "adequate" else [],
-        figures=_figures(part, words, settings),
+        figures=_figures(part, words, settings) if figures else {},
     )
 
 

@@ -21,6 +21,8 @@ from pipeline.settings import ReportSettings
 Array = NDArray[np.float64]
 # More names than this on an axis cannot be annotated at 440 px.
 ANNOTATED_NAMES = 9
+# Below this width, in px, numbers under a map would run into each other: half a page of report.pdf.
+NARROW = 330.0
 
 
 def measured_map(result: Result) -> ResidualMap | None:
@@ -46,7 +48,10 @@ def measured_map(result: Result) -> ResidualMap | None:
 
 def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
-    axes = plot_area(figure, left=92.0, right=84.0, top=20.0 if title else 8.0)
+    branches = residuals.branches or [""] * len(residuals.steps)
+    names = [f"{step} {words.branch(b)}" for step, b in zip(residuals.steps, branches, strict=True)]
+    width = figure.bbox.width
+    axes = plot_area(figure, left=label_width(names, most=0.4 * width), right=84.0, top=20.0 if title else 8.0)
     s = 1e3 * np.asarray(residuals.s_m)
     columns = np.linspace(s[0], s[-1], settings.map_columns)
     table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
@@ -64,13 +69,13 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: Repor
         extent=(s[0], s[-1], len(residuals.steps) - 0.5, -0.5),
     )
     finish(axes, x=words("axis_s"), y="", decimal=words.decimal)
+    axes.locator_params(axis="x", nbins=6 if width > NARROW else 3)
     axes.set_facecolor(LIGHT["grid"])
     axes.grid(False)
-    branches = residuals.branches or [""] * len(residuals.steps)
     every = max(1, len(residuals.steps) // 12)
     axes.set_yticks(
         range(0, len(residuals.steps), every),
-        [f"{step} {words.branch(b)}" for step, b in zip(residuals.steps, branches, strict=True)][::every],
+        names[::every],
     )
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)

@@ -22,7 +22,7 @@ from matplotlib.image import imread
 from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
 from pipeline.report.canvas import FONT, LIGHT, Area, style
-from pipeline.report.diagnosed import diagnosis_view, residual_map
+from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
 from pipeline.report.document import simulation_texts
 from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
@@ -118,8 +118,9 @@ def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
         if result.steps or curves(result):
             sheets.append(_mechanics_sheet(result, words, settings))
         sheets.append(_photo_sheet(result, words, settings))
-        if result.diagnosis is not None:
-            sheets.append(_diagnosis_sheet(result, result.diagnosis, words, settings))
+        view = diagnosis_view(result, words, settings, figures=False)
+        if view is not None and view.examined and result.diagnosis is not None:
+            sheets.append(_diagnosis_sheet(result, result.diagnosis, view, words, settings))
         file = io.BytesIO()
         metadata = {
             "CreationDate": None,
@@ -255,7 +256,9 @@ def _picture(part: Area, photo: PhotoPart, words: Words) -> None:
     head = 14.0 / part.bbox.height
     axes = part.add_axes((0.0, 0.0, 1.0, 1.0 - head))
     axes.set_axis_off()
-    axes.imshow(imread(io.BytesIO(base64.b64decode(photo.preview.jpeg_base64)), format="jpeg"), cmap="gray")
+    axes.imshow(
+        imread(io.BytesIO(base64.b64decode(photo.preview.jpeg_base64)), format="jpeg"), cmap="gray", vmin=0, vmax=255
+    )
     axes.set_autoscale_on(False)
     if photo.u_px:
         u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction - 0.5
@@ -267,13 +270,13 @@ def _picture(part: Area, photo: PhotoPart, words: Words) -> None:
     part.text(0.0, 1.0 - 10.0 / part.bbox.height, label, size=8.5, color=LIGHT["ink"])
 
 
-def _diagnosis_sheet(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> Sheet:
+def _diagnosis_sheet(
+    result: Result, part: DiagnosisPart, view: DiagnosisView, words: Words, settings: ReportSettings
+) -> Sheet:
     """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
-    sheet, view = Sheet(_head(result)), diagnosis_view(result, words, settings)
+    sheet = Sheet(_head(result))
     sheet.text(words("nav_diagnosis"), size=13.0, bold=True)
     sheet.text(words.said(part.headline).sentence, bold=True)
-    if view is None:
-        return sheet
     for line in (*(cause.line for cause in view.named), *view.gain, *view.leftover):
         sheet.text(line)
     if part.table:
