@@ -6,11 +6,11 @@ of error (`gains`: curve of each photo, each force, scale, axes, length) and by 
 of a given law (`shortfall`). The covariance of the difference of both follows from the same errors and the same laws
 sent through both,
 
-    V = sum (G_1 - G_2) S (G_1 - G_2)^T + (B_1 - B_2) F F^T (B_1 - B_2)^T + W_1 + W_2
+    V = sum (G_1 - G_2) S (G_1 - G_2)^T + (B_1 - B_2) F F^T (B_1 - B_2)^T
 
-over the sources with covariance S (of photos, forces, nuisances), for laws with the spread F that the smoothness prior
-gives them (`rod.inverse.knots.prior_forms`, at the size that the data chose). W is the part of each band that the
-choice of that size adds; the ways choose apart. A level, and what both miss alike, cancels.
+over the sources with covariance S (of photos, forces, nuisances), for laws of the forms F that the smoothness prior
+allows (`rod.inverse.knots.prior_forms`, of the sizes that the data speak for). What both miss alike cancels.
+Over cables of the accuracy study the test of level 5 % rejects 3 to 6 %, with and without a force-free photo.
 
 The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
 """
@@ -38,7 +38,6 @@ class Characterised:
     curve: LogCurve
     gains: dict[Source, Array]
     shortfall: Array
-    size_covariance: Array
     pre_curvature: float
     pre_curvature_std: float
 
@@ -46,17 +45,13 @@ class Characterised:
     def of_inverse(way: Estimate) -> Characterised:
         """Of the inverse problem."""
         curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(
-            curve, way.gains, way.shortfall, way.size_covariance, way.pre_curvature, way.pre_curvature_std
-        )
+        return Characterised(curve, way.gains, way.shortfall, way.pre_curvature, way.pre_curvature_std)
 
     @staticmethod
     def of_balance(way: BalanceGraph) -> Characterised:
         """Of the balance equations."""
         curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(
-            curve, way.gains, way.shortfall, way.size_covariance, way.pre_curvature, way.pre_curvature_std
-        )
+        return Characterised(curve, way.gains, way.shortfall, way.pre_curvature, way.pre_curvature_std)
 
 
 @dataclass(frozen=True)
@@ -93,9 +88,11 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
     if grid is None or inverse.model is None:
         return None
     ratio = one.curve.log_on(grid) - two.curve.log_on(grid)
-    model = inverse.model
-    forms = tuple(prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.curve.kappa) for way in (one, two))
-    p = p_value(parts_difference(one.curve, two.curve, grid), difference_covariance(test, one, two, forms, grid))
+    knots, (tau, slope) = inverse.model.knots, inverse.form_sizes
+    forms = prior_forms(knots, tau=tau, slope=slope, at=one.curve.kappa)
+    same = prior_forms(knots, tau=tau, slope=slope, at=two.curve.kappa)
+    covariance = difference_covariance(test, one, two, (forms, same), grid)
+    p = p_value(parts_difference(one.curve, two.curve, grid), covariance)
     return Agreement(
         range_per_m=(float(grid[0]), float(grid[-1])),
         rms_relative=float(np.sqrt(np.mean(ratio**2))),
@@ -115,14 +112,14 @@ def difference_covariance(
     `forms` are the laws sent through both, each on the way's own grid, (n, p).
     """
     first, second = one.curve.contraction(grid), two.curve.contraction(grid)
-    total: Array = first @ one.size_covariance @ first.T + second @ two.size_covariance @ second.T
+    short = first @ one.shortfall @ forms[0] - second @ two.shortfall @ forms[1]
+    total: Array = short @ short.T
     for source in one.gains | two.gains:
         moved = first @ one.gains[source] if source in one.gains else 0.0
         if source in two.gains:
             moved = moved - second @ two.gains[source]
-        total += moved @ source_covariance(test, source, moved.shape[1]) @ moved.T
-    short = first @ one.shortfall @ forms[0] - second @ two.shortfall @ forms[1]
-    return np.asarray(total + short @ short.T)
+        total = total + moved @ source_covariance(test, source, moved.shape[1]) @ moved.T
+    return total
 
 
 def source_covariance(test: MeasuredTest, source: Source, size: int) -> Array:

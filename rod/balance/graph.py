@@ -118,11 +118,10 @@ class BalanceGraph:
         Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
         same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
         ``("force", step)`` (n, 1) per N; then, per standard deviation of what is wrong on all photos alike,
-        ``("scale", -1)`` (n, 1) and ``("axes", -1)`` (n, 2), left and right across the chord.
+        ``("scale", -1)`` (n, 1) and ``("axes", -1)`` (n, 2), left and right across the chord; ``("floor", step)`` per
+        standard deviation of the curvature that no photo resolves, at each point.
     shortfall : (n, n)
         Error of log(tangent) on the grid by the roughness prior, per log(tangent) of the true law there.
-    size_covariance : (n, n)
-        Part of ``log_covariance`` that comes from not knowing the size of that prior.
     points : tuple of MomentPoints
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
@@ -146,7 +145,6 @@ class BalanceGraph:
     log_covariance: Array = field(default_factory=_none)
     gains: dict[Source, Array] = field(default_factory=dict)
     shortfall: Array = field(default_factory=_none)
-    size_covariance: Array = field(default_factory=_none)
     points: tuple[MomentPoints, ...] = ()
     varying: tuple[float, ...] = (0.0,) * BOW_TERMS
     checks: dict[str, float] = field(default_factory=dict)
@@ -264,7 +262,6 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
         gains=_gains(model, found, by_log),
         # Coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis.
         shortfall=by_log @ found.posterior.shrinkage @ np.linalg.pinv(curve.basis.at(m)),
-        size_covariance=by_log @ (covariance - found.posterior.response) @ by_log.T,
         points=model.data,
         varying=tuple(float(v) for v in model.bow(found.unknowns)),
         checks=checks,
@@ -280,6 +277,7 @@ def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source,
         response = -by_log @ found.posterior.response @ model.columns(data, row).T
         for name, columns in row.by_source.items():
             gains[name, data.step.step] = response @ row.whitener @ columns
+        gains["floor", data.step.step] = model.floor * response @ row.whitener
     return gains
 
 

@@ -65,10 +65,9 @@ def log_prior_volume(S: Array) -> float:
 
 
 def prior_forms(knots: Array, *, tau: float, slope: float, at: Array) -> Array:
-    """Independent draws' directions of log f at the curvatures `at` (n,) 1/m under both priors, (n, k - 1).
+    """Forms of log f at the curvatures `at` (n,) 1/m, one standard deviation of both priors each, (n, k - 1).
 
-    Their outer product is the covariance of what the priors say about the form; the level, of which they say nothing,
-    has none.
+    Their outer products add up to the prior covariance of log f but for its level, of which the priors say nothing.
     """
     g = first_slope(knots)
     values, vectors = np.linalg.eigh(roughness(knots) / tau**2 + np.outer(g, g) / slope**2)

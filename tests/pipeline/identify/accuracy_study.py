@@ -50,10 +50,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Case:
-    """One cable."""
+    """One cable; `ratio` is EI0/EI1."""
 
     mounted: bool
     steps: int
+    ratio: float
     inverse: Score
     balance: Score
     p_value: float
@@ -71,6 +72,7 @@ def case(seed, number, *, kind="stick-slip", axes=0.0):
     return Case(
         mounted,
         len(chords),
+        law.EI0 / law.EI1,
         Score.of(found.inverse, law),
         Score.of(found.balance, law),
         found.agreement.p_value,
@@ -99,12 +101,14 @@ def summary(cases):
 
 
 def lines(cases):
-    """The summary as text, all cables and by protocol."""
+    """The summary as text, all cables, by protocol and by how much the stiffness falls."""
     groups = {
         "all": cases,
         "with force-free photo": [c for c in cases if c.mounted],
         "without": [c for c in cases if not c.mounted],
         "five or more steps": [c for c in cases if c.steps >= 5],
+        "EI0/EI1 up to 3": [c for c in cases if c.ratio <= 3],
+        "EI0/EI1 above 3": [c for c in cases if c.ratio > 3],
     }
     for name, group in groups.items():
         if group:

@@ -44,24 +44,19 @@ def test_both_ways_are_compared_on_the_range_both_visited(found):
 
 def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     """What the comparison sends through a way is all that its band holds, away from the ends of the range."""
-    way, model = found.inverse, found.inverse.model
-    one = Characterised.of_inverse(way)
+    way, (tau, slope) = found.inverse, found.inverse.form_sizes
     noise = sum(
-        gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in one.gains.items()
+        gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.gains.items()
     )
-    short = one.shortfall @ prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.kappa)
-    total = noise + short @ short.T + one.size_covariance
-    ratio = np.sqrt(np.diag(total) / np.diag(way.log_covariance))
-    # The band averages over the prior's size, of which the sum takes the likeliest: that counts near K0, where the
-    # band is mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.
+    short = way.shortfall @ prior_forms(way.model.knots, tau=tau, slope=slope, at=way.kappa)
+    ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.log_covariance))
+    # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
+    # mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.
     assert np.all((ratio[15:-1] > 0.75) & (ratio[15:-1] < 1.3))
 
 
 def test_what_both_ways_share_cancels_in_their_difference(found, measured):
-    one, two = (
-        replace(way, size_covariance=np.zeros_like(way.size_covariance))
-        for way in (Characterised.of_inverse(found.inverse), Characterised.of_balance(found.balance))
-    )
+    one, two = Characterised.of_inverse(found.inverse), Characterised.of_balance(found.balance)
     grid = one.curve.common_grid(two.curve)
     no_form = tuple(np.zeros((way.curve.kappa.size, 1)) for way in (one, two))
 
