@@ -4,21 +4,20 @@ Truth: `fixtures.continuum` (collocation) read by the rig and camera of `fixture
 The expected answer is the name, the class where physics allows no more, ``adequate`` where nothing is hidden.
 """
 
-from dataclasses import replace
-from functools import cache
-
 import numpy as np
 import pytest
 
-from fixtures.continuum import Cable, Slipping
+from fixtures.aliens import with_alien
+from fixtures.continuum import Cable
+from fixtures.effects import HIDE, LARGEST, PLAIN, PROTOCOLS, SPOT, Form, profile
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.make import hidden_specimen
+from fixtures.scores import answers, expected_scores, outlook
+from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.score import sigma_needed
-from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.workbench import prepare
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
@@ -28,76 +27,19 @@ from pipeline.simulate import Experiment
 from pipeline.vision.series import trace_series
 
 SETTINGS = DiagnosisSettings()
-PROTOCOLS = {"three": THREE, "six": SIX, "loop": LOOP}
-LARGEST = 0.0138
-LAW = {"EI0": 0.018, "EI1": 0.0075, "kc": 4.5}
-
-
-def growing(amount):
-    return lambda u: amount * (2.0 * u - 1.0)
-
-
-def waved(amount):
-    return lambda u: amount * np.sin(2.0 * np.pi * u)
-
-
-def spot(amount):
-    return lambda u: amount * np.exp(-0.5 * ((u - 0.6) / 0.06) ** 2)
-
-
-HIDE = {
-    "pre_curvature_varying": lambda a: (Cable(K0_profile=growing(a)), Reading()),
-    "stiffness_varying": lambda a: (Cable(stiffness_profile=spot(-a)), Reading()),
-    # two sharp elements that slip at 1 and 3 1/m and share the half width as 1 to 2
-    "hysteresis": lambda a: (Cable(memory=Slipping((a / 3.0, 2.0 * a / 9.0), (1.0, 3.0))), Reading()),
-    "plastic_set": lambda a: (Cable(set_rate=a), Reading()),
-    "relaxation": lambda a: (Cable(), Reading(relaxation=(a, 7.0))),
-    "bearing_friction": lambda a: (Cable(bearing_friction=a), Reading()),
-    "bearing_stiffness": lambda a: (Cable(bearing_stiffness=a), Reading()),
-    "rigid_ends": lambda a: (Cable(rigid_end=a), Reading()),
-    "rig_compliance": lambda a: (Cable(compliance=a), Reading()),
-    "displacement_offset": lambda a: (Cable(displacement_offset=a), Reading()),
-    "length_error": lambda a: (Cable(), Reading(length_error=a)),
-    "force_offset": lambda a: (Cable(), Reading(force_offset=a)),
-    "force_drift": lambda a: (Cable(), Reading(force_drift=a)),
-    "force_gain": lambda a: (Cable(), Reading(force_gain=a)),
-    "in_plane_load": lambda a: (Cable(load=(a, 0.0)), Reading()),
-    "scale_error": lambda a: (Cable(), Reading(scale_error=a)),
-    "lens_distortion": lambda a: (Cable(), Reading(lens=a)),
-    "camera_tilt": lambda a: (Cable(), Reading(tilt=(a, 0.0))),
-}
-"""How an amount of each cause is put into the continuum, the load cell or the camera."""
-
-CLEAREST = {
-    "pre_curvature_varying": lambda a: (Cable(K0_profile=waved(a)), Reading()),
-    "stiffness_varying": lambda a: (Cable(stiffness_profile=waved(a)), Reading()),
-}
-"""The form whose detectable amount is the smallest, where a cause has several."""
+VISIBLE = [name for name in HIDE if name != "force_gain"]
 
 NEEDS_THE_WAY_BACK = ("hysteresis", "plastic_set", "bearing_friction")
+"""Causes that change sign when the motion turns back; on loading alone they are shifts of K0."""
 
+FAR = {"three": ("bearing_friction", "displacement_offset", "hysteresis")}
+"""Seen only at sizes at which their traces are no longer in proportion: judged by refits, below."""
 
-def f_error(curve, law=LAW, K0=2.0):
-    """Relative error of a tangent curve against the hidden law, rms over its range."""
-    kappa = np.array(curve.kappa_per_m)
-    truth = law["EI1"] + (law["EI0"] - law["EI1"]) / np.cosh((kappa - K0) / law["kc"]) ** 2
-    return float(np.sqrt(np.mean((np.array(curve.tangent_Nm2) / truth - 1.0) ** 2)))
+BEYOND = {("three", "plastic_set"), ("six", "plastic_set"), ("three", "force_offset")}
+"""Needs more than ten times a plausible amount at four times the detectable one: no rig would have that."""
 
-
-@cache
-def outlook(protocol):
-    """Plausible size and detectable amount of every cause under a protocol, from a specimen with nothing hidden."""
-    bench = bench_of(hidden_test(Cable(), PROTOCOLS[protocol], largest=LARGEST, seed=99))
-    needed = sigma_needed(bench.limit, power=0.9)
-    return {
-        cause.name: (
-            cause.plausible(bench.facts),
-            detectable_amount(
-                bench.observation, bench.base, bench.suspicion, index, needed=needed, trace=SETTINGS.trace
-            ),
-        )
-        for index, cause in enumerate(bench.suspicion.causes)
-    }
+USUAL = {"pre_curvature_varying": PLAIN, "stiffness_varying": SPOT, "hysteresis": Form()}
+"""The form people would meet; else the clearest one."""
 
 
 def bench_of(test):
@@ -106,65 +48,62 @@ def bench_of(test):
     return bench
 
 
-def names_found(bench):
-    """Names in the set of the conclusion; empty where nothing was found."""
-    conclusion = conclude(bench, SETTINGS)
-    if conclusion.accepted is None:
-        return [], conclusion
-    found = [CATALOGUE[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
-    return found + [CATALOGUE[cause].name for cause in conclusion.accepted.causes], conclusion
-
-
 def test_every_cause_of_the_catalogue_is_hidden_here():
     # a law of another form is the base model's own business; see test_rediscovery for where it is found
     assert set(HIDE) == {cause.name for cause in CATALOGUE} - {"nonlinear_stiffness"}
 
 
-@pytest.mark.parametrize("name", [name for name in HIDE if name != "force_gain"])
+@pytest.mark.parametrize("name", VISIBLE)
 def test_plausible_size_is_named_and_f_comes_back(name):
     protocol = "loop" if name in NEEDS_THE_WAY_BACK else "six"
-    # below the detectable amount nothing can be asked for: bearing_stiffness and rigid_ends lie just at it
-    size = max(outlook(protocol)[name][0], 1.5 * outlook(protocol)[name][1])
-    cable, reading = HIDE[name](size)
-    part, findings = diagnose(
-        hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=7, reading=reading), None, SETTINGS
-    )
+    seen = outlook(protocol)[name]
+    # below the detectable amount nothing can be asked for: rigid_ends lie just at it
+    size = max(seen.plausible, 1.5 * seen.detectable) * (-1.0 if name == "stiffness_varying" else 1.0)
+    cable, reading = HIDE[name](size, USUAL.get(name, seen.form))
+    test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=7, reading=reading)
+    part, findings = diagnose(test, None, SETTINGS)
     assert [finding.code for finding in findings if finding.level == "error"] == []
     assert part.verdict in ("named", "class"), part.headline
     assert name in part.causes[0].class_, part.headline
     if part.verdict == "named" and name != "relaxation":
         # relaxation: the share that is lost depends on what happens after the hold
-        sign = -1.0 if name == "stiffness_varying" else 1.0
-        assert part.causes[0].estimate == pytest.approx(sign * size, abs=4.0 * part.causes[0].std + 0.05 * size)
-    assert f_error(part.extended) < 0.02, part.headline
+        assert part.causes[0].estimate == pytest.approx(size, abs=4.0 * part.causes[0].std + 0.05 * abs(size))
+    assert f_error(part.extended, cable)[0] < 0.02, part.headline
 
 
-# both multiples of every cause are in the study (python -m fixtures.study); here they alternate, for time
-@pytest.mark.parametrize(
-    ("name", "times"),
-    [
-        (name, (2.0, 4.0)[number % 2])
-        for number, name in enumerate(name for name in HIDE if name not in ("force_gain", "hysteresis"))
-    ],
-)
-def test_multiples_of_the_detectable_amount_are_in_the_set(name, times):
-    protocol = {2.0: "loop", 4.0: "six"}[times] if name not in NEEDS_THE_WAY_BACK else "loop"
-    plausible, detectable = outlook(protocol)[name]
-    factor = np.sqrt(times) if name == "rigid_ends" else times  # its trace grows with the square
-    cable, reading = CLEAREST.get(name, HIDE[name])(factor * detectable)
-    bench = bench_of(hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=int(10 * times), reading=reading))
-    found, conclusion = names_found(bench)
-    assert name in found and not conclusion.alien
-    assert np.isfinite(plausible)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize(("times", "target"), [(2.0, 0.95), (4.0, 0.99)])
+def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol, times, target):
+    """Every cause, hidden by collocation; rates over noise drawn on the scores, since one draw in twenty may miss."""
+    rng = np.random.default_rng(11)
+    shares, beyond = {}, set()
+    for name in VISIBLE:
+        seen = outlook(protocol)[name]
+        if not seen.possible(seen.amount(name, times)):
+            beyond.add((protocol, name))
+        elif name not in FAR.get(protocol, ()):
+            scores = expected_scores(protocol, name, seen.amount(name, times))
+            shares[name] = float(answers(protocol, name, scores, draws=40, rng=rng).right.mean())
+    assert beyond <= BEYOND
+    # of the 560 to 680 draws a rate of 95 % (99 %) itself would show 0.9 % (0.4 %) less by chance
+    assert np.mean(list(shares.values())) > target - 0.01, shares
+    # 32 of 40: a rate of 95 % shows less than that once in ten thousand causes
+    assert min(shares.values()) >= 0.8, shares
+
+
+@pytest.mark.parametrize("name", ["bearing_friction", "displacement_offset"])
+def test_twins_of_three_loading_steps_are_one_class(name):
+    """Without the way back and the force-free photo, friction of the bearings and a wrong zero both shift K0."""
+    found = record(Trial("hidden", "three", 31, (name,), 2.0))
+    assert set(found["set"]) >= {"bearing_friction", "displacement_offset"} and not found["alien"]
 
 
 @pytest.mark.parametrize("protocol", ["three", "six", "loop"])
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_nothing_is_named_where_nothing_is_hidden(protocol, seed):
     law = {11: Cable(), 12: Cable(EI0=0.03, EI1=0.005, kc=5.0, K0=1.2), 13: Cable(EI0=2e-4, EI1=1.5e-4, kc=3.0, K0=2.5)}
-    bench = bench_of(hidden_test(law[seed], PROTOCOLS[protocol], largest=LARGEST, seed=seed))
-    found, conclusion = names_found(bench)
-    assert found == [] and not conclusion.alien
+    conclusion = conclude(bench_of(hidden_test(law[seed], PROTOCOLS[protocol], largest=LARGEST, seed=seed)), SETTINGS)
+    assert conclusion.singles == [] and conclusion.accepted is None and not conclusion.alien
 
 
 def test_force_gain_is_never_seen_and_said_to_be_invisible():
@@ -177,12 +116,13 @@ def test_force_gain_is_never_seen_and_said_to_be_invisible():
 
 
 def test_three_loading_steps_show_a_growing_pre_curvature():
-    test = hidden_test(Cable(K0=0.6, K0_profile=growing(0.7)), THREE, largest=LARGEST, seed=5)
+    cable = Cable(K0=0.6, K0_profile=profile(0.7, PLAIN))
+    test = hidden_test(cable, THREE, largest=LARGEST, seed=5)
     part, _ = diagnose(test, None, SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "pre_curvature_varying"
     assert part.causes[0].estimate == pytest.approx(0.7, abs=0.01)
     assert part.gain.heldout_excess_removed > 0.9
-    assert f_error(part.extended, K0=0.6) < 0.02
+    assert f_error(part.extended, cable)[0] < 0.02
 
 
 def test_two_causes_are_both_found():
@@ -190,20 +130,16 @@ def test_two_causes_are_both_found():
     part, _ = diagnose(hidden_test(cable, LOOP, largest=LARGEST, seed=8), None, SETTINGS)
     assert part.verdict == "two_causes"
     assert {cause.name for cause in part.causes} == {"bearing_friction", "displacement_offset"}
-    assert f_error(part.extended) < 0.02
+    assert f_error(part.extended, cable)[0] < 0.02
 
 
-def test_an_effect_outside_the_catalogue_is_unexplained():
-    """Waves along the cable that come and go from step to step as no beam's do, a tenth of a millimetre high."""
+@pytest.mark.parametrize("alien", ["waves", "sticking"])
+def test_an_effect_outside_the_catalogue_is_unexplained(alien):
+    """Patterns from step to step that no cause makes, twelve sigma beside the best of them; shares are in the study."""
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)
-    steps = list(test.steps)
-    for index, size in ((2, 1.2e-4), (4, -1.6e-4), (5, 1.4e-4)):
-        shape = steps[index].shape
-        push = size * np.sin(5.0 * np.pi * shape.section_s / 0.181) ** 3
-        steps[index] = replace(steps[index], shape=replace(shape, section_y=shape.section_y + push))
-    part, _ = diagnose(replace(test, steps=tuple(steps)), None, SETTINGS)
+    part, _ = diagnose(with_alien(test, alien, 12.0 * alien_size("six", alien)), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
-    assert "shapes" in part.leftover["message"]
+    assert {"waves": "shapes", "sticking": "forces"}[alien] in part.leftover["message"]
 
 
 RENDERED = {
@@ -229,4 +165,4 @@ def test_through_rendered_photos(tmp_path, name):
         assert part.verdict == "adequate", part.headline
     else:
         assert part.verdict in ("named", "class") and name in part.causes[0].class_, part.headline
-        assert f_error(part.extended) < 0.02
+        assert f_error(part.extended, Cable())[0] < 0.02  # the experiment's law is that of the continuum's cable

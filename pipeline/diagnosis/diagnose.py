@@ -167,7 +167,8 @@ def _linear_gain(suspicion: Suspicion, cause: int) -> float:
 def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Leftover:
     fields = smooth_fields(bench.observation, bench.facts, rows=len(fitted.residual))
     rng = np.random.default_rng(settings.seed)
-    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng)
+    kind = bench.observation.rows.kind
+    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng, kind=kind)
 
 
 def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from fixtures import continuum
+from fixtures.memory import Slipping
 from pipeline.simulate import (
     EFFECTS,
     Experiment,
@@ -99,7 +100,7 @@ def test_linear_cable_has_the_exact_forces() -> None:
         ({"in_plane_load": (0.4, 0.2)}, {"load": (0.4, 0.2)}),
         (
             {"hysteresis": (2e-3, 3.0)},
-            {"memory": continuum.Slipping((2e-3 / 3, 1e-3 / 3, 2e-3 / 9), (1.0, 2.0, 3.0))},
+            {"memory": Slipping((2e-3 / 3, 1e-3 / 3, 2e-3 / 9), (1.0, 2.0, 3.0))},
         ),
     ],
     ids=lambda value: "-".join(value) or "ideal",

@@ -29,7 +29,6 @@ ELSEWHERE = (
     "pipeline/cli/",
     "pipeline/compare.py",
     "pipeline/diagnosis/rediscovery.py",
-    "pipeline/diagnosis/study",
     "pipeline/intake/template.py",
     "pipeline/predict.py",
     "pipeline/report/",
