@@ -202,6 +202,20 @@ class BearingSettings(StageSettings):
         (0.12, 0.16, 0.21, 0.28, 0.37),
         description="radii of a cover; sizes of a dot or screw on its axis that are tried",
     )
+    cover_radii_widths: tuple[float, float] = Field(
+        (0.9, 3.2),
+        description="widths of the cable; range of radii searched where no size is given: covers of 2 to 6 diameters,"
+        " and the mask may be a tenth wider or narrower than the cable",
+    )
+    same_radius: float = Field(
+        0.04, gt=0, lt=1, description="relative; covers of one rig are turned alike, light and blur move a rim less"
+    )
+    end_on_rim: float = Field(
+        0.4,
+        gt=0,
+        lt=1,
+        description="radii; how far from the rim the cable's mask may end: led straight on by a width at most",
+    )
     rim_tolerance: float = Field(
         0.015,
         gt=0,

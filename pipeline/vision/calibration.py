@@ -61,7 +61,7 @@ def from_found(
     if precise:
         scale = min(precise, key=lambda estimate: estimate.std_relative)
     else:
-        lengths = np.array([_length(cable.path_px) for cable in found])
+        lengths = np.array([cable.length_px for cable in found])
         scale = Scale(
             float(np.median(lengths)) / specimen.length_m,
             settings.length_scale_std,
@@ -70,10 +70,6 @@ def from_found(
     message = f"No scale is given; {scale.px_per_m / 1e3:.4g} px/mm follow from the {scale.source}."
     finding = Finding("scale/source", "info", message)
     return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,))
-
-
-def _length(path: Array) -> float:
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 def chords_px(found: list[RoughCable]) -> Array:

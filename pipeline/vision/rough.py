@@ -93,3 +93,8 @@ class RoughCable:
     weights: tuple[float, ...] = (1.0,)
     quality: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def length_px(self) -> float:
+        """Length of the path from axis to axis, px."""
+        return float(np.hypot(*np.diff(self.path_px, axis=0).T).sum())

@@ -8,6 +8,7 @@ A photo that cannot be measured is a `pipeline.records.Rejected` in its place; t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,8 +21,9 @@ from pipeline.vision.bearings import BearingHints, PixelPair
 from pipeline.vision.board import calibrate_by_board
 from pipeline.vision.calibration import Calibration, check_scale, from_found, from_number
 from pipeline.vision.centerline import measure_centerline
+from pipeline.vision.cover_size import cover_radius
 from pipeline.vision.judgement import Cable
-from pipeline.vision.photo import load_photo
+from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.plane import PlaneMap
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
@@ -82,7 +84,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         The calibration photos cannot be used.
     """
     calibration = _given_calibration(specimen, settings)
-    shots = _find_all(specimen, calibration, settings)
+    shots, cover_findings = _find_all_and_covers(specimen, calibration, settings)
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
     displacements = np.array([shot.step.displacement_m for shot in shots if isinstance(shot.found, RoughCable)])
     if calibration is None:
@@ -100,6 +102,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     found = [shot.found for shot in named if isinstance(shot.found, RoughCable)]
     findings = (
         *calibration.findings,
+        *cover_findings,
         *side_findings,
         *check_scale(specimen, calibration, found, displacements, settings.calibration),
         *_check_lengths(specimen, lines, settings.series),
@@ -116,7 +119,61 @@ def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibrat
     return None
 
 
-def _find_all(specimen: Specimen, calibration: Calibration | None, settings: VisionSettings) -> list[_Shot]:
+def _find_all_and_covers(
+    specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
+) -> tuple[list[_Shot], tuple[Finding, ...]]:
+    """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
+    shots = _find_all(specimen, calibration, settings)
+    found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
+    if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
+        return shots, ()
+    if calibration is not None:
+        lengths = [shot.found.length_px for shot in found if isinstance(shot.found, RoughCable)]
+        ratio = float(np.median(lengths)) / (calibration.scale.px_per_m * specimen.length_m)
+        if abs(ratio - 1.0) <= settings.series.max_length_deviation:
+            return shots, ()
+    ends = [found[0], found[-1]] if len(found) > 1 else found
+    radius = cover_radius(_with_photos(specimen, ends, settings), settings.bearings)
+    if radius is None:
+        return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
+    text = (
+        f"bearing_marker_mm is not given; round covers {2 * radius:.0f} px across are seen where the cable ends, their "
+        "centres are taken for the bearing axes."
+    )
+    again = _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
+    return again, (Finding("rig/covers-found", "info", text),)
+
+
+def _with_axes_shown(shot: _Shot) -> _Shot:
+    """Refuse a cable that vanishes under something: without a scale its length cannot show where the axis is."""
+    cable = shot.found
+    if isinstance(cable, Rejected):
+        return shot
+    clamps = [axis.center_px for axis in (cable.left, cable.right) if axis.kind == "clamp"]
+    if not clamps:
+        return shot
+    reason = (
+        f"{cable.image}: the cable vanishes under something at ({clamps[0][0]:.0f}, {clamps[0][1]:.0f}) px that is no "
+        "round cover, and without a scale nothing tells where the bearing axis is; give scale_px_per_mm, "
+        "bearing_marker_mm or bearings_px."
+    )
+    return replace(shot, found=Rejected(cable.image, "photo/bearing", reason))
+
+
+def _with_photos(
+    specimen: Specimen, shots: list[_Shot], settings: VisionSettings
+) -> Iterator[tuple[Photo, RoughCable]]:
+    """The photos once more: they are not kept, a series of them would not fit into memory."""
+    for shot in shots:
+        photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+        if isinstance(photo, Photo) and isinstance(shot.found, RoughCable):
+            yield photo, shot.found
+
+
+def _find_all(
+    specimen: Specimen, calibration: Calibration | None, settings: VisionSettings, *, cover_px: float | None = None
+) -> list[_Shot]:
+    """Find the cable on all photos; ``cover_px`` is the diameter of covers seen on them (px)."""
     shots: list[_Shot] = []
     near: RoughCable | None = None
     first: LoadStep | None = None
@@ -130,6 +187,8 @@ def _find_all(specimen: Specimen, calibration: Calibration | None, settings: Vis
             shots.append(_Shot(step, photo, None))
             continue
         cable = _expected(specimen, calibration, step.displacement_m - first.displacement_m)
+        if cover_px is not None:
+            cable = replace(cable, bearings=BearingHints(cover_px=cover_px))
         found = find_cable(photo, settings, cable=cable, near=near)
         near = found if isinstance(found, RoughCable) else near
         shots.append(_Shot(step, found, reduce_photo(photo, settings.preview)))

@@ -15,7 +15,7 @@ from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import trace_photo, trace_series
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
 
 SETTINGS = VisionSettings()
@@ -39,19 +39,22 @@ def series(
     scale_error: float | None = 0.0,
     drift_m: float = 0.0,
     covers: bool = True,
+    cover_m: float = COVER,
+    hands: tuple[Thing, ...] = (),
 ) -> Specimen:
     """Three photos of a cable pushed by one bearing; ``scale_error`` None leaves the scale out."""
     camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022)) if camera is None else camera
     steps, images = [], {}
     for i, curve in enumerate(CURVES):
         start = TRAVEL[i] if moving == "left" else 0.0
-        cover = Cover(COVER) if covers else None
+        cover = Cover(cover_m) if covers else None
         scene = Scene(
             Strand(curve, DIAMETER, Sheath((0.17,) * 3), (start, drift_m * i)),
             camera,
             (cover, cover),
             Light(gradient=(0.1, 0.0)),
             Ground("brushed", (0.75,) * 3, 0.02),
+            things=hands,
             sensor=Sensor(noise=0.01),
             seed=i,
         )
@@ -142,6 +145,27 @@ def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
     for line, curve in zip(lines(traces), CURVES, strict=True):
         assert line.chord_m == pytest.approx(curve.chord, abs=1e-5)
         assert line.axis_std_px == pytest.approx(SETTINGS.bearings.given_std_px, rel=0.2)
+
+
+@pytest.mark.parametrize(("diameter", "scale_error"), [(0.0098, 0.0), (0.025, None)])
+def test_covers_of_a_diameter_nobody_gave_are_found(tmp_path: Path, diameter: float, scale_error: float | None) -> None:
+    rig = RigSpec("left", None)
+    specimen = series(tmp_path, given=rig, cover_m=diameter, scale_error=scale_error)
+    traces = trace_series(specimen, SETTINGS)
+    assert "rig/covers-found" in {finding.code for finding in traces.findings}
+    assert not codes(traces)
+    for line, curve in zip(lines(traces), CURVES, strict=True):
+        std = np.hypot(line.chord_std_m, line.chord_m * traces.scale.std_relative)
+        assert line.chord_m == pytest.approx(curve.chord, abs=4 * std)
+        assert std < 2.5e-3 * curve.chord  # what three photos and the log tell of the scale, as with covers given
+
+
+def test_without_any_scale_a_cable_that_vanishes_is_refused(tmp_path: Path) -> None:
+    blocks = tuple(Thing("box", (x, 0.0), (0.03, 0.04)) for x in (-0.01, 0.18))
+    specimen = series(tmp_path, given=RigSpec("left", None), covers=False, hands=blocks, scale_error=None)
+    traces = trace_series(specimen, SETTINGS)
+    assert {photo.code for photo in traces.photos if isinstance(photo, Rejected)} == {"photo/bearing"}
+    assert len(traces.photos) == 3
 
 
 def test_bad_photos_are_refused_and_the_others_measured(tmp_path: Path) -> None:

@@ -1,0 +1,74 @@
+"""Round bearing covers whose diameter nobody gave: found by what the ends of the cable vanish under.
+
+``photos with a cable from visible end to visible end -> circles of 2 to 6 cable diameters at both ends -> one radius``
+
+A cable that vanishes ends on the rim of the cover, ahead of which the centre lies; a dot or screw of the right size
+lies too far ahead, a disc under a clamped end not far enough. One radius must serve both ends of several photos, all
+round: then it is what the user would have given as ``bearing_marker_mm``, and each photo is searched again with it.
+Units: px.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.covers import Radius, find_cover
+from pipeline.vision.ends import CableEnd
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import RoughCable
+
+
+def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSettings) -> float | None:
+    """Radius of the covers under which the cable's ends vanish.
+
+    Parameters
+    ----------
+    seen : iterable of (Photo, RoughCable)
+        Photos of one camera position with the cable from visible end to visible end; two tell as much as all.
+    settings : BearingSettings
+
+    Returns
+    -------
+    px or None
+        None unless one radius fits both ends on every photo.
+    """
+    radii = []
+    for photo, cable in seen:
+        for end in visible_ends(cable):
+            radius = _at_end(photo, end, 2.0 * cable.half_width_px, settings)
+            if radius is None:
+                return None
+            radii.append(radius)
+    if not radii or np.ptp(radii) > settings.same_radius * np.mean(radii):
+        return None
+    return float(np.median(radii))
+
+
+def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
+    """The first and the last point in which the cable is seen, with the direction in which it goes on."""
+    first, last = cable.visible
+    body = cable.path_px[first : last + 1]
+    gaps = np.hypot(*np.diff(body, axis=0).T)
+    back = min(max(1, round(2.0 * cable.half_width_px / float(np.median(gaps)))), len(body) - 1)
+    starts = body[0] - body[back], body[-1] - body[-1 - back]
+    ends = [CableEnd(place, way / np.hypot(*way)) for place, way in zip(body[[0, -1]], starts, strict=True)]
+    return ends[0], ends[1]
+
+
+def _at_end(photo: Photo, end: CableEnd, width_px: float, settings: BearingSettings) -> float | None:
+    """The smallest circle seen nearly all round whose rim is where the cable ends."""
+    low, high = settings.cover_radii_widths
+    # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
+    steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
+    for radius in np.geomspace(low, high, steps + 1):
+        expected = Radius(float(radius * width_px), 0.5 * settings.search_radii)
+        circle = find_cover(photo, end, expected, width_px, settings)
+        if circle is None or circle.rim < settings.sure_rim or circle.radius_std > settings.same_radius * circle.radius:
+            continue
+        ahead = float(np.hypot(*(np.array(circle.center) - end.place))) / circle.radius
+        if abs(ahead - 1.0) <= settings.end_on_rim:
+            return circle.radius
+    return None
