@@ -25,6 +25,7 @@ from scipy.special import ndtr
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Finding
 from pipeline.result import Result
+from pipeline.rounding import p_value as p_text
 from pipeline.rounding import plain, rounded
 from pipeline.settings.compare import CompareSettings
 from pipeline.visited import Visited, best, pre_curvature
@@ -33,6 +34,8 @@ Array = NDArray[np.float64]
 
 # Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it.
 DOUBTS = ("identify/scale", "identify/length", "identify/misfit-shape", "identify/misfit-force", "length/traced")
+# Misfit of the base model is no doubt about the answer of an extended one.
+EXPLAINED = ("identify/misfit-shape", "identify/misfit-force")
 TESTS = 2
 
 
@@ -188,12 +191,12 @@ def _verdict(
     stiffer = b.specimen.id if mean.difference > 0.0 else a.specimen.id
     seen = []
     if bent:
-        seen.append(f"the bending stiffness characteristic (p = {p:.2g}; {stiffer} is stiffer on the mean)")
+        seen.append(f"the bending stiffness characteristic ({p_text(p)}; {stiffer} is stiffer on the mean)")
     if set_off:
-        seen.append(f"the pre-curvature (by {rounded(rest.difference, rest.std)} 1/m, p = {rest.p_value:.2g})")
+        seen.append(f"the pre-curvature (by {rounded(rest.difference, rest.std)} 1/m, {p_text(rest.p_value)})")
     if seen:
         return "differ", f"{names} differ beyond their bands in {' and in '.join(seen)}. {size}."
-    found = f"{size}, which is within both bands (p = {p:.2g})"
+    found = f"{size}, which is within both bands ({p_text(p)})"
     seen_from = f"a mean difference of {plain(200 * mean.std / mean.a, 2)} % is twice its standard deviation"
     return "no difference seen", f"{names} do not differ beyond their bands: {found}; {seen_from}."
 
@@ -242,11 +245,12 @@ def _findings(
         message = f"One answers with the {curves[0].method} curve, the other with the {curves[1].method} one."
         yield Finding("compare/method", "warning", message)
     for result in (a, b):
-        doubts = [f.message.rstrip(".") + "." for f in result.findings if f.code in DOUBTS]
+        settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
+        doubts = [f.message.rstrip(".") for f in result.findings if f.code in DOUBTS and f.code not in settled]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
-            doubts.append("its simulation leaves a misfit that no known cause removes.")
+            doubts.append("its simulation leaves a misfit that no known cause removes")
         if doubts:
-            yield Finding("compare/doubt", "warning", f"{result.specimen.id}: {' '.join(doubts)}")
+            yield Finding("compare/doubt", "warning", f"{result.specimen.id}: {'; '.join(doubts)}.")
 
 
 def _scale_findings(a: Result, b: Result, mean: Difference) -> Iterator[Finding]:

@@ -202,7 +202,7 @@ def predict(
         raise ValueError(f"a cable cannot be {length} m long")
     test = model.bending_test(length, zero=zero, elements=settings.elements)
     steps = tuple(_step(test, model, float(d), extrapolate, settings) for d in displacements_m)
-    beyond = any(step.status in ("extrapolated", "refused") for step in steps)
+    limit = reachable(test, model) if any(step.status != "predicted" for step in steps) else None
     return Prediction(
         specimen=result.specimen.id,
         method=model.method,
@@ -211,8 +211,8 @@ def predict(
         pre_curvature_per_m=model.pre_curvature,
         pre_curvature_std_per_m=model.pre_curvature_std,
         visited_per_m=model.visited,
-        reachable_m=reachable(test, model) if beyond else None,
-        steps=steps,
+        reachable_m=limit,
+        steps=tuple(_explained(step, limit) for step in steps),
         findings=tuple(_findings(result, model)),
     )
 
@@ -261,6 +261,14 @@ def _step(
             return PredictedStep(displacement, "refused", reason, chord_m=step.chord, kappa_max_per_m=sharpest)
         status = "extrapolated"
     return replace(_with_bands(test, model, bent), displacement_m=displacement, status=status, reason=reason)
+
+
+def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
+    """A step without equilibrium that lies beyond the visited range: what the continued law does there says nothing."""
+    if step.status != "no equilibrium" or limit is None or step.displacement_m <= limit:
+        return step
+    reason = "bends the cable beyond the visited range, where its characteristic is not known"
+    return replace(step, status="refused", reason=reason)
 
 
 def _with_bands(test: BendingTest, model: IdentifiedModel, bent: tuple[Equilibrium, ...]) -> PredictedStep:

@@ -12,6 +12,7 @@ import math
 # Beyond these powers of ten a fixed-point number is mostly zeros and a reader miscounts them.
 LARGEST_FIXED = 5
 SMALLEST_FIXED = -4
+SMALLEST_P = 1e-4
 
 
 def rounded(value: float | None, std: float | None, *, decimal: str = ".") -> str:
@@ -60,6 +61,13 @@ def plain(value: float, digits: int = 3, *, decimal: str = ".", zeros: bool = Fa
         text = text.rstrip("0").rstrip(".") if "." in text and not zeros else text
         return text.replace(".", decimal)
     return f"{_fixed(value / 10.0**power, digits - 1, decimal)}·10{_superscript(power)}"
+
+
+def p_value(value: float, *, decimal: str = ".") -> str:
+    """Text of a p value as an equation; the tails below `SMALLEST_P` are not known to any formula."""
+    if value < SMALLEST_P:
+        return f"p < {plain(SMALLEST_P, decimal=decimal)}"
+    return f"p = {plain(value, 2, decimal=decimal)}"
 
 
 def _decimals(std: float) -> int:

@@ -68,7 +68,7 @@ def as_document(comparison: Comparison) -> dict[str, object]:
 
 def echo_comparison(comparison: Comparison) -> None:
     """The statement, the numbers behind it, and what makes it doubtful."""
-    from pipeline.rounding import plain, rounded
+    from pipeline.rounding import p_value, plain, rounded
 
     click.echo(comparison.statement)
     if comparison.range_per_m is not None:
@@ -81,9 +81,9 @@ def echo_comparison(comparison: Comparison) -> None:
             f"mean stiffness: {plain(1e3 * mean.a, 4)} and {plain(1e3 * mean.b, 4)} mN m², difference {change} %"
         )
     if rest is not None:
-        click.echo(f"pre-curvature: difference {rounded(rest.difference, rest.std)} 1/m, p = {rest.p_value:.2g}")
+        click.echo(f"pre-curvature: difference {rounded(rest.difference, rest.std)} 1/m, {p_value(rest.p_value)}")
     if comparison.p_characteristic is not None:
-        p, level = comparison.p_characteristic, comparison.level
-        click.echo(f"characteristic: p = {p:.2g}; level of both tests together {level:g}")
+        text, level = p_value(comparison.p_characteristic), comparison.level
+        click.echo(f"characteristic: {text}; level of both tests together {level:g}")
     for finding in comparison.findings:
         click.echo(f"{finding.level}: {finding.message} [{finding.code}]", err=True)

@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 MISSING = 3
 
 
-def millimetres(ctx: click.Context, parameter: click.Parameter, text: str) -> list[float]:
-    """Numbers between commas."""
+def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[float]:
+    """Numbers between commas, of every time the option is given."""
     try:
-        return [float(number) for number in text.split(",")]
+        return [float(number) for text in texts for number in text.split(",")]
     except ValueError as error:
-        raise click.BadParameter(f"{text!r} is no list of numbers such as 5,10,15.") from error
+        raise click.BadParameter(f"{' '.join(texts)!r} is no list of numbers such as 5,10,15.") from error
 
 
 @click.command(short_help="Forces and shapes of a new experiment.")
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option(
-    "--displacement-mm", "displacements_mm", required=True, callback=millimetres, metavar="MM[,MM...]",
-    help="Displacement of each step.",
+    "--displacement-mm", "displacements_mm", required=True, multiple=True, callback=millimetres,
+    metavar="MM[,MM...]", help="Displacement of each step; repeatable.",
 )  # fmt: skip
 @click.option("--length-mm", type=click.FloatRange(min=0, min_open=True), help="Cable length; that of the specimen.")
 @click.option(

@@ -11,9 +11,10 @@ from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
-from pipeline.visited import best, curves
+from pipeline.visited import Visited, best, curves
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
+K0_WAYS = ("photo", "balance", "inverse", "all")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
 
@@ -63,8 +64,8 @@ def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
         verdict=verdict,
         tone=tone,
         pre_curvatures=tuple(
-            (words(f"k0_{way}") if way in ("photo", "balance", "inverse") else way, words.measured(value, std))
-            for way, (value, std) in pre_curvatures(result).items()
+            (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
+            for way, (value, std) in _all_pre_curvatures(result).items()
         ),
     )
 
@@ -78,6 +79,15 @@ def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
         if part is not None and part.pre_curvature_per_m is not None:
             found.setdefault(way, (part.pre_curvature_per_m, part.pre_curvature_std_per_m))
     return found
+
+
+def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
+    """K0 by sources that are independent of each other, then by the fit to all photos, the free cable's included."""
+    sources = pre_curvatures(result)
+    part = result.inverse
+    if part is None or part.pre_curvature_per_m is None or "photo" not in sources:
+        return sources
+    return {**sources, "all": (part.pre_curvature_per_m, part.pre_curvature_std_per_m)}
 
 
 def _sentence(result: Result, words: Words) -> str:
@@ -102,11 +112,17 @@ def _sentence(result: Result, words: Words) -> str:
         low=words.curvature(curve.kappa[0]),
         high=words.curvature(curve.kappa[-1]),
     )
-    known = pre_curvatures(result)
+    rest = at_rest(result, curve)
+    return text if rest is None else f"{text} {words('answer_pre_curvature', value=words.measured(*rest))}"
+
+
+def at_rest(result: Result, curve: Visited) -> tuple[float, float | None] | None:
+    """K0 as the report answers with, 1/m: by the way the curve comes from, with all of its data; else by the photo."""
+    part = {"inverse": result.inverse, "balance": result.balance}.get(curve.method)
+    if part is not None and part.pre_curvature_per_m is not None:
+        return part.pre_curvature_per_m, part.pre_curvature_std_per_m
     # an extended model takes the place of the fit that was found wanting; what the photo shows stands in any case
-    ways = ("photo",) if curve.method == "extended" else ("inverse", "balance", "photo")
-    way = next((way for way in ways if way in known), None)
-    return text if way is None else f"{text} {words('answer_pre_curvature', value=words.measured(*known[way]))}"
+    return pre_curvatures(result).get("photo")
 
 
 def _together(quantity: str) -> str:
@@ -160,7 +176,8 @@ def _advice(result: Result, words: Words) -> str:
         names = ", ".join(words.cause(name) for name in experiment.separates)
         what = words.said(experiment.what).text
         what = what[:1].upper() + what[1:]
-        return words("next_what", what=what, causes=names) if names else what
+        key = "next_what" if len(experiment.separates) > 1 else "next_settles"
+        return words(key, what=what, causes=names) if names else what
     if any(finding.level != "info" for finding in result.findings):
         return words("next_findings")
     return words("next_none")

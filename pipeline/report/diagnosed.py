@@ -70,10 +70,18 @@ def diagnosis_view(
             for spot in part.blind_spots
         ],
         next_what=words.said(following.what).sentence if following else "",
-        next_separates=", ".join(words.cause(name) for name in following.separates) if following else "",
+        next_separates=_separates(following.separates, words) if following else "",
         leftover=_sentences(part.leftover, words) if part.verdict != "adequate" else [],
         figures=_figures(part, words, settings) if figures else {},
     )
+
+
+def _separates(names: list[str], words: Words) -> str:
+    """What an experiment separates, or settles if it is one cause alone."""
+    if not names:
+        return ""
+    key = "next_separates" if len(names) > 1 else "next_settled"
+    return words(key, names=", ".join(words.cause(name) for name in names))
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:

@@ -17,7 +17,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from pipeline.report.answer import pre_curvatures
+from pipeline.report.answer import at_rest
 from pipeline.report.document import asset, environment, palette_css, write_report
 from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
@@ -56,7 +56,7 @@ class IndexRow:
 
 def index_row(result: Result, report: str, settings: ReportSettings) -> IndexRow:
     """Row of one result; ``report`` is the path of its report relative to the index, empty if there is none."""
-    known = pre_curvatures(result)
+    curve = best(result)
     troubles = [f for f in result.findings if f.level == "error"] + [f for f in result.findings if f.level == "warning"]
     return IndexRow(
         id=result.specimen.id,
@@ -64,8 +64,8 @@ def index_row(result: Result, report: str, settings: ReportSettings) -> IndexRow
         type=result.specimen.description.get("type", ""),
         status=result.status,
         verdict=result.diagnosis.verdict if result.diagnosis else "none",
-        curve=_thinned(best(result), settings.index_curve_points),
-        pre_curvature=next((known[way] for way in ("inverse", "balance", "photo") if way in known), None),
+        curve=_thinned(curve, settings.index_curve_points),
+        pre_curvature=at_rest(result, curve) if curve else None,
         rms_relative=result.agreement.rms_relative if result.agreement else None,
         compatible=result.agreement.compatible if result.agreement else None,
         photos_used=sum(photo.status == "traced" for photo in result.photos),

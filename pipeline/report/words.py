@@ -13,10 +13,9 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.report.german import in_german
-from pipeline.rounding import plain, rounded
+from pipeline.rounding import p_value, plain, rounded
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
-SMALLEST_P = 1e-4
 LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 
 
@@ -112,10 +111,9 @@ class Words:
         return plain(value, 3, decimal=self.decimal, zeros=True)
 
     def probability(self, value: float, *, name: str = "") -> str:
-        """A p value, with ``name`` as an equation; tails beyond `SMALLEST_P` are not known to any formula."""
-        if value < SMALLEST_P:
-            return f"{name} < {self.number(SMALLEST_P)}".strip()
-        return f"{name} = {self.number(value, 2)}" if name else self.number(value, 2)
+        """A p value, with ``name`` as an equation; see `pipeline.rounding.p_value`."""
+        text = p_value(value, decimal=self.decimal)
+        return text.replace("p", name, 1) if name else text.removeprefix("p ").removeprefix("= ")
 
     def measured(self, value: float | None, std: float | None) -> str:
         """A measured number with its standard deviation."""
