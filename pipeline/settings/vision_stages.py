@@ -125,8 +125,14 @@ class SegmentationSettings(StageSettings):
     level_factors: tuple[float, ...] = Field(
         (0.5, 2.0, 0.25), description="ratios to Otsu's level that are tried next: texture may push it up or down"
     )
+    higher_levels: int = Field(
+        2, ge=0, description="levels tried above Otsu's, each splits what stands above the last: shadow, then cable"
+    )
     least_level: float = Field(
-        5.0, gt=0, description="sigmas of the ground; the last level at which a cable may be found"
+        5.0, gt=0, description="sigmas of the ground; a strip above it is no play of noise and texture"
+    )
+    lowest_level: float = Field(
+        3.0, gt=0, description="sigmas of the ground; the last level that is tried, below it noise makes strips"
     )
     max_judged_pictures: int = Field(
         4, ge=1, description="readings with a long strip that are judged; what four of them refuse is not the cable"
@@ -134,20 +140,49 @@ class SegmentationSettings(StageSettings):
     max_covered_share: float = Field(
         0.5, gt=0, le=1, description="share of the photo; a mask that covers more is ground, not cable"
     )
-    crossing_level_dark: float = Field(
+    pair_pooling_widths: float = Field(
+        1.0, gt=0, description="widths; sections pooled for the pair of edges: letters are shorter, bends longer"
+    )
+    pair_search_widths: float = Field(
+        0.6, gt=0, description="widths; a shadow as wide as the cable draws the mask's middle half a width aside"
+    )
+    pair_wander_cost: float = Field(
+        0.5,
+        ge=0,
+        description="usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay",
+    )
+    pair_width_range: tuple[float, float] = Field(
+        (0.45, 1.6), description="ratios to the width that are tried: half a cable along a highlight, and a shadow's"
+    )
+    pair_widths: int = Field(26, ge=5, description="widths tried, 5 % apart; the edges are then sought in 15 %")
+    pair_width_std: float = Field(
+        0.25, gt=0, description="logarithm; how far a given diameter may be off before the edges count for less"
+    )
+    pair_width_doubt: float = Field(
         0.6,
         gt=0,
         lt=1,
-        description="share of the contrast at which a dark cable's edge is taken: above a cast shadow's",
+        description="weight of a pair far off the given width: diameters are mistyped",
     )
-    crossing_level_bright: float = Field(
-        0.35, gt=0, lt=1, description="share of the contrast; a bright round sheath falls off toward its flanks"
+    pair_width_share: float = Field(
+        0.9, gt=0, lt=1, description="ratio to the best pair's score from which a wider pair is preferred"
+    )
+    edge_reach_widths: float = Field(
+        0.15, gt=0, lt=0.5, description="widths; an edge is sought so far about the pair's place: steps of 5 %, noise"
+    )
+    least_edge_share: float = Field(
+        0.15, gt=0, lt=1, description="ratio to the usual steepest slope; a flatter place is no edge: half is shade"
+    )
+    texture_widths: float = Field(
+        12.0,
+        gt=0,
+        description="widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter",
     )
     smoothing_widths: float = Field(
         0.8, gt=0, description="widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03"
     )
     accepted_width_ratio: tuple[float, float] = Field(
-        (0.6, 1.35), description="ratio of half-level width to diameter; a bright round sheath is dark at its flanks"
+        (0.65, 1.35), description="ratio of the edges' distance to the diameter; a sheath may be dark at its flanks"
     )
     max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
     seen_share: float = Field(

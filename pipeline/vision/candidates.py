@@ -103,10 +103,11 @@ def approaches_itself(path: Array, width: float) -> bool:
 def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tuple[Image, float]]:
     """Pictures in ground sigmas and levels, the likeliest first."""
     distance = standout.distance()
-    otsu = _otsu(distance)
+    otsu, *higher = _levels(distance, settings)
     yield distance, otsu
-    for factor in settings.level_factors:
-        yield distance, factor * otsu
+    for level in (*higher, *(factor * otsu for factor in settings.level_factors)):
+        if level > settings.lowest_level:
+            yield distance, level
     channels = standout.residual.shape[2]
     directions = [np.full(channels, 1.0 / channels)]
     if channels == 3:  # blue, green, red
@@ -115,20 +116,29 @@ def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tu
         signed = standout.along(direction)
         for sign in (-1.0, 1.0):
             picture = np.maximum(np.float32(sign) * signed, 0.0)
-            level = _otsu(picture)
+            level, *higher = _levels(picture, settings)
             if level > settings.least_level:
-                yield picture, level
-                yield picture, 0.5 * level
-    for level in (settings.least_level, 0.6 * settings.least_level):
+                for tried in (level, *higher, 0.5 * level):
+                    yield picture, tried
+    for level in (settings.least_level, settings.lowest_level):
         yield distance, level
 
 
-def _otsu(picture: Image) -> float:
-    """Otsu's threshold on the square root: noise and strong things get a like share of the range."""
+def _levels(picture: Image, settings: SegmentationSettings) -> list[float]:
+    """Otsu's level, and those that split what stands above it once more: ground, shadow and cable are three classes.
+
+    Levels are sought on the square root: noise and strong things get a like share of the range.
+    """
     top = float(picture.max()) + 1e-9
     coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
-    code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
-    return max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9)
+    levels: list[float] = []
+    for _ in range(1 + settings.higher_levels):
+        code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
+        levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
+        coded = coded[coded > code]
+        if coded.size < 2:
+            break
+    return levels
 
 
 def _readings(picture: Image, level: float, wanted: Wanted, settings: SegmentationSettings) -> Iterator[Reading]:

@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout
+from pipeline.vision.flanks import find_flanks
 
 _MAD_TO_STD = 1.4826
 
@@ -30,13 +31,13 @@ class CrossCut:
     path : (k, 2) cells
         Refined middle.
     width : (k,) cells
-        Between the outermost level crossings; NaN where one is missing.
+        Between the two edges; NaN where one is not seen.
     step : (k,) fraction of full range
         Core minus ground along ``weights``, positive where the section looks like the cable.
     contrast : float
         Median of ``step``.
     texture : float
-        Standard deviation of the ground beside the cable along ``weights``.
+        Standard deviation of the ground beside the cable along ``weights``, at least that of rounding.
     weights : (c,)
         Colour projection in which the cable stands out best, sum of absolute values 1.
     dark : bool
@@ -71,12 +72,13 @@ def path_normals(path: Array) -> tuple[Array, Array]:
     return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
-def cut_across(standout: Standout, path: Array, width: float, settings: SegmentationSettings) -> CrossCut:
-    """Measure the strip along a path, given its approximate width.
+def cut_across(
+    standout: Standout, path: Array, width: float, settings: SegmentationSettings, *, known: bool = False
+) -> CrossCut:
+    """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; a box of
-    the cable's width slides across each section to centre it (blind to highlights and writing); level crossings
-    from outside give the width.
+    Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
+    of edges one width apart gives middle and width of each section (`pipeline.vision.flanks`).
     """
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
@@ -91,19 +93,21 @@ def cut_across(standout: Standout, path: Array, width: float, settings: Segmenta
     ground = np.median(grey[:, flank], axis=1)
     sign = -1.0 if np.median(np.median(grey[:, core], axis=1) - ground) < 0 else 1.0
     relief = sign * (grey - ground[:, None])
-    shift = _centre(relief, offsets, width)
-    step = np.nanmedian(np.where(np.abs(offsets - shift[:, None]) < 0.35 * width, relief, np.nan), axis=1)
-    contrast = float(np.median(step))
-    level = settings.crossing_level_dark if sign < 0 else settings.crossing_level_bright
-    left, right = _outer_crossings(relief, offsets, shift, level * contrast, width)
-    middle = np.where(np.isfinite(left + right), 0.5 * (left + right), shift)
-    texture = _MAD_TO_STD * float(np.median(np.abs(grey[:, flank] - ground[:, None])))
+    flanks = find_flanks(relief, offsets, width, settings, known=known)
+    inner = np.abs(offsets - flanks.middle[:, None]) < 0.35 * flanks.width
+    step = np.nanmedian(np.where(inner, relief, np.nan), axis=1)
+    # a shadow runs along the cable: it is no texture, and what texture does along the path it does across, too
+    beside = grey[:, flank] - ground[:, None]
+    beside = beside - gaussian_filter1d(beside, settings.texture_widths * width, axis=0, mode="nearest")
+    texture = float(np.hypot(_MAD_TO_STD * np.median(np.abs(beside)), settings.min_ground_std))
+    both = np.isfinite(flanks.left + flanks.right)
+    middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width, mode="nearest")
     return CrossCut(
         path=path + normal * middle[:, None],
-        width=right - left,
+        width=flanks.right - flanks.left,
         step=step,
-        contrast=contrast,
+        contrast=float(np.median(step)),
         texture=texture,
         weights=weights,
         dark=sign < 0,
@@ -123,35 +127,3 @@ def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance:
     # One sign convention: brightness counts positive, so "dark" means dark to a person wherever that makes sense.
     weights *= 1.0 if weights.sum() >= 0 else -1.0
     return np.asarray(weights / (np.abs(weights).sum() + 1e-300))
-
-
-def _centre(relief: NDArray[np.float32], offsets: Array, width: float) -> Array:
-    """Offset at which a box of the cable's width fits each section best, pooled over a few sections."""
-    pooled = gaussian_filter1d(relief, 0.5 * width, axis=0, mode="nearest")
-    spacing = offsets[1] - offsets[0]
-    size = max(3, round(width / spacing))
-    capped = np.clip(pooled, -np.inf, np.median(pooled[:, np.abs(offsets) < 0.35 * width]))
-    box = cv2.blur(capped.astype(np.float32), (size, 1), borderType=cv2.BORDER_REPLICATE)
-    near = np.abs(offsets) <= 0.6 * width
-    return np.asarray(offsets[near][np.argmax(box[:, near], axis=1)])
-
-
-def _outer_crossings(
-    relief: NDArray[np.float32], offsets: Array, shift: Array, level: float, width: float
-) -> tuple[Array, Array]:
-    """Level crossings farthest from the middle but within 0.9 widths of it; NaN where there is none."""
-    distance = offsets[None, :] - shift[:, None]
-    above = (relief > level) & (np.abs(distance) <= 0.9 * width)
-    rows = np.arange(len(relief))
-    first = np.argmax(above, axis=1)
-    last = relief.shape[1] - 1 - np.argmax(above[:, ::-1], axis=1)
-    spacing = offsets[1] - offsets[0]
-
-    def crossing(inside: NDArray[np.intp], direction: int) -> Array:
-        outside = np.clip(inside + direction, 0, relief.shape[1] - 1)
-        a, b = relief[rows, inside], relief[rows, outside]
-        share = np.clip((a - level) / np.where(a > b, a - b, np.inf), 0.0, 1.0)
-        found = above.any(axis=1) & (np.abs(distance[rows, inside]) < 0.9 * width - spacing)
-        return np.where(found, offsets[inside] + direction * share * spacing, np.nan)
-
-    return crossing(first, -1), crossing(last, 1)

@@ -54,8 +54,10 @@ def judge_strip(
 ) -> RoughCable | Rejected:
     """One strip: is it the cable? The checks run from what misleads most to what misleads least."""
     stage = settings.segmentation
-    cut = cut_across(standout, strip.path, reading.width, stage)
-    if cut.contrast < stage.min_contrast_to_noise * cut.texture:
+    cut = cut_across(standout, strip.path, reading.width, stage, known=cable.diameter_px is not None)
+    faint = cut.contrast < stage.min_contrast_to_noise * cut.texture
+    # Beside a crossing lies more cable, which is no texture; what hardly stands out shows no crossing either.
+    if faint and reading.level < stage.least_level:
         return _too_faint(photo, cut.contrast / cut.texture, stage)
     if branches(strip, reading, stage) or approaches_itself(strip.path, reading.width):
         place = standout.to_pixels(strip.path[len(strip.path) // 2])
@@ -67,11 +69,13 @@ def judge_strip(
             u_px=float(place[0]),
             v_px=float(place[1]),
         )
+    if faint:
+        return _too_faint(photo, cut.contrast / cut.texture, stage)
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
-    cut = cut_across(standout, path, reading.width, stage)
+    cut = cut_across(standout, path, reading.width, stage, known=cable.diameter_px is not None)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, settings)
 

@@ -1,0 +1,140 @@
+"""The two flanks of a cable on its straightened picture: pairs of opposite edges, one cable's width apart.
+
+``relief (sections x offsets) -> slope -> width and course of the best pair of edges -> both edges of each section``
+
+A shadow beside the cable, a highlight on it and writing all make edges, and a mask takes in what is dark enough; but
+only the cable has two edges of opposite sign at one distance all along. The pair is sought by its slopes: a soft shadow
+has little slope whatever its depth.
+All lengths in cells; relief is positive where a section looks like the cable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import SegmentationSettings
+
+
+@dataclass(frozen=True)
+class Flanks:
+    """Both edges of the strip on each section: ``left``, ``right`` (n,) offsets, NaN where an edge is not seen."""
+
+    left: Array
+    right: Array
+    middle: Array
+    width: float
+
+
+def find_flanks(
+    relief: NDArray[np.float32], offsets: Array, width: float, settings: SegmentationSettings, *, known: bool
+) -> Flanks:
+    """Edges of the cable.
+
+    Parameters
+    ----------
+    relief : (n, m)
+        Straightened picture, sections one cell apart; positive in the cable.
+    offsets : (m,)
+        Evenly spaced.
+    width : cells
+        The cable's if ``known``, else that of the mask, which a shadow may have widened.
+    known : bool
+
+    Returns
+    -------
+    Flanks
+        ``middle`` is the pair's middle on each section, also where an edge is not seen; ``width`` that of the pair.
+    """
+    spacing = float(offsets[1] - offsets[0])
+    soft = cv2.GaussianBlur(relief, (0, 0), max(0.8, 0.08 * width / spacing), borderType=cv2.BORDER_REPLICATE)
+    slope = np.gradient(soft, spacing, axis=1)
+    # The flanks of most sections tell how strong an edge is; letters and glare count no more than that.
+    usual = float(np.median(np.abs(slope).max(axis=1)))
+    pooling = settings.pair_pooling_widths * width
+    rise, fall = (
+        gaussian_filter1d(np.clip(edge, 0.0, usual), pooling, axis=0, mode="nearest") for edge in (slope, -slope)
+    )
+    near = np.abs(offsets) <= settings.pair_search_widths * width
+    best = _pair_width(rise, fall, offsets, near, width, known, settings)
+    score = _pair_score(rise, fall, offsets, best)[:, near]
+    middle = offsets[near][_best_course(score, settings.pair_wander_cost * usual)]
+    least = settings.least_edge_share * usual
+    slope = gaussian_filter1d(slope, pooling, axis=0, mode="nearest")
+    left = _steepest(slope, offsets, middle - 0.5 * best, settings.edge_reach_widths * best, least)
+    right = _steepest(-slope, offsets, middle + 0.5 * best, settings.edge_reach_widths * best, least)
+    return Flanks(left, right, middle, best)
+
+
+def _pair_score(rise: Array, fall: Array, offsets: Array, width: float) -> Array:
+    """Strength ``(n, m)`` of a pair of edges ``width`` apart about each offset; the weaker edge counts twice."""
+    half = 0.5 * width / float(offsets[1] - offsets[0])
+    first, second = _shifted(rise, -half), _shifted(fall, half)
+    return np.asarray(first + second + np.minimum(first, second))
+
+
+def _shifted(values: Array, by: float) -> Array:
+    """Values ``by`` columns farther on, linear between columns, 0 outside."""
+    columns = np.arange(values.shape[1]) + by
+    low = np.floor(columns).astype(int)
+    share = columns - low
+    padded = np.pad(values, ((0, 0), (1, 2)))
+    at = np.clip(low + 1, 0, values.shape[1] + 1)
+    return np.asarray((1.0 - share) * padded[:, at] + share * padded[:, at + 1])
+
+
+def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
+    """Column on each row so that the sum of scores, less ``cost`` for each column moved, is largest.
+
+    Rows are one cell apart, so a course moves by one column from row to row at most (dynamic programming).
+    """
+    total, moves = score[0].copy(), np.zeros(score.shape, np.int8)
+    for row in range(1, len(score)):
+        padded = np.pad(total, 1, constant_values=-np.inf)
+        reached = np.stack([padded[1:-1], padded[:-2] - cost, padded[2:] - cost])
+        moves[row] = np.array([0, -1, 1], np.int8)[np.argmax(reached, axis=0)]
+        total = reached.max(axis=0) + score[row]
+    course = np.empty(len(score), np.intp)
+    course[-1] = np.argmax(total)
+    for row in range(len(score) - 1, 0, -1):
+        course[row - 1] = course[row] + moves[row, course[row]]
+    return course
+
+
+def _pair_width(
+    rise: Array,
+    fall: Array,
+    offsets: Array,
+    near: NDArray[np.bool_],
+    width: float,
+    known: bool,
+    settings: SegmentationSettings,
+) -> float:
+    """Distance of the edges that fits best along the whole strip.
+
+    An unknown width is the largest of nearly the best ones: a highlight splits a cable, nothing doubles it.
+    """
+    tried = width * np.geomspace(*settings.pair_width_range, settings.pair_widths)
+    totals = np.array([_pair_score(rise, fall, offsets, each)[:, near].max(axis=1).mean() for each in tried])
+    if known:
+        trust = np.exp(-0.5 * (np.log(tried / width) / settings.pair_width_std) ** 2)
+        return float(tried[np.argmax(totals * (settings.pair_width_doubt + (1.0 - settings.pair_width_doubt) * trust))])
+    return float(tried[np.flatnonzero(totals > settings.pair_width_share * totals.max())[-1]])
+
+
+def _steepest(slope: Array, offsets: Array, about: Array, reach: float, least: float) -> Array:
+    """Offset of the steepest place within ``reach`` of ``about``, by a parabola; NaN where it is flat there."""
+    inside = np.abs(offsets - about[:, None]) <= reach
+    place = np.argmax(np.where(inside, slope, -1.0), axis=1)
+    rows, spacing = np.arange(len(slope)), float(offsets[1] - offsets[0])
+    inner = np.clip(place, 1, slope.shape[1] - 2)
+    before, here, after = (slope[rows, inner + k] for k in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, 1.0), 0.0)
+    found = (slope[rows, place] >= least) & inside.any(axis=1)
+    return np.where(found, offsets[inner] + np.clip(shift, -0.5, 0.5) * spacing, np.nan)
