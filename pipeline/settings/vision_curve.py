@@ -64,7 +64,21 @@ class CurveSettings(BaseModel):
         12.0, gt=3, description="px; more sheath or ground than this adds texture, not knowledge of the edge"
     )
     small_radius_px: float = Field(
-        15.0, gt=0, description="px; thinner cables leave no room for shading: plain error function without ramps"
+        15.0,
+        gt=0,
+        description="px; thinner cables leave little room for shading: plain error function, see ramps_worth",
+    )
+    ramps_worth: float = Field(
+        1.5,
+        ge=1,
+        description="ratio of the widths' errors by the plain error function to those with ramps, above which a thin"
+        " cable's edges get ramps all the same: they double the scatter, which a ratio near 1 does not repay",
+    )
+    width_play: float = Field(
+        0.04,
+        ge=0,
+        description="of the width; so much it may be off the expected one throughout: scales and diameters are known to"
+        " some percent, and what both edges are off alike leaves the midline in place",
     )
     profile_windows: int = Field(
         16, ge=1, description="along the cable; in each, blur and shading of the edges are found: light turns slowly"

@@ -161,8 +161,7 @@ def _assemble(
     metres = float(np.median(width / sections.width))
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, light_std, light_length)
-    excess = _width_excess(fit, width, options)
-    covariance += (excess**2 - 1.0) * fit.smooth.covariance
+    covariance *= _width_excess(fit, width, covariance, options) ** 2
     length_std = _length_std(fit, s, covariance)
     # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
     covariance[0, 0] += chord.axis_std**2
@@ -284,18 +283,18 @@ def _with_light(fit: CurveFit, std: float, length: float) -> Array:
     return np.asarray(fit.smooth.covariance + fit.smooth.gain @ light @ fit.smooth.gain.T)
 
 
-def _width_excess(fit: CurveFit, width: Array, options: CurveSettings) -> float:
-    """Ratio, at least 1, of the errors of the curvature to those that the scatter about the curve tells.
+def _width_excess(fit: CurveFit, width: Array, covariance: Array, options: CurveSettings) -> float:
+    """Ratio, at least 1, of the errors of the curvature to those that scatter and light tell.
 
     The cable's width is constant, so half of what the measured width varies is an error of the edges that no bend of
     the cable can pass for: carried through the fit like the midline's, it is what the midline's errors do to kappa.
+    The ratio is that of each point: the ends, ten times less certain than the rest, would speak for all.
     """
     used = fit.weight > 0.0
     half, s = 0.5 * (width - np.median(width))[used], fit.s[used]
     bend = fit.curve.bases(s)[2]
-    apparent = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half)) ** 2)))
-    stated = float(np.sqrt(np.mean(_std(bend, fit.smooth.covariance) ** 2)))
-    return apparent / stated if apparent > options.width_excess * stated else 1.0
+    ratio = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half) / _std(bend, covariance)) ** 2)))
+    return ratio if ratio > options.width_excess else 1.0
 
 
 def _length_std(fit: CurveFit, s: Array, covariance: Array) -> float:

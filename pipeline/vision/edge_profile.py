@@ -89,12 +89,11 @@ def profile(offset: Real, place: Real, blur: Real) -> tuple[Real, Real, Real, Re
     return cumulative, -inside, outside, density / blur
 
 
-def fit_profiles(pixels: Pixels, s: Array, *, ramps: bool, blur: float, settings: CurveSettings) -> Profiles:
-    """Profiles in windows of neighbouring sections.
+def fit_profiles(pixels: Pixels, s: Array, *, blur: float, settings: CurveSettings) -> tuple[Profiles, Profiles]:
+    """Profiles in windows of neighbouring sections: with ramps, and by the plain error function without them.
 
-    Without ``ramps`` the places are those of the plain error function; the fit with ramps is made all the same, for
-    the difference. Medians over the rows come first: letters cover less than half of any line along the cable, and a
-    mean would take them for the sheath.
+    Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take
+    them for the sheath.
     """
     count = min(settings.profile_windows, max(1, len(s) // 4))
     each = len(s) // count
@@ -120,22 +119,26 @@ def fit_profiles(pixels: Pixels, s: Array, *, ramps: bool, blur: float, settings
         pooled = _pool(offset, value, cell, keep, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
-    used, linear = (full, full_linear) if ramps else (plain, plain_linear)
-    step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
-    shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
-    by_side = shape.T.reshape(5, 2, count)
-    noise = _scatter(_misfit(offset, value, np.column_stack([used, linear])))
-    return Profiles(
-        s=s[chosen].reshape(count, each).mean(axis=1),
-        place=used[:, 0].reshape(2, count),
-        blur=by_side[0],
-        level=by_side[1],
-        step=by_side[2],
-        inside=by_side[3],
-        outside=by_side[4],
-        shift=(full[:, 0] - plain[:, 0]).reshape(2, count),
-        noise=noise.reshape(2, count),
-    )
+    shift = (full[:, 0] - plain[:, 0]).reshape(2, count)
+
+    def profiles(used: Array, linear: Array) -> Profiles:
+        step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
+        shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
+        by_side = shape.T.reshape(5, 2, count)
+        noise = _scatter(_misfit(offset, value, np.column_stack([used, linear])))
+        return Profiles(
+            s=s[chosen].reshape(count, each).mean(axis=1),
+            place=used[:, 0].reshape(2, count),
+            blur=by_side[0],
+            level=by_side[1],
+            step=by_side[2],
+            inside=by_side[3],
+            outside=by_side[4],
+            shift=shift,
+            noise=noise.reshape(2, count),
+        )
+
+    return profiles(full, full_linear), profiles(plain, plain_linear)
 
 
 def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:

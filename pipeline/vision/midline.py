@@ -109,9 +109,10 @@ def measure_sections(
     least = settings.edge_window_blurs * blur + 0.5  # half a pixel for what the path may be off
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(np.median(np.diff(s))))
-    ramps = half_width >= settings.small_radius_px
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    profiles = fit_profiles(pixels, s, ramps=ramps, blur=max(blur, 0.5), settings=settings)
+    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings)
+    thin = half_width < settings.small_radius_px
+    profiles = plain if thin and _serves(plain, shaded, half_width, diameter, settings) else shaded
     edges = fit_edges(pixels, s, profiles, settings=settings)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
@@ -143,6 +144,19 @@ def measure_sections(
         blur=float(np.median(profiles.blur)),
         asymmetry=_asymmetry(step),
     )
+
+
+def _serves(
+    plain: Profiles, shaded: Profiles, half_width: float, diameter: float | None, settings: CurveSettings
+) -> bool:
+    """True unless widths by the plain error function are far less constant, or less like the cable's, than by ramps."""
+
+    def unlike(profiles: Profiles) -> float:
+        width = profiles.place.sum(axis=0) + 2.0 * half_width
+        off = 0.0 if diameter is None else abs(float(np.mean(width)) - diameter)
+        return float(np.hypot(np.std(width), max(off - settings.width_play * 2.0 * half_width, 0.0)))
+
+    return unlike(plain) <= settings.ramps_worth * unlike(shaded)
 
 
 def _running_median(values: Array, size: int = 15) -> Array:
