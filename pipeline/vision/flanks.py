@@ -62,8 +62,11 @@ def find_flanks(
     )
     near = np.abs(offsets) <= settings.pair_search_widths * width
     best = _pair_width(rise, fall, offsets, near, width, known, settings)
-    score = _pair_score(rise, fall, offsets, best)[:, near]
-    middle = offsets[near][_best_course(score, settings.pair_wander_cost * usual)]
+    # Pooled sections repeat each other: every half width of them is enough for the course.
+    every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
+    score = _pair_score(rise[every], fall[every], offsets, best)[:, near]
+    course = offsets[near][_best_course(score, settings.pair_wander_cost * usual)]
+    middle = np.interp(np.arange(len(relief)), every, course)
     least = settings.least_edge_share * usual
     slope = gaussian_filter1d(slope, pooling, axis=0, mode="nearest")
     left = _steepest(slope, offsets, middle - 0.5 * best, settings.edge_reach_widths * best, least)
@@ -91,18 +94,21 @@ def _shifted(values: Array, by: float) -> Array:
 def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
     """Column on each row so that the sum of scores, less ``cost`` for each column moved, is largest.
 
-    Rows are one cell apart, so a course moves by one column from row to row at most (dynamic programming).
+    From row to row the course moves by one column at most (dynamic programming).
     """
-    total, moves = score[0].copy(), np.zeros(score.shape, np.int8)
-    for row in range(1, len(score)):
-        padded = np.pad(total, 1, constant_values=-np.inf)
-        reached = np.stack([padded[1:-1], padded[:-2] - cost, padded[2:] - cost])
-        moves[row] = np.array([0, -1, 1], np.int8)[np.argmax(reached, axis=0)]
+    rows, columns = score.shape
+    moves = np.zeros(score.shape, np.int8)
+    reached = np.full((3, columns), -np.inf)
+    total = score[0].copy()
+    for row in range(1, rows):
+        reached[0] = total
+        reached[1, 1:], reached[2, :-1] = total[:-1] - cost, total[1:] - cost
+        moves[row] = np.argmax(reached, axis=0)
         total = reached.max(axis=0) + score[row]
-    course = np.empty(len(score), np.intp)
+    course = np.empty(rows, np.intp)
     course[-1] = np.argmax(total)
-    for row in range(len(score) - 1, 0, -1):
-        course[row - 1] = course[row] + moves[row, course[row]]
+    for row in range(rows - 1, 0, -1):
+        course[row - 1] = course[row] + (0, -1, 1)[moves[row, course[row]]]
     return course
 
 
@@ -120,6 +126,7 @@ def _pair_width(
     An unknown width is the largest of nearly the best ones: a highlight splits a cable, nothing doubles it.
     """
     tried = width * np.geomspace(*settings.pair_width_range, settings.pair_widths)
+    rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = np.array([_pair_score(rise, fall, offsets, each)[:, near].max(axis=1).mean() for each in tried])
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / settings.pair_width_std) ** 2)
