@@ -262,7 +262,7 @@ def test_index_searches_and_filters(show, site):
     assert visible_names(driver) == ["cable-1", *(f"cable-{i}" for i in range(10, 20))]
     Select(one(driver, "#status")).select_by_value("failed")
     assert visible_names(driver) == ["cable-19"]
-    assert one(driver, "#shown").text == "1 of 20 shown"
+    assert one(driver, "#shown").text == "1 of 20 shown."
     one(driver, "#search").clear()
     one(driver, "#search").send_keys(" ")
     Select(one(driver, "#status")).select_by_value("")
@@ -305,4 +305,4 @@ def test_rows_follow_as_the_reader_scrolls(show, site):
     driver = show(f"{site}/large/index.html")
     driver.execute_script("const f = document.getElementById('specimens'); f.scrollTop = f.scrollHeight")
     WebDriverWait(driver, 5).until(lambda d: len(visible_names(d)) == 200)
-    assert one(driver, "#shown").text == f"{ROWS} of {ROWS} shown"
+    assert one(driver, "#shown").text == f"{ROWS} of {ROWS} shown."

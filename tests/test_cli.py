@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from pipeline.assembly import provenance
 from pipeline.batch.specimen import Stages
 from pipeline.cli import main
 from pipeline.cli.configuration import commented_settings, read_settings
 from pipeline.cli.group import COMMANDS
 from pipeline.errors import InputError
+from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -252,6 +254,16 @@ def test_explain_knows_every_cause_of_the_contract():
     german = call("explain", "rig_compliance", "--language", "de").stdout
     assert german.startswith("rig_compliance: Nachgiebigkeit der Anlage (m/N, nicht negativ)")
     assert "An der Anlage:    Die fotografierte Sehne statt des Protokolls verwenden" in german
+
+
+def test_language_is_no_part_of_a_result():
+    specimen = read_specimen(ROOT / "fixtures" / "specimens" / "three", Settings().intake)
+    parts = [
+        provenance(specimen, Settings(report={"language": language}), "cablebend run")["settings"]
+        for language in ("de", "en")
+    ]
+    assert parts[0] == parts[1]
+    assert "band_coverage" in parts[0]["report"]
 
 
 def test_language_reaches_the_reports_and_no_result(cheap, monkeypatch):

@@ -11,10 +11,10 @@ from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
-from pipeline.visited import Visited, best, curves
+from pipeline.visited import best, curves, pre_curvature
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-K0_WAYS = ("photo", "balance", "inverse", "all")
+K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
 
@@ -82,12 +82,13 @@ def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
 
 
 def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
-    """K0 by sources that are independent of each other, then by the fit to all photos, the free cable's included."""
-    sources = pre_curvatures(result)
-    part = result.inverse
-    if part is None or part.pre_curvature_per_m is None or "photo" not in sources:
-        return sources
-    return {**sources, "all": (part.pre_curvature_per_m, part.pre_curvature_std_per_m)}
+    """K0 by sources that are independent of each other, then by the curve of the answer if it saw more than they."""
+    sources, curve = pre_curvatures(result), best(result)
+    if curve is not None and curve.method == "extended":
+        return {**sources, "extended": pre_curvature(result, curve)}
+    if curve is not None and curve.method == "inverse" and "photo" in sources:
+        return {**sources, "all": pre_curvature(result, curve)}
+    return sources
 
 
 def _sentence(result: Result, words: Words) -> str:
@@ -112,17 +113,8 @@ def _sentence(result: Result, words: Words) -> str:
         low=words.curvature(curve.kappa[0]),
         high=words.curvature(curve.kappa[-1]),
     )
-    rest = at_rest(result, curve)
-    return text if rest is None else f"{text} {words('answer_pre_curvature', value=words.measured(*rest))}"
-
-
-def at_rest(result: Result, curve: Visited) -> tuple[float, float | None] | None:
-    """K0 as the report answers with, 1/m: by the way the curve comes from, with all of its data; else by the photo."""
-    part = {"inverse": result.inverse, "balance": result.balance}.get(curve.method)
-    if part is not None and part.pre_curvature_per_m is not None:
-        return part.pre_curvature_per_m, part.pre_curvature_std_per_m
-    # an extended model takes the place of the fit that was found wanting; what the photo shows stands in any case
-    return pre_curvatures(result).get("photo")
+    rest = words.measured(*pre_curvature(result, curve))
+    return f"{text} {words('answer_pre_curvature', value=rest)}"
 
 
 def _together(quantity: str) -> str:

@@ -17,7 +17,6 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from pipeline.report.answer import at_rest
 from pipeline.report.document import asset, environment, palette_css, write_report
 from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
@@ -27,7 +26,7 @@ from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, from_json
 from pipeline.settings import ReportSettings
-from pipeline.visited import Visited, best
+from pipeline.visited import Visited, best, pre_curvature
 
 SHAPE_POINTS = 14
 SHAPE_SIZE = (110.0, 40.0)
@@ -65,7 +64,7 @@ def index_row(result: Result, report: str, settings: ReportSettings) -> IndexRow
         status=result.status,
         verdict=result.diagnosis.verdict if result.diagnosis else "none",
         curve=_thinned(curve, settings.index_curve_points),
-        pre_curvature=at_rest(result, curve) if curve else None,
+        pre_curvature=pre_curvature(result, curve) if curve else None,
         rms_relative=result.agreement.rms_relative if result.agreement else None,
         compatible=result.agreement.compatible if result.agreement else None,
         photos_used=sum(photo.status == "traced" for photo in result.photos),
