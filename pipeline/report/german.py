@@ -25,7 +25,7 @@ CATALOGUE = Path(__file__).parent / "templates" / "german"
 # Sentences end or begin so where others are joined to them; the same signs are stripped from the catalogue's.
 EDGES = " ,;.:\n"
 SENTENCES = re.compile(r"(; |\. |\n)")
-SEPARATORS = re.compile(r"(\n|; |: |, | and | or |\. | in | from | \(|\))")
+SEPARATORS = re.compile(r"(\n|; |: |, | and | or |\. | in | from | \(|\)|(?<=\d) (?=[a-z]))")
 JOINED = {" and ": " und ", " or ": " oder ", " from ": " ab "}
 # A decimal point between digits, but not in file names and versions.
 DECIMAL = re.compile(r"(?<![\w./\\-])([-+]?\d+)\.(\d+)(?=(?:e[-+]?\d+)?(?!\.?\w|[/\\]))")
