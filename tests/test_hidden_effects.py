@@ -12,7 +12,7 @@ from fixtures.continuum import Cable
 from fixtures.effects import HIDE, LARGEST, PLAIN, PROTOCOLS, SPOT, Form, profile
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.make import hidden_specimen
-from fixtures.scores import answers, expected_scores, outlook
+from fixtures.scores import FAR, answers, expected_scores, outlook
 from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
@@ -31,9 +31,6 @@ VISIBLE = [name for name in HIDE if name != "force_gain"]
 
 NEEDS_THE_WAY_BACK = ("hysteresis", "plastic_set", "bearing_friction")
 """Causes that change sign when the motion turns back; on loading alone they are shifts of K0."""
-
-FAR = {"three": ("bearing_friction", "displacement_offset", "hysteresis")}
-"""Seen only at sizes at which their traces are no longer in proportion: judged by refits, below."""
 
 BEYOND = {("three", "plastic_set"), ("six", "plastic_set"), ("three", "force_offset")}
 """Needs more than ten times a plausible amount at four times the detectable one: no rig would have that."""
@@ -81,7 +78,7 @@ def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol
         seen = outlook(protocol)[name]
         if not seen.possible(seen.amount(name, times)):
             beyond.add((protocol, name))
-        elif name not in FAR.get(protocol, ()):
+        elif (protocol, name) not in FAR:
             scores = expected_scores(protocol, name, seen.amount(name, times))
             shares[name] = float(answers(protocol, name, scores, draws=40, rng=rng).right.mean())
     assert beyond <= BEYOND
