@@ -42,6 +42,8 @@ class ComplianceBasis:
         The p splines as one vector-valued spline over mu.
     roughness : (p, p)
         Matrix of the penalty.
+    first_slope : (p,)
+        d/dmu of the splines at m = 0.
     """
 
     low: float
@@ -52,6 +54,7 @@ class ComplianceBasis:
     zero: int
     spline: BSpline
     roughness: Array
+    first_slope: Array
 
     def at(self, moment: ArrayLike) -> Array:
         """The splines at `moment` (n,), N m -> (n, p); constant continuation outside."""
@@ -98,7 +101,9 @@ def compliance_basis(low: float, high: float, *, unit: float, coefficients: int 
     half = 0.5 * np.diff(inner)[:, None]
     nodes = (0.5 * (inner[:-1] + inner[1:])[:, None] + half * np.array([-1.0, 1.0]) / np.sqrt(3.0)).ravel()
     bend = np.asarray(spline(nodes, 2)) * np.sqrt(np.repeat(half.ravel(), 2))[:, None]
-    return ComplianceBasis(low, high, unit, moments, table, int(np.argmin(np.abs(moments))), spline, bend.T @ bend)
+    first_slope = np.asarray(spline(-low / (high - low), 1))
+    zero = int(np.argmin(np.abs(moments)))
+    return ComplianceBasis(low, high, unit, moments, table, zero, spline, bend.T @ bend, first_slope)
 
 
 @dataclass(frozen=True)

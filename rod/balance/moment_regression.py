@@ -2,10 +2,10 @@
 
 Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the errors common
 to all photos (`rod.balance.moment_points.CommonErrors`, each in units of its standard deviation), and Legendre
-coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual
-depends on the compliance and is renewed in each iteration. The posterior is an average over the prior size of the
-roughness of log c, weighted by its evidence (Laplace), so that the bands hold what the data do not know about the form
-of the law.
+coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual depends on the compliance and is renewed
+in each iteration. The prior of the law's form is its roughness and its slope at rest, log c being flat there for a
+cable that bends alike to both sides. The posterior is an average over the sizes of both, weighted by their evidence
+(Laplace), so that the bands hold what the data do not know about the form of the law.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ Array = NDArray[np.float64]
 BOW_TERMS = 4
 """Legendre terms of K0(s) - K0: a linear set from the spool, one and two bows, and a kink's rough place."""
 
-ROUGHNESS_STEPS = 25
-"""Values of the roughness averaged over: a factor 1.3 apart, over which the posterior hardly changes."""
+ROUGHNESS_STEPS = 15
+"""Values of the roughness averaged over: a factor 1.6 apart, over which the posterior hardly changes."""
+
+SLOPES, SLOPE_STEPS = (0.03, 3.0), 5
+"""Sizes of the prior of d log c / dmu at m = 0 averaged over: from none that could be seen to a factor e^3."""
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Average over the roughness.
+    """Average over the sizes of roughness and slope.
 
     Attributes
     ----------
@@ -134,33 +137,34 @@ class MomentModel:
         return columns
 
     def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
-        """Mean and covariance of the unknowns, averaged over the roughness with its evidence as the weight."""
+        """Mean and covariance of the unknowns, averaged over the priors' sizes with their evidence as the weight."""
         p, size = self.size, J.shape[1]
         prior = np.zeros(size)
         prior[self.common] = 1.0
         if not self.varying:  # a prior far sharper than any photo switches them off
             prior[self.common.stop :] = (1e6 / self.floor) ** 2
-        penalty = np.zeros((size, size))
-        penalty[:p, :p] = self.basis.roughness
         normal, pull = J.T @ J + np.diag(prior), J.T @ (J @ unknowns - value)
-        evidence, means, inverses, shrunk = [], [], [], []
-        for log_tau in np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS):
-            sized = penalty * np.exp(-2.0 * log_tau)
-            A = normal + sized
-            unit = 1.0 / np.sqrt(np.diag(A))  # unknowns of very different size
-            scaled = unit[:, None] * A * unit
-            inverse = unit[:, None] * np.linalg.inv(scaled) * unit
-            mean = inverse @ pull
-            log_det = np.linalg.slogdet(scaled)[1] - 2.0 * np.sum(np.log(unit))
-            # The penalty leaves straight lines free: p - 2 coefficients have the prior exp(-2 log_tau).
-            evidence.append(0.5 * (pull @ mean - log_det) - (p - 2) * log_tau)
-            means.append(mean)
-            inverses.append(inverse)
-            shrunk.append(inverse @ sized[:, :p])
-        weight = np.exp(np.array(evidence) - max(evidence))
+        rough = np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS)
+        steep = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
+        log_tau, log_slope = (axis.ravel() for axis in np.meshgrid(rough, steep))
+        sized = np.zeros((log_tau.size, size, p))
+        sized[:, :p] = np.exp(-2.0 * log_tau)[:, None, None] * self.basis.roughness
+        sized[:, :p] += np.exp(-2.0 * log_slope)[:, None, None] * np.outer(
+            self.basis.first_slope, self.basis.first_slope
+        )
+        A = np.repeat(normal[None], log_tau.size, axis=0)
+        A[:, :, :p] += sized
+        unit = 1.0 / np.sqrt(np.diagonal(A, axis1=1, axis2=2))  # unknowns of very different size
+        scaled = unit[:, :, None] * A * unit[:, None, :]
+        inverses = unit[:, :, None] * np.linalg.inv(scaled) * unit[:, None, :]
+        means = inverses @ pull
+        log_det = np.linalg.slogdet(scaled)[1] - 2.0 * np.sum(np.log(unit), axis=1)
+        # Each prior counts as often as it has directions: the roughness leaves straight lines free.
+        evidence = 0.5 * (means @ pull - log_det) - (p - 2) * log_tau - log_slope
+        weight = np.exp(evidence - evidence.max())
         weight /= weight.sum()
-        mean, response, shrinkage = (np.tensordot(weight, parts, 1) for parts in (means, inverses, shrunk))
-        spread = np.array(means) - mean
+        mean, response, shrinkage = (np.tensordot(weight, parts, 1) for parts in (means, inverses, inverses @ sized))
+        spread = means - mean
         return Posterior(mean, response + (weight[:, None] * spread).T @ spread, response, shrinkage)
 
 
