@@ -145,6 +145,15 @@ class CurveSettings(BaseModel):
     max_blur_radii: float = Field(
         0.4, gt=0, description="of the radius; with more blur the two edges run into each other and move inward"
     )
+    max_motion_radii: float = Field(
+        0.5,
+        gt=0,
+        description="of the radius; a longer motion during the exposure doubles covers and smears the shading over the"
+        " edges: from 0.55 on midlines were off by more than their bands",
+    )
+    hint_blur_radii: float = Field(
+        0.2, gt=0, description="of the radius; with more blur that, and no missing cover, is why no axis was found"
+    )
     max_width_error: float = Field(
         0.15,
         gt=0,

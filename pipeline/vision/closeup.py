@@ -19,6 +19,7 @@ from pipeline.vision.crosscut import path_normals
 from pipeline.vision.photo import Photo
 
 _MAD_TO_STD = 1.4826
+_GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
 _TILE = 128  # px; pieces of the window that are projected or left out
 
 
@@ -36,12 +37,15 @@ class Closeup:
         Standard deviation of one pixel, without texture coarser than two pixels.
     blur_px : px
         Standard deviation of the edge spread.
+    motion_px : px
+        Length over which camera or cable moved during the exposure; 0 where the edges are equally sharp everywhere.
     """
 
     grey: NDArray[np.float32]
     origin_px: tuple[int, int]
     noise: float
     blur_px: float
+    motion_px: float
 
 
 def take_closeup(
@@ -59,11 +63,14 @@ def take_closeup(
         part = window[rows, columns]
         grey[rows, columns] = part * scaled[0] if part.ndim == 2 else part.astype(np.float32) @ scaled
     local = path_px - low
+    spreads, angles = _edge_spreads(grey, local, width_px)
+    seen = spreads[np.isfinite(spreads)]
     return Closeup(
         grey=grey,
         origin_px=(int(low[0]), int(low[1])),
         noise=_pixel_noise(grey, local, width_px),
-        blur_px=_edge_blur(grey, local, width_px),
+        blur_px=float(np.median(seen)) if len(seen) else 0.0,
+        motion_px=_motion(spreads, angles),
     )
 
 
@@ -93,13 +100,13 @@ def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
     return _MAD_TO_STD * float(np.median(np.abs(differences))) / np.sqrt(6.0) if len(differences) else 0.0
 
 
-def _edge_blur(grey: NDArray[np.float32], path: Array, width: float) -> float:
-    """Edge spread by the steepest slope of edges averaged over neighbouring sections.
+def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:
+    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, NaN without an edge, and angle ``(k,)``.
 
     A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle.
     """
-    _, normal = path_normals(path)
-    sections = np.linspace(0.1, 0.9, 64) * (len(path) - 1)
+    tangent, normal = path_normals(path)
+    sections = np.linspace(0.1, 0.9, 8 * _GROUPS) * (len(path) - 1)
     centre = np.column_stack([np.interp(sections, np.arange(len(path)), column) for column in path.T])
     across = normal[np.rint(sections).astype(int)]
     offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
@@ -107,11 +114,33 @@ def _edge_blur(grey: NDArray[np.float32], path: Array, width: float) -> float:
     for side in (-0.5, 0.5):
         points = (centre[:, None, :] + (side * width + offsets)[None, :, None] * across[:, None, :]).astype(np.float32)
         profile = cv2.remap(grey, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        spreads.extend(_spread_of_groups(profile, offsets))
-    return float(np.median(spreads)) if spreads else 0.0
+        spreads.append(_spread_of_groups(profile, offsets))
+    along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
+    return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
+
+
+def _motion(spreads: Array, angles: Array) -> float:
+    """Length of a motion blur by the edge spreads ``(2, k)`` and the angles ``(k,)`` of the cable.
+
+    A motion over L in the direction mu adds ``L^2/12 sin^2(angle - mu)`` to the squared spread: nothing where the cable
+    runs along it. The sharper of both edges counts: a shadow softens one of them, a motion both. Where the squared
+    spread changes by less than half along the cable, the cause is another one, or does the same as defocus.
+    """
+    sharper = np.min(spreads, axis=0)
+    known = np.isfinite(sharper)
+    if np.count_nonzero(known) < _GROUPS // 2:
+        return 0.0
+    squared, twice = sharper[known] ** 2, 2.0 * angles[known]
+    terms = np.column_stack([np.ones(len(twice)), np.cos(twice), np.sin(twice)])
+    # Turns of a few degrees leave the last two terms open: no more than the data ask for.
+    ridge = 1e-3 * len(terms) * np.diag([0.0, 1.0, 1.0])
+    fitted = np.linalg.solve(terms.T @ terms + ridge, terms.T @ squared)
+    smooth = terms @ fitted
+    return float(np.sqrt(24.0 * np.hypot(fitted[1], fitted[2]))) if smooth.min() < 0.5 * smooth.max() else 0.0
 
 
 def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> list[float]:
+    """Spread of one edge on each group of sections; NaN where the profile is flat."""
     spacing = float(offsets[1] - offsets[0])
     plateau = max(2, len(offsets) // 6)
     step = profile[:, -plateau:].mean(axis=1) - profile[:, :plateau].mean(axis=1)
@@ -119,10 +148,10 @@ def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> list[floa
     above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
     crossing = offsets[np.argmax(above, axis=1)]
     spreads = []
-    for group in np.array_split(np.arange(len(profile)), len(profile) // 8):
+    for group in np.array_split(np.arange(len(profile)), _GROUPS):
         # Lined up at their own crossings, so a path half a pixel off does not count as blur.
         lined = np.mean([np.interp(offsets + crossing[i], offsets, profile[i]) for i in group], axis=0)
         slope = np.abs(np.gradient(lined, spacing)[plateau:-plateau]).max(initial=0.0)
-        if slope > 0:
-            spreads.append(float(abs(np.mean(step[group])) / (np.sqrt(2.0 * np.pi) * slope)))
+        height = float(abs(np.mean(step[group])))
+        spreads.append(height / (np.sqrt(2.0 * np.pi) * slope) if slope > 0.0 else np.nan)
     return spreads

@@ -17,7 +17,7 @@ from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout
 from pipeline.vision.bearings import BearingHints, find_bearings, left_first
 from pipeline.vision.candidates import Reading, approaches_itself, branches
-from pipeline.vision.closeup import take_closeup
+from pipeline.vision.closeup import Closeup, take_closeup
 from pipeline.vision.crosscut import CrossCut, cut_across
 from pipeline.vision.ends import CableEnd, at_border, between_axes, find_end, lead_to_axes, settle_end, without_specks
 from pipeline.vision.photo import Photo
@@ -73,11 +73,44 @@ def judge_strip(
         return _too_faint(photo, cut.contrast / cut.texture, stage)
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
-        return axes
+        return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = cut_across(standout, path, reading.width, stage, known=cable.diameter_px is not None)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, settings)
+
+
+def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
+    """Refuse a photo whose covers were not found because it is moved or out of focus."""
+    if not np.isfinite(cut.width).any():
+        return None
+    width = float(np.nanmedian(cut.width)) * standout.reduction
+    closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights, settings.segmentation)
+    return _check_sharpness(photo, closeup, width, 0.5 * settings.curve.hint_blur_radii, settings)
+
+
+def _check_sharpness(
+    photo: Photo, closeup: Closeup, width: float, max_blur: float, settings: VisionSettings
+) -> Rejected | None:
+    """Refuse a photo taken in motion, or with more blur than ``max_blur`` widths."""
+    if closeup.motion_px > 0.5 * settings.curve.max_motion_radii * width:
+        return refused(
+            photo,
+            "photo/blur",
+            f"camera or cable moved by {closeup.motion_px:.0f} px during the exposure, the cable is {width:.0f} px "
+            "wide; let the rig come to rest, and use a shorter exposure",
+            motion_px=closeup.motion_px,
+            width_px=width,
+        )
+    if closeup.blur_px > max_blur * width:
+        return refused(
+            photo,
+            "photo/blur",
+            f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
+            blur_px=closeup.blur_px,
+            width_px=width,
+        )
+    return None
 
 
 def _axes(
@@ -182,14 +215,9 @@ def _assemble(
     ratio = cut.contrast / max(float(np.hypot(cut.texture, closeup.noise)), 1e-9)
     if ratio < stage.min_contrast_to_noise:
         return _too_faint(photo, ratio, stage)
-    if closeup.blur_px > stage.max_blur_widths * width:
-        return refused(
-            photo,
-            "photo/blur",
-            f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
-            blur_px=closeup.blur_px,
-            width_px=width,
-        )
+    unsharp = _check_sharpness(photo, closeup, width, stage.max_blur_widths, settings)
+    if unsharp is not None:
+        return unsharp
     finite = cut.width[np.isfinite(cut.width)]
     scatter = 1.4826 * float(np.median(np.abs(finite - np.median(finite)))) / float(np.median(finite))
     return RoughCable(

@@ -1,0 +1,72 @@
+"""Blur and motion by the edges of a drawn cable, and the refusal of photos taken in motion or out of focus."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.records import Rejected
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.bearings import BearingHints
+from pipeline.vision.closeup import Closeup, take_closeup
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import Photo
+from pipeline.vision.render import Camera, Curve, Scene, Sensor, Strand, render
+from pipeline.vision.segmentation import find_cable
+
+WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis
+
+
+def arc(*, motion: float = 0.0, direction: float = 0.0, blur: float = 0.8, shadow: float = 0.0) -> Closeup:
+    """Close-up of a dark arc of 80 degrees, moved by so many px; ``shadow`` px of blur at its outer edge alone."""
+    v, u = np.mgrid[0:420, 0:1100].astype(np.float32)
+    away = np.hypot(u - 550.0, v - 760.0) - BEND
+    outer = 0.5 * WIDTH - away
+    grey = 0.8 - 0.6 * np.clip(np.minimum(outer, 0.5 * WIDTH + away) + 0.5, 0.0, 1.0)
+    if shadow:
+        soft = cv2.GaussianBlur(grey, (0, 0), shadow)
+        grey = np.where(away > 0.0, soft, grey)
+    # A motion is the mean of pictures one after the other; four a pixel leave no steps.
+    count = max(1, round(4.0 * motion))
+    way = (np.arange(count) + 0.5) / count * motion - 0.5 * motion
+    moves = [np.array([[1.0, 0.0, w * np.cos(direction)], [0.0, 1.0, w * np.sin(direction)]]) for w in way]
+    size = grey.shape[::-1]
+    grey = np.mean([cv2.warpAffine(grey, m, size, borderMode=cv2.BORDER_REPLICATE) for m in moves], axis=0)
+    grey = cv2.GaussianBlur(grey, (0, 0), blur)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(grey.shape)
+    turn = np.linspace(-0.7, 0.7, 300)
+    path = np.column_stack([550.0 + BEND * np.sin(turn), 760.0 - BEND * np.cos(turn)])
+    pixels = np.clip(np.rint(255.0 * (grey + noise)), 0, 255).astype(np.uint8)
+    return take_closeup(Photo("a.png", pixels, 8), path, WIDTH, np.ones(1), VisionSettings().segmentation)
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.6, 2.4])
+def test_motion_is_measured_by_what_it_does_to_the_edges(direction):
+    """A box of length L has the variance L^2 / 12; its steepest slope tells L to a fifth, enough for a refusal."""
+    assert_allclose(arc(motion=15.0, direction=direction).motion_px, 15.0, rtol=0.2)
+
+
+@pytest.mark.parametrize("blur", [0.8, 3.0, 6.0])
+def test_defocus_is_not_motion(blur):
+    closeup = arc(blur=blur)
+    assert closeup.motion_px == 0.0
+    # The pixel's box adds a variance of 1/12 px^2, the linear interpolation between pixels 1/6.
+    assert_allclose(closeup.blur_px, np.sqrt(blur**2 + 1.0 / 12.0 + 1.0 / 6.0), rtol=0.1)
+
+
+def test_soft_shadow_at_one_edge_is_not_motion():
+    assert arc(shadow=5.0).motion_px == 0.0
+
+
+@pytest.mark.parametrize("sensor", [Sensor(motion_px=15.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
+def test_covers_lost_in_blur_are_no_reason_of_their_own(sensor):
+    length, scale = 0.181, 8_000.0
+    curve = Curve.from_curvature(lambda s: 3.0 + 5.0 * np.sin(np.pi * s / length), length)
+    camera = Camera(1640, 640, scale, look_at_m=(0.5 * curve.chord, 0.5 * curve.y.max()))
+    pixels = render(Scene(Strand(curve, 0.0046), camera, sensor=sensor)).pixels
+    known = Cable(0.0046 * scale, length * scale, BearingHints(cover_px=0.012 * scale))
+    found = find_cable(Photo("a.png", pixels, 8), VisionSettings(), cable=known)
+    assert isinstance(found, Rejected)
+    assert found.code == "photo/blur"
