@@ -28,7 +28,7 @@ from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
-from pipeline.result import DiagnosisPart, PhotoPart, Result
+from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result
 from pipeline.settings import ReportSettings
 from pipeline.visited import curves
 
@@ -60,8 +60,7 @@ class Sheet:
 
     def text(self, text: str, *, size: float = 10.0, bold: bool = False, color: str = LIGHT["ink"]) -> None:
         """Write a paragraph over the width of the page."""
-        width = PAGE[0] - 2.0 * MARGIN
-        for line in textwrap.wrap(printable(text), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]:
+        for line in _lines(text, size, bold):
             self.y += LEADING * size
             self.figure.text(
                 MARGIN / PAGE[0],
@@ -96,6 +95,12 @@ class Sheet:
     def room(self) -> float:
         """Height left on the page in points."""
         return PAGE[1] - MARGIN - self.y
+
+
+def _lines(text: str, size: float, bold: bool = False) -> list[str]:
+    """Lines of a paragraph over the width of the page."""
+    width = PAGE[0] - 2.0 * MARGIN
+    return textwrap.wrap(printable(text), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]
 
 
 @cache
@@ -145,12 +150,12 @@ def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> She
     sheet, said = Sheet(_head(result)), answer(result, words, settings)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
-        figures.draw_characteristic(sheet.part(300.0, left=0.04, right=0.96), result, words, settings)
+        figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words, settings)
         sheet.text(words("convention", coverage=words.number(100.0 * settings.band_coverage)), color=LIGHT["muted"])
     parts = [("what_next", said.advice)]
     if result.status != "failed":
         parts += [
-            ("adequate", f"{said.verdict + '. ' if said.verdict else ''}{said.model}"),
+            ("adequate", f"{said.verdict[:1].upper()}{said.verdict[1:]}. {said.model}" if said.verdict else said.model),
             ("two_ways", said.agreement),
         ]
     for title, text in parts:
@@ -165,13 +170,21 @@ def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> She
         for title, key in (("use_equivalent", "equivalent"), ("use_radius", "radius")):
             if use.get(key):
                 sheet.text(f"{words(title)}: {use[key]}")
-    troubles = [finding for finding in result.findings if finding.level != "info"]
-    if troubles:
-        sheet.text(words("nav_findings"), bold=True)
-        for finding in troubles:
-            if sheet.room() > 30.0:
-                sheet.text(f"{words(f'level_{finding.level}')}: {words.said(finding.message).sentence}", size=9.0)
+    list_troubles(sheet, [finding for finding in result.findings if finding.level != "info"], words)
     return sheet
+
+
+def list_troubles(sheet: Sheet, findings: list[FindingPart], words: Words) -> None:
+    """Warnings and errors as far as the page has room, and how many more there are."""
+    if findings:
+        sheet.text(words("nav_findings"), bold=True)
+    size = 9.0
+    for number, finding in enumerate(findings):
+        told = f"{words(f'level_{finding.level}')}: {words.said(finding.message).sentence}"
+        if sheet.room() < LEADING * size * (len(_lines(told, size)) + 1) + size:
+            sheet.text(words("more_findings", count=len(findings) - number), size=size)
+            return
+        sheet.text(told, size=size)
 
 
 def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:

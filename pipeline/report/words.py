@@ -31,6 +31,13 @@ def _german_causes() -> dict[str, str]:
     return {english: row[1] for name, row in rows for english in (name, name.replace("_", " "), row[0])}
 
 
+@cache
+def _spoken_causes() -> tuple[tuple[str, str], ...]:
+    """Names of causes as the diagnosis speaks them where English says otherwise, the longest first."""
+    named = ((name.replace("_", " "), row[0]) for name, row in _table()["causes"].items())
+    return tuple(sorted((pair for pair in named if pair[0] != pair[1]), key=lambda pair: -len(pair[0])))
+
+
 @dataclass(frozen=True)
 class Said:
     """A sentence of another room as the reader gets it, and the language it is in."""
@@ -91,11 +98,12 @@ class Words:
 
     def said(self, sentence: str) -> Said:
         """A stored sentence (finding, reason, headline, advice) in this language, as far as it is known."""
-        text, language = sentence.replace("+-", "±"), "en"
         if self.language == "de":
             text, known = in_german(sentence, _german_causes())
-            text, language = text.replace("+-", "±"), "de" if known else "en"
-        return Said(text, language)
+            return Said(text.replace("+-", "±"), "de" if known else "en")
+        for spoken, written in _spoken_causes():
+            sentence = sentence.replace(spoken, written)
+        return Said(sentence.replace("+-", "±"), "en")
 
     def branch(self, name: str) -> str:
         """Branch of the test; a name the table does not have stays as it is."""

@@ -226,6 +226,11 @@ def test_what_is_not_known_stays_and_is_called_english(text):
     assert (said.text, said.language) == (text, "en")
 
 
+def test_english_names_causes_as_english_does():
+    said = Words("en").said("The simulation lacks pre curvature varying or in plane load (1 1/m).")
+    assert said.text == "The simulation lacks varying pre-curvature or in-plane load (1 1/m)."
+
+
 def test_english_stays_english():
     said = Words("en").said("f_EI at 5.2 1/m (+- 0.3 in the logarithm)")
     assert (said.text, said.language) == ("f_EI at 5.2 1/m (± 0.3 in the logarithm)", "en")
