@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.bootstrap import confirmed_limit
 from pipeline.diagnosis.explanation import Explanation, candidates, refit_one, refit_pairs
@@ -20,7 +21,7 @@ from pipeline.diagnosis.pairs import pair_gains
 from pipeline.diagnosis.presentation import present
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.twins import cosines
-from pipeline.diagnosis.verdict import credible_set, probabilities
+from pipeline.diagnosis.verdict import credible_set, probabilities, with_twins
 from pipeline.diagnosis.workbench import Workbench, prepare, scored, with_finer_law
 from pipeline.identify import Identification
 from pipeline.records import Finding
@@ -104,32 +105,63 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
         return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
     singles = _refitted(bench, settings)
     if not singles:
-        return Conclusion([], [], 0, None, _left_over(bench, bench.base, settings), True)
+        left = _left_over(bench, bench.base, settings)
+        return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
     weight = probabilities(
         [e.weighed for e in singles],
         reduced_chi2=singles[0].fitted.chi2 / freedom,
         implausible=settings.implausible,
     )
-    members = credible_set(weight, level=settings.set_level)
+    members = _members(bench, singles, weight, settings)
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
-    accepted = _second_cause(bench, singles, settings) or singles[0]
+    named = {explanation.causes[0] for explanation in singles[: len(members)]}
+    accepted = _second_cause(bench, singles, named, settings) or singles[0]
     accepted = _with_finer_law(bench, accepted, settings)
     left = _left_over(bench, accepted.fitted, settings)
     alien = left.p_value < settings.alien_false_alarm and left.excess > settings.explained_share * accepted.gain
     return Conclusion(singles, chance, len(members), accepted, left, alien)
 
 
+def _members(
+    bench: Workbench, singles: list[Explanation], weight: NDArray[np.float64], settings: DiagnosisSettings
+) -> list[int]:
+    """Explanations that form the set of names, most probable first."""
+    members = credible_set(weight, level=settings.set_level)
+    loudest = [bench.suspicion.best(e.causes[0]) for e in singles]
+    unit = bench.suspicion.scores.unit
+    first = loudest[members[0]]
+    closeness = np.array([0.0 if k is None or first is None else abs(unit[:, k] @ unit[:, first]) for k in loudest])
+    gain = np.array([e.gain for e in singles])
+    return with_twins(members, weight, gain, closeness, cosine=settings.twin_cosine, margin=settings.twin_margin)
+
+
 def _refitted(bench: Workbench, settings: DiagnosisSettings) -> list[Explanation]:
     """All suspects refitted that remove anything, the best first."""
+    suspects = candidates(bench.suspicion, settings)
+    found = _explanations(bench, suspects, settings)
+    if max((e.gain for e in found), default=0.0) < CONFIRMED * bench.largest**2:
+        # A base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit.
+        others = [k for k in range(len(bench.suspicion.causes)) if k not in suspects and bench.suspicion.of(k).size]
+        found = [*found, *_explanations(bench, others, settings)]
+        found = [e for e in found if e.gain >= CONFIRMED * bench.limit**2]
+    return sorted(found, key=lambda e: -e.gain)
+
+
+CONFIRMED = 0.5
+"""Share of a score's chi-square that its refit must remove: a score that no refit confirms is no finding."""
+
+
+def _explanations(bench: Workbench, causes: list[int], settings: DiagnosisSettings) -> list[Explanation]:
+    """The named causes refitted, as far as they remove anything."""
     found: list[Explanation] = []
-    for cause in candidates(bench.suspicion, settings):
+    for cause in causes:
         rival = min((e.fitted.chi2 for e in found), default=np.inf)
         explanation = refit_one(bench.observation, bench.base, bench.suspicion, cause, settings, rival=rival)
         if explanation is not None and explanation.gain > 0.0:
             found.append(explanation)
-    return sorted(found, key=lambda e: -e.gain)
+    return found
 
 
 def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:
@@ -138,8 +170,14 @@ def _with_finer_law(bench: Workbench, accepted: Explanation, settings: Diagnosis
     return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 
-def _second_cause(bench: Workbench, singles: list[Explanation], settings: DiagnosisSettings) -> Explanation | None:
-    """A pair that is accepted: significant beyond the best single cause, and neither of the two can be dropped."""
+def _second_cause(
+    bench: Workbench, singles: list[Explanation], named: set[int], settings: DiagnosisSettings
+) -> Explanation | None:
+    """A pair that is accepted: significant beyond the best single cause, and neither of the two can be dropped.
+
+    Another control point of the law beside a cause is a finer base and no second cause; that pair stands for the cause
+    alone, which must then be one of those ``named`` by itself.
+    """
     best = max(singles, key=lambda e: e.gain)
     second = suspect(
         bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
@@ -153,6 +191,9 @@ def _second_cause(bench: Workbench, singles: list[Explanation], settings: Diagno
     pairs = refit_pairs(bench.observation, bench.base, bench.suspicion, best, second, settings)
     alone = {e.causes[0]: e.gain for e in singles}
     for pair in pairs:
+        beside_law = [c for c in pair.causes if bench.suspicion.causes[c].name != "nonlinear_stiffness"]
+        if len(beside_law) == 1 and beside_law[0] not in named:
+            continue
         others = [alone.get(cause, _linear_gain(bench.suspicion, cause)) for cause in pair.causes]
         if pair.gain - max(best.gain, *others) > least:
             return pair

@@ -9,15 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.fit import Extension, Fit, Term, fit
+from pipeline.diagnosis.fit import Extension, Fit, Term, fit, whole_residual
 from pipeline.diagnosis.observation import Observation
 from pipeline.diagnosis.pairs import Pair, best_pairs, pair_gains
 from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.diagnosis.simulation import run
 from pipeline.diagnosis.twins import cosines
 from pipeline.diagnosis.verdict import Weighed, scan_share
 from pipeline.settings.diagnosis import DiagnosisSettings
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,23 +181,21 @@ def _fit_terms(
     extension = Extension(base.extension.base, base.extension.facts, (*base.extension.terms, *terms))
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
+    starts = [_linear_start(observation, base, extension, suspicion.columns[:, list(directions)], terms, amounts)]
+    if "mounted" not in base.extension.facts.branch:
+        # Without a photo of the force-free cable K0 has a second, false valley, as deep as the true one but for some
+        # sigma: further starts lie on both sides of it.
+        shift = 0.1 * base.extension.facts.curvature_scale
+        guesses = [base.extension.base.neutral(bend=bend) for bend in (shift, -shift)]
+        starts += [_start(extension, guess, terms, amounts, 1.0) for guess in guesses if len(guess) == len(base.vector)]
     best: Fit | None = None
-    enough = settings.fits * (len(base.residual) - extension.size)
-    # Without a photo of the force-free cable K0 has a second, false valley, as deep as the true one but for some sigma:
-    # further starts lie on both sides of it.
-    at_rest = "mounted" in base.extension.facts.branch
-    shift = 0.1 * base.extension.facts.curvature_scale
-    guesses = [base.extension.base.neutral(bend=bend) for bend in (shift, -shift)]
-    starts = [(1.0, base.vector), (0.3, base.vector)]
-    starts += [(1.0, guess) for guess in guesses if len(guess) == len(base.vector)]
-    for share, vector in starts:
-        told = best is not None and at_rest and (best.converged or best.chi2 < enough)
-        if best is not None and (share < 1.0 or best.chi2 >= hopeless or told):
-            continue  # a further start is worth its time where the first did not end at the noise, or could not tell
+    for start in starts:
+        if best is not None and best.converged and best.chi2 >= hopeless:
+            break
         found = fit(
             observation,
             extension,
-            _start(extension, vector, terms, amounts, share),
+            start,
             iterations=settings.iterations,
             tolerance=settings.tolerance,
             near=base.run,
@@ -203,9 +205,39 @@ def _fit_terms(
     return best
 
 
+def _linear_start(
+    observation: Observation,
+    base: Fit,
+    extension: Extension,
+    columns: Array,
+    added: tuple[Term, ...],
+    amounts: tuple[float, ...],
+) -> Array:
+    """The linear estimate of amounts and of what they leave to the other parameters, or the share of it that fits best.
+
+    A cause put beside parameters that stay where they were starts far from its valley: they had taken its place.
+    """
+    size = np.linalg.norm(base.jacobian, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    left = base.residual - columns @ np.asarray(amounts)
+    move = np.linalg.lstsq(base.jacobian / size, left, rcond=1e-7)[0] / size
+    trials = [_start(extension, base.vector + share * move, added, amounts, share) for share in SHARES]
+    trials.append(_start(extension, base.vector, added, amounts, SHARES[-1]))
+    costs = []
+    for trial in trials:
+        shown = run(extension.model(trial), extension.facts, near=base.run) if extension.admissible(trial) else None
+        value = whole_residual(observation, shown.prediction, trial, extension.prior) if shown else None
+        costs.append(np.inf if value is None else float(value @ value))
+    return trials[int(np.argmin(costs))]
+
+
+SHARES = (1.0, 0.3, 0.1)
+"""Of a linear estimate, tried before a refit."""
+
+
 def _start(
-    extension: Extension, vector: np.ndarray, added: tuple[Term, ...], amounts: tuple[float, ...], share: float
-) -> np.ndarray:
+    extension: Extension, vector: Array, added: tuple[Term, ...], amounts: tuple[float, ...], share: float
+) -> Array:
     """Start vector: the fitted model's, then the added terms with a share of their amounts, held to sane sizes."""
     parts = [vector]
     for term, amount in zip(added, amounts, strict=True):
@@ -223,12 +255,41 @@ def _with_more_forms(
     own = [cause for cause in suspicion.causes if cause.name == name]
     while len(best.extension.terms) < settings.shapes_most:
         more = suspect(observation, best, own, visible=settings.visible, trace=settings.trace)
-        if more.statistic.size == 0 or more.statistic.max() ** 2 < settings.shape_gain:
-            break
-        added = _fit_terms(observation, best, more, (int(np.argmax(more.statistic)),), settings)
+        # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
+        fresh = np.array([term not in best.extension.terms for term in more.terms], dtype=bool)
+        added: Fit | None = None
+        for statistic in (np.where(fresh, more.statistic, 0.0), more.statistic):
+            if statistic.max(initial=0.0) ** 2 >= settings.shape_gain:
+                added = _fit_terms(observation, best, more, (int(np.argmax(statistic)),), settings)
+            if added is not None and best.chi2 - added.chi2 >= settings.shape_gain:
+                break
         if added is None or best.chi2 - added.chi2 < settings.shape_gain:
             break
-        best = added
+        best = _without_needless_forms(observation, added, settings)
+    return best
+
+
+def _without_needless_forms(observation: Observation, best: Fit, settings: DiagnosisSettings) -> Fit:
+    """Drop the forms that later ones have made needless: what each removes is less than ``shape_gain``.
+
+    A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
+    """
+    while len(best.extension.terms) > 1:
+        shorter = [
+            fit(
+                observation,
+                replace(best.extension, terms=tuple(t for k, t in enumerate(best.extension.terms) if k != dropped)),
+                np.delete(best.vector, range(at, at + 1 + len(best.extension.terms[dropped].variant.tuned))),
+                iterations=settings.iterations,
+                tolerance=settings.tolerance,
+                near=best.run,
+            )
+            for dropped, at in enumerate(best.extension.owners)
+        ]
+        simplest = min(shorter, key=lambda fitted: fitted.chi2 if fitted.run.prediction is not None else np.inf)
+        if simplest.run.prediction is None or simplest.chi2 - best.chi2 > settings.shape_gain:
+            break
+        best = simplest
     return best
 
 

@@ -4,9 +4,13 @@ All curves are over the curvature K = K0 + D on the visited range, tangent readi
 covariance of the fit, correlations between control points and K0 included:
 
     df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
+
+Where several causes explain the same data, the distance between their curves widens the band.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +27,17 @@ def visited(fitted: Fit) -> tuple[float, float]:
     return float(kappa.min()), float(kappa.max())
 
 
-def curve(fitted: Fit, *, points: int) -> Curve:
-    """f_EI and m of a fitted model on its visited range."""
+def curve(fitted: Fit, *, points: int, rivals: Sequence[tuple[Fit, float]] = ()) -> Curve:
+    """f_EI and m of a fitted model on its visited range.
+
+    Parameters
+    ----------
+    fitted : Fit
+    points : int
+    rivals : sequence of (Fit, probability)
+        Other explanations of the same class. How far their f_EI lies from this one is part of the band: the variance of
+        a mixture, ``sum_k p_k (f_k - f)^2`` beside the covariance of the fit.
+    """
     base = fitted.extension.base
     law, K0 = base.characteristic(fitted.vector), base.pre_curvature(fitted.vector)
     low, high = visited(fitted)
@@ -40,28 +53,31 @@ def curve(fitted: Fit, *, points: int) -> Curve:
         by_moment = np.column_stack([by_moment, law.moment_by_pre_curvature(K, K0)])
         used.append(bend)
     covariance = fitted.covariance[np.ix_(used, used)]
-    moment_std = _std(by_moment, covariance)
     values, vectors = np.linalg.eigh(covariance)
-    factor = by_tangent @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    tangent, moment = law.tangent(K, K0), law.moment(K, K0)
+    apart_f, apart_m = [by_tangent @ root], [by_moment @ root]
+    for rival, chance in rivals:
+        other, own = rival.extension.base.characteristic(rival.vector), rival.extension.base.pre_curvature(rival.vector)
+        apart_f.append(np.sqrt(chance) * (other.tangent(K, own) - tangent)[:, None])
+        apart_m.append(np.sqrt(chance) * (other.moment(K, own) - moment)[:, None])
+    factor = np.hstack(apart_f)
+    tangent_std, moment_std = (np.linalg.norm(columns, axis=1) for columns in (factor, np.hstack(apart_m)))
     excess = K - K0
     # at K = K0 the secant is the tangent, and so is its band
     far = excess > 1e-3 * (high - K0)
-    secant_std = np.where(far, moment_std / np.where(far, excess, 1.0), _std(by_tangent, covariance))
+    secant_std = np.where(far, moment_std / np.where(far, excess, 1.0), tangent_std)
     return Curve(
         kappa_per_m=K.tolist(),
-        moment_Nm=law.moment(K, K0).tolist(),
+        moment_Nm=moment.tolist(),
         moment_std_Nm=moment_std.tolist(),
-        tangent_Nm2=law.tangent(K, K0).tolist(),
-        tangent_std_Nm2=_std(by_tangent, covariance).tolist(),
+        tangent_Nm2=tangent.tolist(),
+        tangent_std_Nm2=tangent_std.tolist(),
         secant_Nm2=law.secant(K, K0).tolist(),
         secant_std_Nm2=secant_std.tolist(),
         supported=[True] * points,
         tangent_factor_Nm2=factor.tolist(),
     )
-
-
-def _std(columns: Array, covariance: Array) -> Array:
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, covariance, columns), 0.0)))
 
 
 def stiffness_change(before: Fit, after: Fit) -> float:

@@ -282,7 +282,7 @@ def fit(
         state = _State(vector, base_model, here, value)
         jacobian = sensitivities(observation, extension, vector, base_model, here)
     rows = np.ones(len(state.value), dtype=bool) if kept is None else kept
-    converged, damping = False, 0.0
+    converged, damping, crawled = False, 0.0, 0
     for _ in range(iterations):
         scaled = _Scaled(jacobian[rows], state.value[rows], cutoff)
         if scaled.expected < tolerance:
@@ -292,14 +292,22 @@ def fit(
         if accepted is None:
             converged = scaled.expected < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
-        before, (state, damping) = state, accepted
+        before, (state, damping) = state.cost(rows), accepted
         jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.here)
-        if before.cost(rows) - state.cost(rows) < tolerance and damping == 0.0:
+        fall = before - state.cost(rows)
+        if fall < tolerance and damping == 0.0:
             converged = True
+            break
+        crawled = crawled + 1 if damping > 0.0 and fall < CRAWL * before else 0
+        if crawled == PATIENCE:
             break
         damping = 0.1 * damping if damping > 1e-4 else 0.0
     advice = "" if converged else "the fit did not settle"
     return Fit(extension, state.vector, state.here, state.value, jacobian, converged, advice)
+
+
+CRAWL, PATIENCE = 2e-3, 4
+"""Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
 
 
 class _State(NamedTuple):

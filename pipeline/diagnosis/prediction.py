@@ -82,7 +82,7 @@ def facts_of(test: MeasuredTest) -> Facts:
     steps = test.steps
     shapes = [step.shape for step in steps if step.shape is not None]
     bow = max((float(np.max(np.abs(shape.y))) for shape in shapes), default=0.2 * test.length)
-    bend = max((float(np.ptp(shape.kappa)) for shape in shapes), default=1.0 / test.length)
+    bend = max((_range(shape.kappa[shape.seen]) for shape in shapes if np.any(shape.seen)), default=0.0)
     force = max(abs(step.force) for step in steps)
     timed = all(step.hold_times is not None and step.time is not None for step in steps)
     begin, holds, photo = [], [], []
@@ -105,8 +105,14 @@ def facts_of(test: MeasuredTest) -> Facts:
         length=test.length,
         force_scale=force,
         moment_scale=force * bow,
-        curvature_scale=max(bend, 1e-3 / test.length),
+        curvature_scale=bend or 1.0 / test.length,
     )
+
+
+def _range(kappa: Array) -> float:
+    """Range of curvatures of a photo, 1/m, without the outermost 2 %: at the rim of what is seen they are uncertain."""
+    low, high = np.quantile(kappa, [0.02, 0.98])
+    return float(high - low)
 
 
 def _samples(step: MeasuredStep) -> int:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanation import Explanation
 from pipeline.diagnosis.extended import curve, stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.fit import Fit
 from pipeline.diagnosis.heldout import measured_gain
 from pipeline.diagnosis.maps import residual_map, smooth_share
 from pipeline.diagnosis.next_experiment import next_experiment
@@ -59,12 +60,21 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
         gain=_valid(gain),
         blind_spots=blind_spots(bench, rows, settings),
         next_experiment=_next(bench, conclusion, settings, verdict),
-        extended=curve(accepted.fitted, points=settings.curve_points) if accepted else None,
+        extended=curve(accepted.fitted, points=settings.curve_points, rivals=_rivals(conclusion)) if accepted else None,
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
         twins=confusable(bench, conclusion, settings),
     )
+
+
+def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
+    """The other members of the class of the accepted cause, with their share of the class's probability."""
+    if conclusion.accepted is None or len(conclusion.accepted.causes) > 1:
+        return []
+    chance = conclusion.probability[: conclusion.members]
+    others = zip(conclusion.singles[: conclusion.members], chance, strict=True)
+    return [(e.fitted, p / sum(chance)) for e, p in others if e.causes != conclusion.accepted.causes]
 
 
 def named_causes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:

@@ -11,7 +11,9 @@ the size of an effect in sigma, the weight of an explanation is ``exp(gain / 2)`
 The gain is divided by the reduced chi-square of the best explanation where that exceeds 1: where even the best form
 does not fit to the noise, a difference between two imperfect forms is no proof.
 
-The causes that together hold 95 % of the weight form the set. One name: ``named``; several: ``class``.
+The causes that together hold 95 % of the weight form the set, and with them every twin of the best one: whatever points
+the same way and removes as much, so that only the weights of forms and sizes speak against it. One name: ``named``;
+several: ``class``.
 """
 
 from __future__ import annotations
@@ -86,6 +88,27 @@ def credible_set(probability: Array, *, level: float) -> list[int]:
     order = np.argsort(-probability, kind="stable")
     needed = int(np.searchsorted(np.cumsum(probability[order]), level - 1e-12)) + 1
     return [int(k) for k in order[: min(needed, len(order))]]
+
+
+def with_twins(
+    members: list[int], probability: Array, gain: Array, closeness: Array, *, cosine: float, margin: float
+) -> list[int]:
+    """The set with the twins of its first member.
+
+    Parameters
+    ----------
+    members : list of int
+        As of `credible_set`.
+    probability, gain : (n,)
+        Of each explanation.
+    closeness : (n,)
+        |cos| of each explanation's direction with that of the first member.
+    cosine, margin : float
+        Twins are closer than ``cosine`` and remove at most ``margin`` less chi-square than the first member.
+    """
+    twin = (closeness > cosine) & (gain > gain[members[0]] - margin)
+    order = np.argsort(-probability, kind="stable")
+    return [*members, *(int(k) for k in order if twin[k] and int(k) not in members)]
 
 
 def decide(*, detected: bool, alien: bool, two: bool, names: int, powerless: bool) -> Verdict:

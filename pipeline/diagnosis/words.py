@@ -52,7 +52,11 @@ def headline(
     if verdict == "unexplained":
         return f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}."
     sizes = [f"{rounded(value, std)} {unit}".rstrip(" -") for value, std, unit in amounts]
-    gain = "" if explained is None else f"; on steps it had not seen it removes {100.0 * explained:.0f} % of the misfit"
+    gain = (
+        ""
+        if explained is None
+        else f"; on steps it had not seen it removes {100.0 * min(explained, 1.0):.0f} % of the misfit"
+    )
     shift = "" if change is None else f", and f_EI changes by {100.0 * change:.2g} % rms"
     if verdict == "two_causes":
         both = " and ".join(f"{listed(group)} ({size})" for group, size in zip(names, sizes, strict=True))

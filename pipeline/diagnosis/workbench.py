@@ -169,8 +169,9 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
         )
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
-        at_rest = "mounted" in facts.branch  # K0 is then seen directly, and has no second valley
-        if best is not None and (best.chi2 < settings.fits * freedom or (at_rest and best.converged)):
+        # only then K0 is seen directly; else it has a second valley, which may fit nearly as well
+        at_rest = "mounted" in facts.branch
+        if at_rest and best is not None and (best.chi2 < settings.fits * freedom or best.converged):
             break
     return found if best is None else best
 

@@ -60,7 +60,10 @@ class DiagnosisSettings(BaseModel):
     )
 
     # naming
-    twin_cosine: float = Field(0.95, description="|cos| above which two causes are one class, diagnosis.md F")
+    twin_cosine: float = Field(0.95, description="|cos| above which two causes that remove as much are one class")
+    twin_margin: float = Field(
+        4.0, description="chi-square a twin may remove less than the best cause and still share its class (2 sigma)"
+    )
     set_level: float = Field(0.95, description="probability the set of possible causes contains the true one")
     refit_margin: float = Field(
         0.35, description="share of the best linear chi-square gain a cause may fall short of and still be refitted"

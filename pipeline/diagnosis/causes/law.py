@@ -16,9 +16,6 @@ from pipeline.diagnosis.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
-ROUND = 8
-"""Elements of a friction that slips gradually: the corner is then round to 1/8 of its width."""
-
 
 @dataclass(frozen=True)
 class NonlinearStiffness:
@@ -97,20 +94,17 @@ class Hysteresis:
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Sharp and round loops that have slipped after some share of the range of curvatures."""
-        reach = (0.01 * facts.curvature_scale, 2.0 * facts.curvature_scale)
-        kinds = [("with a sharp corner", 0.0, share) for share in (0.06, 0.15, 0.4, 1.0)]
-        kinds += [("with a round corner", 1.0, share) for share in (0.1, 0.3, 0.8)]
+        """Elements that slip after some share of the range of curvatures; a round loop is a sum of them."""
+        # what has not slipped over the whole range is elastic, and no other than the law itself
+        reach = (0.01 * facts.curvature_scale, 0.9 * facts.curvature_scale)
         return tuple(
-            Variant(label, at=share * facts.curvature_scale, width=round_, tuned=("at",), at_range=reach)
-            for label, round_, share in kinds
+            Variant("with a sharp corner", at=share * facts.curvature_scale, tuned=("at",), at_range=reach)
+            for share in (0.05, 0.12, 0.25, 0.5, 0.8)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that has slipped after a curvature change ``at``; round if it has one."""
-        beside = model.bending.friction
-        elements = ROUND if variant.width > 0.0 else 1
-        friction = InternalFriction(max(amount, 0.0), variant.at, elements, beside=beside)
+        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is."""
+        friction = InternalFriction(max(amount, 0.0), variant.at, 1, beside=model.bending.friction)
         return replace(model, bending=replace(model.bending, friction=friction))
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pipeline.diagnosis.score import score
-from pipeline.diagnosis.verdict import Weighed, credible_set, decide, probabilities, scan_share
+from pipeline.diagnosis.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
 
 
 def weigh(gains, **kind):
@@ -33,6 +33,14 @@ def test_set_holds_the_level():
     p = np.array([0.5, 0.02, 0.4, 0.08])
     assert credible_set(p, level=0.95) == [0, 2, 3]
     assert credible_set(p, level=0.5) == [0]
+
+
+def test_twins_that_remove_as_much_share_the_class():
+    probability = np.array([0.97, 0.02, 0.006, 0.004])
+    gain, closeness = np.array([100.0, 99.0, 99.0, 80.0]), np.array([1.0, 0.99, 0.5, 0.99])
+    assert with_twins([0], probability, gain, closeness, cosine=0.95, margin=4.0) == [0, 1]
+    assert with_twins([0, 1], probability, gain, closeness, cosine=0.95, margin=4.0) == [0, 1]
+    assert with_twins([0], probability, gain, closeness, cosine=0.95, margin=30.0) == [0, 1, 3]
 
 
 def test_stated_probabilities_are_true_for_twins():

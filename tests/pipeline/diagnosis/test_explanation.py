@@ -1,0 +1,79 @@
+"""Refits: forms that are not needed are dropped, refits without some data do not see them, bands of a class."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import LOOP, hidden_test
+from fixtures.memory import Slipping
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.explanation import refit_one
+from pipeline.diagnosis.extended import curve
+from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis.fit import fit
+from pipeline.diagnosis.workbench import prepare
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+SETTINGS = DiagnosisSettings()
+ELEMENTS = Slipping((2e-3, 1.3e-3), (1.0, 3.0))
+
+
+def prepared(cable, seed):
+    return prepare(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=seed), SETTINGS), SETTINGS, knots=5)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return prepared(Cable(), 6)
+
+
+def test_two_elements_that_slip_are_found_as_two():
+    """Truth by collocation; each slip within four of its standard deviations, and the law is itself again."""
+    bench = prepared(Cable(memory=ELEMENTS), 6)
+    index = [cause.name for cause in CATALOGUE].index("hysteresis")
+    found = refit_one(bench.observation, bench.base, bench.suspicion, index, SETTINGS)
+    own = found.fitted.extension.owners
+    assert len(own) == 2
+    slip = sorted((found.fitted.vector[at + 1], np.sqrt(found.fitted.covariance[at + 1, at + 1])) for at in own)
+    for (value, std), truth in zip(slip, ELEMENTS.slip, strict=True):
+        assert abs(value - truth) < 4.0 * std and std < 0.1 * truth
+    amount, std = found.amount(CATALOGUE[index])
+    assert amount == pytest.approx(np.dot(ELEMENTS.stiffness, ELEMENTS.slip), abs=4.0 * std)
+
+
+def test_rows_left_out_of_a_refit_do_not_matter(plain):
+    rows = len(plain.observation.rows.kind)
+    kept = np.r_[plain.observation.rows.step != 3, np.ones(len(plain.base.residual) - rows, dtype=bool)]
+    spoilt = replace(plain.observation, added=np.where(plain.observation.rows.step == 3, 50.0, 0.0))
+    found = [
+        fit(
+            observation,
+            plain.base.extension,
+            plain.base.vector,
+            iterations=10,
+            tolerance=1e-3,
+            kept=kept,
+            begin=begin,
+        )
+        for observation, begin in ((plain.observation, plain.base), (spoilt, None))
+    ]
+    # both end within the tolerance of the same minimum: a thirtieth of a standard deviation
+    std = np.sqrt(np.diag(plain.base.covariance))
+    assert np.all(np.abs(found[0].vector - found[1].vector) < 0.1 * std)
+    assert np.all(found[1].residual[:rows][plain.observation.rows.step == 3] > 40.0)
+
+
+def test_the_band_of_a_class_holds_the_distance_of_its_members(plain):
+    count = len(plain.base.extension.base.knots)
+    other = replace(
+        plain.base, vector=plain.base.vector + np.r_[np.full(count, 0.03), np.zeros(len(plain.base.vector) - count)]
+    )
+    alone = curve(plain.base, points=21)
+    shared = curve(plain.base, points=21, rivals=[(other, 0.4)])
+    apart = np.expm1(0.03) * np.array(alone.tangent_Nm2)
+    expected = np.hypot(alone.tangent_std_Nm2, np.sqrt(0.4) * apart)
+    assert shared.tangent_Nm2 == alone.tangent_Nm2
+    assert shared.tangent_std_Nm2 == pytest.approx(expected, rel=1e-6)
+    assert shared.moment_std_Nm[-1] > alone.moment_std_Nm[-1]
