@@ -168,7 +168,7 @@ class SegmentationSettings(StageSettings):
         0.9, gt=0, lt=1, description="ratio to the best pair's score from which a wider pair is preferred"
     )
     edge_reach_widths: float = Field(
-        0.15, gt=0, lt=0.5, description="widths; an edge is sought so far about the pair's place: steps of 5 %, noise"
+        0.1, gt=0, lt=0.5, description="widths; an edge is sought so near to the pair's place; glare is farther"
     )
     least_edge_share: float = Field(
         0.15, gt=0, lt=1, description="ratio to the usual steepest slope; a flatter place is no edge: half is shade"
@@ -228,6 +228,12 @@ class BearingSettings(StageSettings):
         0.05,
         gt=0,
         description="radii; standard deviation of the ring that seeks centres: as well as the radius is known",
+    )
+    near_radii: float = Field(
+        0.045, gt=0, description="radii; half range in which edges are sought at last: a bevel is twice as far away"
+    )
+    light_reach_px: float = Field(
+        4.0, ge=2, description="px; half range about an edge in which the light's slopes are fitted with it"
     )
     min_rim: float = Field(
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"

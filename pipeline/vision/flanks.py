@@ -54,18 +54,20 @@ def find_flanks(
     spacing = float(offsets[1] - offsets[0])
     soft = cv2.GaussianBlur(relief, (0, 0), max(0.8, 0.08 * width / spacing), borderType=cv2.BORDER_REPLICATE)
     slope = np.gradient(soft, spacing, axis=1)
-    # The flanks of most sections tell how strong an edge is; letters and glare count no more than that.
-    usual = float(np.median(np.abs(slope).max(axis=1)))
+    # Most sections tell how strong an edge is; letters count no more, and a highlight's edge, which may be three times
+    # as strong as a flank, less than twice (the root).
+    usual = float(np.median(np.abs(slope).max(axis=1))) + 1e-12
     pooling = settings.pair_pooling_widths * width
     rise, fall = (
-        gaussian_filter1d(np.clip(edge, 0.0, usual), pooling, axis=0, mode="nearest") for edge in (slope, -slope)
+        np.sqrt(gaussian_filter1d(np.clip(edge / usual, 0.0, 1.0), pooling, axis=0, mode="nearest"))
+        for edge in (slope, -slope)
     )
     near = np.abs(offsets) <= settings.pair_search_widths * width
     best = _pair_width(rise, fall, offsets, near, width, known, settings)
     # Pooled sections repeat each other: every half width of them is enough for the course.
     every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
     score = _pair_score(rise[every], fall[every], offsets, best)[:, near]
-    course = offsets[near][_best_course(score, settings.pair_wander_cost * usual)]
+    course = offsets[near][_best_course(score, settings.pair_wander_cost)]
     middle = np.interp(np.arange(len(relief)), every, course)
     least = settings.least_edge_share * usual
     slope = gaussian_filter1d(slope, pooling, axis=0, mode="nearest")

@@ -99,17 +99,23 @@ def _weigh(
         area = reading.longest * reading.width
         chosen = accepted[0] if accepted else 0
         outcome = outcomes[chosen]
-        if len(accepted) > 1:
-            lengths = [rivals[k].length * standout.reduction for k in accepted]
+        # blur is judged last: a strip refused for it looks like a cable in all else
+        alike = [k for k, verdict in enumerate(outcomes) if k in accepted or _code(verdict) == "photo/blur"]
+        if accepted and len(alike) > 1:
+            lengths = [rivals[k].length * standout.reduction for k in alike]
             text = (
-                f"{len(accepted)} strips could be the cable ({lengths[0]:.0f} px and {lengths[1]:.0f} px long); "
+                f"{len(alike)} strips could be the cable ({lengths[0]:.0f} px and {lengths[1]:.0f} px long); "
                 "leave one cable in the picture"
             )
-            outcome = refused(photo, "photo/two-candidates", text, candidates=float(len(accepted)))
+            outcome = refused(photo, "photo/two-candidates", text, candidates=float(len(alike)))
         verdicts.append((area, outcome, standout.to_pixels(rivals[chosen].path)))
     clear = [v for v in verdicts if isinstance(v[1], RoughCable) or v[1].code in _CONCLUSIVE]
     _, outcome, path = max(clear or verdicts, key=lambda verdict: verdict[0])
     return outcome, path
+
+
+def _code(outcome: RoughCable | Rejected) -> str:
+    return outcome.code if isinstance(outcome, Rejected) else ""
 
 
 def _is_part(found: RoughCable, leaving: list[Array]) -> bool:

@@ -1,0 +1,269 @@
+"""The rim of a round cover: a circle fitted to the edges on rays from a first guess of its centre.
+
+``rays -> slope of the grey value -> the shift that lays most of one circle on edges -> edges -> robust circle``
+
+A bevel, a groove, a shadow and a printed ring make edges of their own; with all directions together only one circle of
+the expected radius has an edge all round. A soft shadow beside the rim pulls the steepest place toward itself by
+(slope outside - slope inside) sigma^2 / step, so the slopes on both sides are fitted with the edge.
+Units: px of the photo as displayed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.special import ndtr
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import Bearing
+
+_MAD_TO_STD = 1.4826
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A fitted circle and how much of its rim was seen.
+
+    ``center`` (u, v), ``radius`` and their standard deviations in px; ``rim`` is the share of directions with an edge
+    on the circle.
+    """
+
+    center: tuple[float, float]
+    radius: float
+    std: float
+    radius_std: float
+    rim: float
+
+    def as_bearing(self) -> Bearing:
+        """The bearing axis under this cover."""
+        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover")
+
+
+@dataclass(frozen=True)
+class Radius:
+    """Expected radius of a cover in px and its relative standard deviation."""
+
+    px: float
+    std: float
+
+
+def fit_circle(
+    photo: Photo, center: Array, expected: Radius, settings: BearingSettings, *, softness: float = 1.0
+) -> Circle | None:
+    """Fit a circle to the edges around a first guess; None if there are too few.
+
+    Strategy: the shift with most of one circle on edges; then radial profiles from there, twice; the edge is the
+    centroid of the slope about its steepest place, at last with the slopes of light beside it; Gauss-Newton on the
+    radial residuals with Tukey's biweight. The slope is taken over ``softness`` px: sought over its own blur, an edge
+    stands out of noise the most.
+    """
+    radius = expected.px
+    count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
+    angle = np.arange(count) * (2.0 * np.pi / count)
+    ray = np.column_stack([np.cos(angle), np.sin(angle)])
+    span = max(4.0, settings.search_radii * radius)
+    parameters = np.array([*center, radius])
+    parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
+    reach = max(3.0, settings.near_radii * radius)
+    for beside in (False, True):
+        slopes = _radial_slopes(photo, parameters, ray, reach, softness, settings.pooled_rays)
+        edge, trust = _radial_edges(slopes, reach, softness, settings)
+        if beside:
+            edge = _without_light(slopes, edge, settings)
+        fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
+        if fitted is None:
+            return None
+        before, (parameters, covariance) = parameters, fitted
+    miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
+    rim = float(np.mean(np.abs(miss) < max(0.75, settings.rim_tolerance * radius)))
+    off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
+    concentric = other > max(4.0 * expected.std * radius, 1.0)
+    if off > 0.5 * radius or (concentric and (rim < settings.sure_rim or other > 1.2 * span)):
+        return None
+    if concentric:
+        # A bevel or groove turned on the same axis, seen all round: it tells the centre, the radius it does not.
+        std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
+        return Circle((float(parameters[0]), float(parameters[1])), radius, std, 0.1 * radius, rim)
+    # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
+    excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
+    std = float(
+        np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
+    )
+    radius_std = float(np.hypot(np.sqrt(covariance[2, 2]), settings.center_std_floor_px))
+    return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """Slope along rays: ``along`` (rays, places) with the sign of the edge positive, ``strength`` without a sign.
+
+    ``offsets`` (places,) px from the circle the rays started at; ``seen`` False where a ray leaves the picture.
+    """
+
+    offsets: Array
+    along: Array
+    strength: Array
+    seen: NDArray[np.bool_]
+
+
+def _radial_slopes(
+    photo: Photo, parameters: Array, ray: Array, span: float, softness: float, pooled_rays: float
+) -> _Slopes:
+    # The outer halves of the rays tell what is no edge: sheen, texture and noise.
+    calm = span + 4.0 * (softness - 1.0)  # a soft edge reaches beyond the range in which it is sought
+    offsets = np.arange(-calm - span, calm + span + 0.25, 0.5)
+    points = parameters[:2] + (parameters[2] + offsets)[None, :, None] * ray[:, None, :]
+    low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 2, 0)
+    high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 3, photo.size)
+    if (high - low < 4).any():
+        nothing = np.zeros((len(ray), len(offsets)))
+        return _Slopes(offsets, nothing, nothing, np.zeros(len(ray), bool))
+    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
+    u, v = (points[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
+    profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
+    # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
+    pooled = gaussian_filter1d(profile, pooled_rays * softness, axis=0, mode="wrap")
+    slope = gaussian_filter1d(np.gradient(pooled, 0.5, axis=1), 2.0 * softness, axis=1)
+    strength = np.sqrt((slope**2).sum(axis=2))
+    inner = np.abs(offsets) <= span
+    outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
+    steepest = np.argmax(np.where(inner, strength, 0.0), axis=1)
+    colour = slope[np.arange(len(ray)), steepest]
+    colour /= np.hypot.reduce(colour, axis=1)[:, None] + 1e-12
+    along = np.einsum("ijc,ic->ij", slope, colour)
+    return _Slopes(offsets, along, strength, ~(outside & inner).any(axis=1))
+
+
+def _best_shift(
+    photo: Photo,
+    parameters: Array,
+    ray: Array,
+    span: float,
+    softness: float,
+    expected: Radius,
+    settings: BearingSettings,
+) -> Array:
+    """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
+    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness, settings.pooled_rays)
+    step = span / 12.0
+    peak = np.sort(np.where(slopes.seen[:, None], slopes.strength, 0.0).max(axis=1))
+    usual = float(peak[len(peak) // 2]) + 1e-12
+    # Blurred to the step of the search; no direction counts more than the median one.
+    level = gaussian_filter1d(np.minimum(slopes.strength / usual, 1.0), step, axis=1) * slopes.seen[:, None]
+    shifts = np.arange(-12, 13) * step
+    wider = np.clip(np.arange(-2, 3) * expected.std * expected.px, -0.5 * span, 0.5 * span)
+    rows = np.arange(len(ray))[:, None]
+    best, found = -1.0, parameters
+    for k, more in enumerate(wider):
+        aside = more + shifts[:, None, None] * ray[:, 0] + shifts[None, :, None] * ray[:, 1]
+        places = np.rint((aside.reshape(-1, len(ray)).T - slopes.offsets[0]) / 0.5).astype(int)
+        score = level[rows, np.clip(places, 0, len(slopes.offsets) - 1)].mean(axis=0) * (1.0 - 0.03 * abs(k - 2))
+        place = int(np.argmax(score))
+        if score[place] > best:
+            i, j = divmod(place, len(shifts))
+            best, found = float(score[place]), parameters + np.array([shifts[i], shifts[j], more])
+    return found
+
+
+def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: BearingSettings) -> tuple[Array, Array]:
+    """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
+
+    The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
+    else pass for the rim.
+    """
+    offsets, strength = slopes.offsets, slopes.strength
+    inner = np.abs(offsets) <= span
+    place = np.argmax(np.where(inner, strength, 0.0), axis=1)
+    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5 * softness
+    mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
+    edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
+    peak = strength[np.arange(len(strength)), place]
+    calm = np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span
+    found = slopes.seen & (peak > settings.rim_over_texture * float(np.median(strength[:, calm])))
+    usual = float(np.percentile(peak[found], 75)) if found.any() else 1.0
+    return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
+
+
+def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> Array:
+    """Edges freed of the pull of a shadow beside the rim.
+
+    About each edge the slope is ``A G(t - e) + a + b Phi(t)``: the blurred step and the light's slope on both sides;
+    linear in A, A e, a and b. Its spread follows from the mean profile of all edges.
+    """
+    found = np.isfinite(edge)
+    if found.sum() < 12:
+        return edge
+    t = np.arange(-settings.light_reach_px, settings.light_reach_px + 0.25, 0.5)
+    places = (np.where(found, edge, 0.0)[:, None] + t - slopes.offsets[0]) / 0.5
+    low = np.clip(np.floor(places).astype(int), 0, len(slopes.offsets) - 2)
+    share, rows = np.clip(places - low, 0.0, 1.0), np.arange(len(edge))[:, None]
+    around = (1.0 - share) * slopes.along[rows, low] + share * slopes.along[rows, low + 1]
+    mean = np.median(around[found], axis=0)
+    mass = np.clip(mean - np.min(mean), 0.0, None)
+    inside = mass > 0.3 * mass.max()
+    # Of a Gaussian cut at 0.3 of its height the variance is 0.58 of the whole one's.
+    sigma = float(np.sqrt((mass[inside] @ t[inside] ** 2) / mass[inside].sum() / 0.58))
+    bell = np.exp(-0.5 * (t / sigma) ** 2)
+    design = np.column_stack([bell, t * bell / sigma**2, np.ones_like(t), ndtr(t / sigma)])
+    solved = around @ np.linalg.pinv(design).T
+    step = solved[:, 0]
+    good = found & (step > 0.3 * np.abs(around).max(axis=1))
+    shift = np.where(good, solved[:, 1] / np.where(good, step, 1.0), 0.0)
+    return np.asarray(edge + np.clip(shift, -sigma, sigma))
+
+
+def _robust_circle(
+    parameters: Array, ray: Array, edge: Array, trust: Array, span: float, expected: Radius
+) -> tuple[Array, Array] | None:
+    found = np.isfinite(edge)
+    if found.sum() < 12:
+        return None
+    points = parameters[:2] + (parameters[2] + edge[found])[:, None] * ray[found]
+    fit, scale = parameters.copy(), 0.5 * span
+    for step in range(25):
+        arm = points - fit[:2]
+        distance = np.hypot(*arm.T)
+        residual = distance - fit[2]
+        tukey = trust[found] * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
+        design = np.column_stack([arm / distance[:, None], np.ones(len(points))])
+        normal = design.T @ (tukey[:, None] * design)
+        # A whole rim has the determinant W^3 / 4 (W the sum of weights), an eighth of it a thousandth of that.
+        if np.linalg.det(normal) < 2.5e-4 * tukey.sum() ** 3 or not tukey.any():
+            return None
+        gradient = design.T @ (tukey * residual)
+        prior = (scale / (expected.std * expected.px)) ** 2
+        normal[2, 2] += prior
+        gradient[2] += prior * (expected.px - fit[2])
+        change = np.linalg.solve(normal, gradient)
+        fit = fit + change
+        # The scale may fall by a third a step: a robust fit that trusts its first guess too early keeps its error.
+        floor = 0.67 * scale if step < 6 else 0.03
+        settled = np.abs(change).max() < 1e-3 and step >= 6
+        scale = max(_MAD_TO_STD * float(np.median(np.abs(residual))), floor)
+        if settled:
+            break
+    spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))
+    lag = float((residual[1:] * residual[:-1] * tukey[1:] * tukey[:-1]).sum() / ((tukey * residual) ** 2).sum())
+    # Neighbouring directions share noise and texture: an autoregression of lag one inflates the variance so much.
+    inflation = (1.0 + np.clip(lag, 0.0, 0.95)) / (1.0 - np.clip(lag, 0.0, 0.95))
+    covariance = np.linalg.inv(normal) * spread**2 * inflation
+    covariance[:2, :2] += _unevenness(arm / distance[:, None], residual, tukey) * np.eye(2)
+    return fit, covariance
+
+
+def _unevenness(direction: Array, residual: Array, weight: Array) -> float:
+    """Variance (px^2) of a centre coordinate by light and looks that differ around the rim.
+
+    They move edges by smooth functions of the direction. The part once around passes for a shift of the centre; those
+    two and three times around are seen, and are about as large.
+    """
+    angle = np.arctan2(direction[:, 1], direction[:, 0])
+    waves = np.column_stack([wave(n * angle) for n in (2, 3) for wave in (np.cos, np.sin)])
+    normal = waves.T @ (weight[:, None] * waves) + 0.05 * weight.sum() * np.eye(4)
+    return float(np.mean(np.linalg.solve(normal, waves.T @ (weight * residual)) ** 2))
