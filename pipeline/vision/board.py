@@ -68,13 +68,22 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
     Raises
     ------
     InputError
-        ``calibration/no-board``: the board is on none of the photos; ``calibration/size``: photos of different sizes.
+        ``calibration/no-board``: the board is on none of the photos; ``calibration/size``: photos of different sizes;
+        ``calibration/degenerate``: no plane follows from the corners.
     """
     if camera.calibration is None or camera.board is None:
         raise ValueError("calibrate_by_board needs a folder of photos and the board's size")
     stage = settings.calibration
     views, findings = _read_views(camera.calibration, camera.board, settings)
-    fit = fit_views(views, stage)
+    try:
+        fit = fit_views(views, stage)
+    except (np.linalg.LinAlgError, cv2.error) as error:
+        raise InputError(
+            "no plane follows from the corners of the board",
+            path=camera.calibration,
+            code="calibration/degenerate",
+            remedy="show the whole board from above, lying in the plane of the cable",
+        ) from error
     plane, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)
     middle = 0.5 * np.array([views[0].size], float)
     std = float(np.sqrt(fit.scale_std**2 + stage.board_std**2 + height_std**2))
@@ -118,7 +127,8 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
     factor = max(1, round(max(photo.size) / settings.board_search_px))
     small = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
     found = _charuco(small, board) if board.charuco else _chessboard(small, board)
-    if found is None or len(found[0]) < 6:
+    # corners on one line tell no plane, however many there are
+    if found is None or len(found[0]) < 6 or not _spread(found[0], 0.25 * board.square_m):
         reason = f"{photo.name}: the board with {board.columns} x {board.rows} inner corners is not seen."
         return Rejected(photo.name, "calibration/no-corners", reason)
     points, uv = found
@@ -129,6 +139,12 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
         start = np.ascontiguousarray(uv.reshape(-1, 1, 2), np.float32)
         uv = cv2.cornerSubPix(grey, start, (3 * factor, 3 * factor), (-1, -1), criteria).reshape(-1, 2)
     return BoardView(photo.name, points, np.asarray(uv, np.float64), photo.size)
+
+
+def _spread(points: Array, least: float) -> bool:
+    """True if the points span a plane: their standard deviation is at least ``least`` in every direction."""
+    covariance = np.cov(points, rowvar=False)
+    return bool(np.sqrt(max(float(np.linalg.eigvalsh(covariance)[0]), 0.0)) > least)
 
 
 def _grey8(photo: Photo) -> NDArray[np.uint8]:
@@ -209,7 +225,7 @@ class _Solution:
 
 def _start(views: list[BoardView], middle: Array, radius: float) -> tuple[Array, list[Array]]:
     """Homography of the first photo and rigid moves of the others from matching by it."""
-    first, _ = cv2.findHomography((views[0].uv - middle) / radius, views[0].board_m)
+    first = _homography((views[0].uv - middle) / radius, views[0].board_m)
     start = (first / first[2, 2]).ravel()[:8]
     moves = []
     for view in views[1:]:
@@ -218,6 +234,13 @@ def _start(views: list[BoardView], middle: Array, radius: float) -> tuple[Array,
         turn = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
         moves.append(np.array([turn, *(plane.mean(axis=0) - _rotation(turn) @ view.board_m.mean(axis=0))]))
     return start, moves
+
+
+def _homography(uv: Array, points: Array) -> Array:
+    matrix, _ = cv2.findHomography(uv, points)
+    if matrix is None or abs(matrix[2, 2]) < 1e-9:
+        raise np.linalg.LinAlgError  # on one line or in one point
+    return np.asarray(matrix)
 
 
 def _rotation(turn: float) -> Array:
@@ -281,7 +304,7 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     rms, camera, distortion, turns, shifts = fits[1] if drop > settings.lens_sigmas**2 * 3 else fits[0]
     lens = Lens(np.asarray(camera), np.ravel(distortion)[:5])
     ideal = lens.undistort(views[0].uv)
-    homography, _ = cv2.findHomography(ideal, views[0].board_m)
+    homography = _homography(ideal, views[0].board_m)
     rotation, _ = cv2.Rodrigues(turns[0])
     # The board's z axis points away from or toward the camera; the distance from the plane is the same.
     distance = float(abs(rotation[:, 2] @ np.ravel(shifts[0])))
