@@ -79,9 +79,6 @@ class Estimate:
         beside these ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` (-1: common to all photos).
     shortfall : (n, n)
         Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
-    form_sizes : (tau, slope)
-        How rough and how steep at K0 the data let the law be, see `rod.inverse.knots`: geometric means of what they
-        allow.
     evidence : dict of int -> float
         Log evidence of each number of control points tried, against the best.
     model, evaluation, unknowns, covariance
@@ -110,7 +107,6 @@ class Estimate:
     log_covariance: Array = field(default_factory=_none)
     gains: dict[Source, Array] = field(default_factory=dict)
     shortfall: Array = field(default_factory=_none)
-    form_sizes: tuple[float, float] = (np.nan, np.nan)
     evidence: dict[int, float] = field(default_factory=dict)
     model: FitModel | None = None
     evaluation: Evaluation | None = None
@@ -171,7 +167,6 @@ def read_off(
         log_covariance=by_log @ covariance @ by_log.T,
         gains=_gains(model, found, by_log @ posterior.response),
         shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
-        form_sizes=posterior.mean_sizes,
         model=model,
         evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
         unknowns=u,

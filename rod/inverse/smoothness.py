@@ -43,8 +43,6 @@ class Averaged:
         straight line whose slope the data show.
     tau, slope : float
         Sizes of roughness and of the slope at K0 of largest evidence.
-    mean_sizes : (tau, slope)
-        Their geometric means over the evidence.
     log_evidence : float
         Of the model, up to a constant of the data.
     """
@@ -55,7 +53,6 @@ class Averaged:
     shrinkage: Array
     tau: float
     slope: float
-    mean_sizes: tuple[float, float]
     log_evidence: float
 
 
@@ -129,7 +126,6 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
     covariance = response + (share[:, None] * spread).T @ spread
     whole = np.concatenate([move, inner @ pull[rest] + back @ move])
     tau, slope = sizes[int(np.argmax(evidence))]
-    mean_tau, mean_slope = np.exp(share @ np.log(sizes))
     return Averaged(
         unknowns + whole,
         _extended(covariance, inner, back),
@@ -137,7 +133,6 @@ def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[
         np.vstack([shrinkage, back @ shrinkage])[:, :k],
         tau,
         slope,
-        (float(mean_tau), float(mean_slope)),
         log_evidence,
     )
 

@@ -44,11 +44,11 @@ def test_both_ways_are_compared_on_the_range_both_visited(found):
 
 def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     """What the comparison sends through a way is all that its band holds, away from the ends of the range."""
-    way, (tau, slope) = found.inverse, found.inverse.form_sizes
+    way, model = found.inverse, found.inverse.model
     noise = sum(
         gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.gains.items()
     )
-    short = way.shortfall @ prior_forms(way.model.knots, tau=tau, slope=slope, at=way.kappa)
+    short = way.shortfall @ prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.kappa)
     ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.log_covariance))
     # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
     # mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.
