@@ -97,16 +97,22 @@ def _by_travel(found: list[RoughCable], displacements: Array) -> Scale | None:
 
 def cover_radii_px(found: list[RoughCable]) -> Array:
     """Radii ``(k,)`` of all covers that were measured, px."""
+    return np.array([radius for radius, _ in _radii(found)])
+
+
+def _radii(found: list[RoughCable]) -> list[tuple[float, float]]:
+    """Radius and its standard deviation, px, of each cover that was measured."""
     axes = [axis for cable in found for axis in (cable.left, cable.right)]
-    return np.array([axis.radius_px for axis in axes if axis.radius_px is not None])
+    return [(axis.radius_px, axis.radius_std_px or 0.0) for axis in axes if axis.radius_px is not None]
 
 
 def _by_covers(found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings) -> Scale | None:
     radii = cover_radii_px(found)
     if specimen.rig.marker_diameter_m is None or not len(radii):
         return None
-    scatter = float(np.std(radii) / np.mean(radii))
-    std = float(np.hypot(settings.cover_diameter_std, scatter))
+    # what light does to the rims is common to all photos: it does not show in their scatter
+    rims = float(np.median([std / radius for radius, std in _radii(found)]))
+    std = float(np.linalg.norm([settings.cover_diameter_std, np.std(radii) / np.mean(radii), rims]))
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
 
 

@@ -95,7 +95,7 @@ def fit_circle(
     std = float(
         np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
     )
-    radius_std = float(np.hypot(np.sqrt(covariance[2, 2]), settings.center_std_floor_px))
+    radius_std = float(np.linalg.norm([np.sqrt(covariance[2, 2]), settings.center_std_floor_px, excess]))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
 
@@ -253,12 +253,12 @@ def _robust_circle(
     # Neighbouring directions share noise and texture: an autoregression of lag one inflates the variance so much.
     inflation = (1.0 + np.clip(lag, 0.0, 0.95)) / (1.0 - np.clip(lag, 0.0, 0.95))
     covariance = np.linalg.inv(normal) * spread**2 * inflation
-    covariance[:2, :2] += _unevenness(arm / distance[:, None], residual, tukey) * np.eye(2)
+    covariance += _unevenness(arm / distance[:, None], residual, tukey) * np.eye(3)
     return fit, covariance
 
 
 def _unevenness(direction: Array, residual: Array, weight: Array) -> float:
-    """Variance (px^2) of a centre coordinate by light and looks that differ around the rim.
+    """Variance (px^2) of each coordinate of the centre, and of the radius, by light and looks that differ around it.
 
     They move edges by smooth functions of the direction. The part once around passes for a shift of the centre; those
     two and three times around are seen, and are about as large.

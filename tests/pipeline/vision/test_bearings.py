@@ -91,10 +91,11 @@ LOOKS = {
 @pytest.mark.parametrize("look", LOOKS, ids=str)
 def test_centre_of_any_cover_is_found_within_its_uncertainty(look: str) -> None:
     errors, stds = centre_errors(scene(**LOOKS[look]))
-    assert np.all(np.abs(errors) < 5.0 * stds[:, None])
-    # A tenth of a pixel is 0.01 mm; where a shadow melts into the rim or little of it shows, the std says so.
-    hard = ("hardly off the ground", "noise of 5 %", "wood", "squared paper", "shadow on one side")
-    assert np.all(stds < (0.3 if look in hard else 0.1))
+    # Of 64 errors the largest is 2.4 standard deviations; 3.5 leaves room for another light.
+    assert np.all(np.abs(errors) < 3.5 * stds[:, None])
+    # A tenth of a pixel is 0.01 mm; a rim of 4 % contrast (0.11 px) and 5 % noise (0.13 px) cannot tell so much.
+    hard = ("hardly off the ground", "noise of 5 %")
+    assert np.all(stds < (0.15 if look in hard else 0.1))
 
 
 @pytest.mark.parametrize(("off", "radius_error"), [(-0.6, 0.0), (0.7, 0.0), (1.8, 0.0), (0.0, 0.05), (0.0, -0.05)])
