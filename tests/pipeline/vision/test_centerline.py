@@ -40,11 +40,15 @@ def lit(rng, **options):
     return bow_scene(rng, **({"light": directional(rng), "sheath": Sheath(gloss=0.4, text=text)} | options))
 
 
-# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm.
+# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. At 5 % noise the target is that of all
+# even light, 0.15 and 1.5, and is missed: 0.185 and 1.52 on these scenes, 0.165 and 1.24 on 16 others. The sections'
+# scatter is 1.27 times the limit for the place alone, which would give about 0.135: the grey values of sheath and
+# ground, free on each section, cost the rest. To hold them to their neighbours gained at 5 px/mm what it lost in side
+# light.
 CASES = {
     "even": (even, {}, {}, (0.02, 0.15, 1.5)),
     "even, noise 0.5 %": (even, {"noise": 0.005}, {}, (0.02, 0.15, 1.5)),
-    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.35, 2.5)),
+    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.20, 1.6)),
     "directional": (lit, {}, {}, (0.25, 0.35, 2.5)),
     "directional, noise 5 %": (lit, {"noise": 0.05}, {}, (0.25, 0.35, 2.5)),
     "directional, JPEG 75": (lit, {}, {"quality": 75}, (0.25, 0.35, 2.5)),
