@@ -44,14 +44,16 @@ class BearingFriction:
         return 0.03 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form: both bearings alike."""
-        return PLAIN
+        """Both bearings alike, slipping at once or only after they have been turned by some angle."""
+        yielding = Variant("that yields before it slips", at=0.03, tuned=("at",), at_range=(0.004, 0.1))
+        return (Variant("that slips at once"), yielding)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Give both bearings the Coulomb moment ``amount``."""
+        """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0."""
         bending = model.bending
-        left = replace(bending.left, friction_moment=amount)
-        right = replace(bending.right, friction_moment=amount)
+        angle = variant.at or bending.left.stick_angle
+        left = replace(bending.left, friction_moment=amount, stick_angle=angle)
+        right = replace(bending.right, friction_moment=amount, stick_angle=angle)
         return replace(model, bending=replace(bending, left=left, right=right))
 
 

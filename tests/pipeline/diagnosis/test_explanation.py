@@ -43,6 +43,20 @@ def test_two_elements_that_slip_are_found_as_two():
     assert amount == pytest.approx(np.dot(ELEMENTS.stiffness, ELEMENTS.slip), abs=4.0 * std)
 
 
+def test_a_bearing_that_yields_before_it_slips_is_no_friction_of_wires():
+    """Three sigma apart at the least, and the moment at which it slips is the hidden one within four sigma."""
+    bench = prepared(Cable(bearing_friction=1.8e-3, stick_angle=0.03), 34)
+    friction, wires = (
+        refit_one(
+            bench.observation, bench.base, bench.suspicion, [cause.name for cause in CATALOGUE].index(name), SETTINGS
+        )
+        for name in ("bearing_friction", "hysteresis")
+    )
+    assert friction.gain > wires.gain + 9.0
+    amount, std = friction.amount(CATALOGUE[friction.causes[0]])
+    assert amount == pytest.approx(1.8e-3, abs=4.0 * std) and std < 1e-4
+
+
 def test_rows_left_out_of_a_refit_do_not_matter(plain):
     rows = len(plain.observation.rows.kind)
     kept = np.r_[plain.observation.rows.step != 3, np.ones(len(plain.base.residual) - rows, dtype=bool)]
