@@ -138,7 +138,7 @@ class CurveSettings(BaseModel):
     width_excess: float = Field(
         1.5,
         ge=1,
-        description="ratio of the errors by the width's variation to those by the scatter about the curve, above which"
+        description="ratio of the errors by the width's variation to those that scatter and light tell, above which"
         " the former count: over ten effective parameters chance passes it once in a hundred",
     )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
