@@ -10,7 +10,7 @@ sent through both,
 
 over the sources with covariance S (of photos, forces, nuisances), for laws of the forms F that the smoothness prior
 allows (`rod.inverse.knots.prior_forms`, of the sizes of largest evidence). What both miss alike cancels. Over cables of
-the accuracy study the test of level 5 % rejects 2 %, with and without a force-free photo, for both kinds of law.
+the accuracy study the test of level 5 % rejects 2 to 4 %, with and without a force-free photo, for both kinds of law.
 
 The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
 """
