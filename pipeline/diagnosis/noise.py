@@ -142,6 +142,7 @@ def calibrate_photo_noise(
     bases: list[Array],
     *,
     stretches: tuple[float, ...],
+    stretch_spread: float,
     prior_weight: float,
 ) -> PhotoNoise:
     """Noise level and correlation of the sections from what is faster along s than ``bases``.
@@ -157,6 +158,10 @@ def calibrate_photo_noise(
         Per photo; bases (k, q) as of `smooth_basis`.
     stretches : tuple of float
         Trial factors of the stated correlation length.
+    stretch_spread : float
+        Standard deviation of the logarithm of that factor before the photos are looked at. What is fast along s tells
+        factor^2 / stretch well and the stretch alone badly, but the slow noise that a cause must exceed goes with
+        factor^2 * stretch.
     prior_weight : float
         Number of samples the stated level counts for.
 
@@ -174,7 +179,8 @@ def calibrate_photo_noise(
             square += float(np.sum(linalg.solve_triangular(root, part, lower=True) ** 2))
             freedom += contrast.shape[1]
             determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
-        value = -0.5 * (determinant + freedom * np.log(square / freedom))
+        off = np.log(stretch) / stretch_spread
+        value = -0.5 * (determinant + freedom * np.log(square / freedom) + off**2)
         if value > likelihood:
             best, likelihood = PhotoNoise(float(np.sqrt(square / freedom)), stretch), value
     return best

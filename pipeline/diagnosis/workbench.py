@@ -102,6 +102,7 @@ def prepare(
             [photo.sections for photo in observation.photos],
             [photo.basis for photo in observation.photos],
             stretches=settings.noise_stretches,
+            stretch_spread=settings.noise_stretch_spread,
             prior_weight=settings.noise_prior_weight,
         )
         observation = observe(

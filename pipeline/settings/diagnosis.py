@@ -33,8 +33,15 @@ class DiagnosisSettings(BaseModel):
         20, description="Legendre polynomials a photo; resolves a kink to L / 20, and 7 photos stay a 150-row problem"
     )
     noise_stretches: tuple[float, ...] = Field(
-        (0.35, 0.6, 1.0, 1.7, 2.8, 4.5),
-        description="trial factors of the stated correlation length, a grid of ratio 1.7",
+        (0.35, 0.5, 0.64, 0.8, 1.0, 1.25, 1.6, 2.1, 2.8, 3.6, 4.5),
+        description="trial factors of the stated correlation length; a grid of ratio 1.7 chose 0.6 where 0.8 was"
+        " likeliest and put the slow noise a third too low",
+    )
+    noise_stretch_spread: float = Field(
+        0.5,
+        gt=0,
+        description="log of the factor; a photo's own estimate of its correlation length scatters by half, and a"
+        " stretch chosen by chance made one null in fifty look like a cause",
     )
     noise_prior_weight: float = Field(
         20.0, description="samples; what the noise level stated by the photos counts for against the level seen"
@@ -102,7 +109,7 @@ class DiagnosisSettings(BaseModel):
     powerless: float = Field(
         0.34, description="share of the causes; `underpowered` if fewer would have shown at a plausible size"
     )
-    separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart, diagnosis.md")
+    separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart")
 
     # base model
     knots: int = Field(5, description="control points of the base characteristic where no identification chose them")

@@ -68,8 +68,8 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
     Raises
     ------
     InputError
-        ``calibration/no-board``: the board is on none of the photos; ``calibration/size``: photos of different sizes;
-        ``calibration/degenerate``: no plane follows from the corners.
+        ``calibration/no-board``: the board is on none of the photos, or no plane follows from its corners;
+        ``calibration/size``: photos of different sizes.
     """
     if camera.calibration is None or camera.board is None:
         raise ValueError("calibrate_by_board needs a folder of photos and the board's size")
@@ -81,7 +81,7 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
         raise InputError(
             "no plane follows from the corners of the board",
             path=camera.calibration,
-            code="calibration/degenerate",
+            code="calibration/no-board",
             remedy="show the whole board from above, lying in the plane of the cable",
         ) from error
     plane, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)

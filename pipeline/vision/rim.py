@@ -95,7 +95,9 @@ def fit_circle(
     std = float(
         np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
     )
-    radius_std = float(np.linalg.norm([np.sqrt(covariance[2, 2]), settings.center_std_floor_px, excess]))
+    # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
+    doubt = 0.0 if rim >= settings.sure_rim else excess
+    radius_std = float(np.linalg.norm([np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt]))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
 

@@ -45,7 +45,7 @@ def wait_for(condition, process: subprocess.Popen, seconds: float = 60.0) -> Non
 def undisturbed(tmp_path_factory):
     """Ten specimens and what an undisturbed run makes of them."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    write_specimens(folder / "batch", [f"cable-{n}" for n in range(10)], notes="delay 0.2")
+    write_specimens(folder / "batch", [f"cable-{n}" for n in range(10)], notes="delay 0.5")
     tally = run_cheaply(folder / "batch", folder / "out")
     assert (tally.measured, tally.failed, tally.reused) == (10, 0, 0)
     return folder

@@ -13,6 +13,7 @@ from pipeline.diagnosis.noise import (
     section_covariance,
     smooth_basis,
 )
+from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def test_covariance_of_block_means_is_that_of_the_averages():
@@ -46,21 +47,28 @@ def test_block_means_lie_on_the_curve(shape):
 
 @pytest.mark.parametrize(("factor", "stretch"), [(1.0, 1.0), (1.4, 1.0), (1.0, 2.8), (0.7, 0.6)])
 def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
-    rng = np.random.default_rng(1)
+    settings = DiagnosisSettings()
     blocks = block_means(shape, blocks=96)
     basis = smooth_basis(blocks.s, 0.181, functions=20)
+    smooth = np.linalg.qr(basis)[0]
     root = np.linalg.cholesky(section_covariance(blocks, factor=factor, stretch=stretch))
     misfit = basis @ np.linspace(1e-3, 1e-5, 20)  # a hundred times the noise, and smooth
-    residuals = [root @ rng.standard_normal(len(blocks.s)) + misfit for _ in range(7)]
-    found = calibrate_photo_noise(
-        residuals, [blocks] * 7, [basis] * 7, stretches=(0.35, 0.6, 1.0, 1.7, 2.8, 4.5), prior_weight=20.0
-    )
-    white = np.linalg.solve(
-        np.linalg.cholesky(section_covariance(blocks, factor=found.factor, stretch=found.stretch)), root
-    )
-    # what counts is the weight of a smooth component, which must be right to a fifth (the false alarms are set by it)
-    weight = np.linalg.norm(np.linalg.qr(basis)[0].T @ white.T, axis=1)[:8]
-    assert np.all(np.abs(weight - 1.0) < 0.2)
+    weights = []
+    for seed in range(8):  # what seven photos tell of the correlation scatters by a tenth: the mean of eight tells bias
+        rng = np.random.default_rng([1, seed])
+        found = calibrate_photo_noise(
+            [root @ rng.standard_normal(len(blocks.s)) + misfit for _ in range(7)],
+            [blocks] * 7,
+            [basis] * 7,
+            stretches=settings.noise_stretches,
+            stretch_spread=settings.noise_stretch_spread,
+            prior_weight=settings.noise_prior_weight,
+        )
+        factor_of = np.linalg.cholesky(section_covariance(blocks, factor=found.factor, stretch=found.stretch))
+        # what counts is the weight of a smooth component (the false alarms are set by it)
+        weights.append(np.linalg.norm(smooth.T @ np.linalg.solve(factor_of, root).T, axis=1)[:8])
+    # a tenth where the stated correlation is nearly right; where it is wrong by 2.8 the prior holds a part of that
+    assert np.all(np.abs(np.mean(weights, axis=0) - 1.0) < (0.1 if stretch < 2.0 else 0.2))
 
 
 def test_force_noise_ignores_drift_and_level():

@@ -177,7 +177,7 @@ def test_corners_that_tell_no_plane_are_the_users_error(tmp_path: Path, monkeypa
     monkeypatch.setattr("pipeline.vision.board.find_board", lambda *_: seen)
     with pytest.raises(InputError, match="no plane follows") as raised:
         calibrate_by_board(CameraSpec(calibration=tmp_path, board=BOARD), 0.005, SETTINGS)
-    assert raised.value.code == "calibration/degenerate"
+    assert raised.value.code == "calibration/no-board"
 
 
 def test_corners_on_one_line_are_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
