@@ -32,6 +32,7 @@ from pipeline.result import (
 )
 from pipeline.rounding import rounded
 from pipeline.settings import Settings
+from pipeline.visited import visited
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
@@ -119,16 +120,21 @@ def assemble(
 
 
 def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None) -> str:
-    """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree."""
+    """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
+
+    Where the diagnosis extended the model, what the extended model gives is the answer.
+    """
     way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
-    if way.curve is None:
+    extended = visited("extended", diagnosis.extended) if diagnosis is not None else None
+    curve = extended or visited(name, way.curve)
+    if curve is None:
         return f"No characteristic was measured: {parts.inverse.advice}."
-    curve = way.curve
     low, high = (
-        f"{rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i])} mN m² at {curve.kappa_per_m[i]:.3g} 1/m"
+        f"{rounded(1e3 * curve.tangent[i], 1e3 * curve.tangent_std[i])} mN m² at {curve.kappa[i]:.3g} 1/m"
         for i in (0, -1)
     )
-    start = rounded(way.pre_curvature_per_m, way.pre_curvature_std_per_m)
+    name = name if extended is None else "extended model"
+    start = rounded(*((way.pre_curvature_per_m, way.pre_curvature_std_per_m) if extended is None else extended.rest()))
     answer = f"By the {name}, f_EI (tangent) goes from {low} to {high}; pre-curvature {start} 1/m"
     agrees = parts.agreement.compatible
     if agrees is not None and parts.agreement.rms_relative is not None:
