@@ -26,21 +26,7 @@ from pipeline.vision.render.lighting import EVEN, Light, cast_shadow, sheet
 from pipeline.vision.render.sensor import Pixels, Sensor, expose
 from pipeline.vision.render.strand import Curve, Layer, Strand, strand_layer
 
-__all__ = [
-    "Camera",
-    "ChessBoard",
-    "Cover",
-    "Curve",
-    "Ground",
-    "Light",
-    "Picture",
-    "Scene",
-    "Sensor",
-    "Strand",
-    "Thing",
-    "render",
-    "render_board",
-]
+__all__ = ["Picture", "Scene", "render", "render_board"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
