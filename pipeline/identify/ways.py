@@ -109,13 +109,11 @@ def inverse_options(settings: IdentifySettings) -> InverseOptions:
 
 def _branches(test: MeasuredTest, options: InverseOptions) -> dict[str, Estimate]:
     groups = {"loading": ("mounted", "loading"), "unloading": ("unloading",)}
-    apart = {}
-    for name, members in groups.items():
-        steps = tuple(step for step in test.steps if step.branch in members)
-        photos = sum(step.shape is not None and step.branch != "mounted" for step in steps)
-        if photos < LEAST_PHOTOS:
-            return {}
-        apart[name] = estimate(replace(test, steps=steps), options=options)
+    halves = {name: tuple(s for s in test.steps if s.branch in members) for name, members in groups.items()}
+    photos = [sum(s.shape is not None and s.branch != "mounted" for s in steps) for steps in halves.values()]
+    if min(photos) < LEAST_PHOTOS:
+        return {}
+    apart = {name: estimate(replace(test, steps=steps), options=options) for name, steps in halves.items()}
     return apart if all(e.characteristic is not None for e in apart.values()) else {}
 
 
