@@ -80,6 +80,12 @@ class CurveSettings(BaseModel):
         description="of the width; so much it may be off the expected one throughout: scales and diameters are known to"
         " some percent, and what both edges are off alike leaves the midline in place",
     )
+    roundness: float = Field(
+        0.005,
+        gt=0,
+        description="of the width; a sheath is round and even so far: edges whose places are surer than that are"
+        " averaged, the width of the cable tells nothing of them",
+    )
     profile_windows: int = Field(
         16, ge=1, description="along the cable; in each, blur and shading of the edges are found: light turns slowly"
     )

@@ -161,7 +161,7 @@ def _assemble(
     metres = float(np.median(width / sections.width))
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, light_std, light_length)
-    covariance *= _width_excess(fit, width, covariance, options) ** 2
+    covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
     length_std = _length_std(fit, s, covariance)
     # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
     covariance[0, 0] += chord.axis_std**2
@@ -283,7 +283,7 @@ def _with_light(fit: CurveFit, std: float, length: float) -> Array:
     return np.asarray(fit.smooth.covariance + fit.smooth.gain @ light @ fit.smooth.gain.T)
 
 
-def _width_excess(fit: CurveFit, width: Array, covariance: Array, options: CurveSettings) -> float:
+def _width_excess(fit: CurveFit, off_width: Array, covariance: Array, options: CurveSettings) -> float:
     """Ratio, at least 1, of the errors of the curvature to those that scatter and light tell.
 
     The cable's width is constant, so half of what the measured width varies is an error of the edges that no bend of
@@ -291,7 +291,7 @@ def _width_excess(fit: CurveFit, width: Array, covariance: Array, options: Curve
     The ratio is that of each point: the ends, ten times less certain than the rest, would speak for all.
     """
     used = fit.weight > 0.0
-    half, s = 0.5 * (width - np.median(width))[used], fit.s[used]
+    half, s = 0.5 * off_width[used], fit.s[used]
     bend = fit.curve.bases(s)[2]
     ratio = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half) / _std(bend, covariance)) ** 2)))
     return ratio if ratio > options.width_excess else 1.0

@@ -3,8 +3,13 @@
 A section's midpoint is the mean of its edges. An edge that contradicts its neighbours (text, dirt, an object beside the
 cable) is replaced by the other one and the local width; a section without any edge is left out.
 
+Where a narrow shadow lies along one edge, the place of that edge is open by pixels and that of the other is not. The
+width ``W`` of a cable is constant, so each edge tells the midpoint, ``e1 + W/2`` and ``e2 - W/2``: they are weighted by
+the inverse variances ``v`` of their places, of which half the move between two edge models is the measure. ``W`` is
+measured where both are sure. Edges as sure as a cable is round are averaged, whatever ``W``.
+
 What the light does to both edges of a section alike (same direction on the photo) moves the midline slowly along s,
-and no averaging removes it. Its size is judged by three things seen on the photo itself:
+and no averaging removes it. Its size is judged by what is seen on the photo itself:
 
 - how far the midline moves when ramps of shading and shadow are left out of the edge model;
 - how far the measured width, which is constant on the cable, changes slowly along s: independent edge errors that
@@ -53,6 +58,9 @@ class Sections:
         Of the midpoint along the normal, from the scatter of the pixels.
     width, width_smooth : (k,)
         Raw, and running median.
+    balance : (k,)
+        ``2 sqrt(v1 v2) / (v1 + v2)``: 1 where both edges count alike, 0 where only one counts. So much of half the
+        width's error is the midpoint's.
     off_path : (k,)
         Offset of the midpoint from the path.
     systematic_std : px
@@ -72,6 +80,7 @@ class Sections:
     std: Array
     width: Array
     width_smooth: Array
+    balance: Array
     off_path: Array
     systematic_std: float
     share: float
@@ -123,20 +132,27 @@ def measure_sections(
     s, place, std = s[keep], place[keep], std[keep]
     where, angle = curve.at(s)
     across = normals(angle)
-    off = 0.5 * (place[:, 1] - place[:, 0])
     width = place.sum(axis=1) + 2.0 * half_width
     step = edges.step[:, keep]
     smooth_width = _running_median(width)
+    doubt = _by_light(profiles, s, settings.roundness * 2.0 * half_width)
+    trust = doubt[::-1] / doubt.sum(axis=0)
+    likely = float(np.average(smooth_width, weights=1.0 / doubt.sum(axis=0)))
+    inward = 0.5 * likely - half_width - place.T
+    off = trust[0] * inward[0] - trust[1] * inward[1]
+    # Both edges are moved alike: their distance stays what was measured.
+    aside = (off - 0.5 * (place[:, 1] - place[:, 0]))[:, None]
     return Sections(
         s=s,
-        first=where - (half_width + place[:, :1]) * across,
-        second=where + (half_width + place[:, 1:]) * across,
+        first=where - (half_width + place[:, :1] - aside) * across,
+        second=where + (half_width + place[:, 1:] + aside) * across,
         middle=where + off[:, None] * across,
-        std=0.5 * np.hypot(std[:, 0], std[:, 1]),
+        std=np.hypot(*(trust * std.T)),
         width=width,
         width_smooth=smooth_width,
+        balance=2.0 * np.sqrt(trust[0] * trust[1]),
         off_path=off,
-        systematic_std=_systematic(profiles, smooth_width, std, diameter),
+        systematic_std=_systematic(profiles, s, smooth_width, std, doubt, diameter),
         share=float(np.mean(keep)),
         profiles=profiles,
         contrast=float(np.median(step)),
@@ -184,17 +200,31 @@ def _consistent(
     return out, spread, good
 
 
-def _systematic(profiles: Profiles, width: Array, std: Array, diameter: float | None) -> float:
-    """Standard deviation, px, of the slow sideways error of the midline; see the module's text."""
-    model = 0.5 * np.diff(profiles.shift, axis=0)
-    # Half the width of the change between two models that both have some right: its standard deviation.
-    by_model = 0.5 * np.sqrt(np.mean(model**2))
+def _by_light(profiles: Profiles, s: Array, floor: float) -> Array:
+    """Variances (px^2) of both edges' places ``(2, n)`` by shadow and shading, at least ``floor`` squared.
+
+    Half the width of the change between two models that both have some right is its standard deviation.
+    """
+    return np.asarray((0.5 * profiles.at(s, "shift")) ** 2 + floor**2)
+
+
+def _systematic(profiles: Profiles, s: Array, width: Array, std: Array, doubt: Array, diameter: float | None) -> float:
+    """Standard deviation, px, of the slow sideways error of the midline; see the module's text.
+
+    Edges count by the shares with which they make the midpoint; ``doubt`` (2, n) are their variances by the light.
+    """
+    trust = doubt[::-1] / doubt.sum(axis=0)
+    balance = 2.0 * np.sqrt(trust[0] * trust[1])
+    shift, blur = profiles.at(s, "shift"), profiles.at(s, "blur")
+    by_model = 0.5 * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0]) ** 2))
     noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
-    by_width = 0.5 * np.sqrt(max(np.var(width) - noise2, 0.0))
-    by_blur = 0.25 * np.sqrt(np.mean(np.diff(profiles.blur, axis=0) ** 2))
+    by_width = 0.5 * np.sqrt(max(np.var(balance * (width - np.median(width))) - noise2, 0.0))
+    by_blur = 0.25 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
+    # Where one edge counts alone, half the error of the cable's width is the midpoint's.
+    by_likely = 0.5 * np.sqrt(np.mean(np.diff(trust, axis=0) ** 2) / np.mean(1.0 / doubt.sum(axis=0)))
     unequal = _asymmetry(profiles.step)
     by_diameter = 0.0 if diameter is None else 0.5 * abs(float(np.median(width)) - diameter) * min(unequal, 1.0)
-    return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_diameter**2))
+    return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_likely**2 + by_diameter**2))
 
 
 def _asymmetry(step: Array) -> float:
