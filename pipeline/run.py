@@ -11,12 +11,13 @@ from pathlib import Path
 
 from pipeline.assembly import assemble
 from pipeline.diagnosis import diagnose
-from pipeline.identify import identify
+from pipeline.identify import Identification, identify
 from pipeline.intake.folder import read_specimen
+from pipeline.records import Finding
 from pipeline.report.document import write_report
 from pipeline.report.pdf import write_pdf
 from pipeline.report.tables import write_result, write_tables
-from pipeline.result import Result
+from pipeline.result import DiagnosisPart, Result
 from pipeline.settings import Settings
 from pipeline.vision.series import trace_series
 
@@ -45,8 +46,20 @@ def measure(folder: Path | str, settings: Settings | None = None, *, command: st
     specimen = read_specimen(Path(folder), settings.intake)
     traces = trace_series(specimen, settings.vision)
     identification = identify(specimen, traces, settings.identify)
-    diagnosis, findings = diagnose(identification.test, identification, settings.diagnosis)
+    diagnosis, findings = _diagnosed(identification, settings)
     return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
+
+
+def _diagnosed(identification: Identification, settings: Settings) -> tuple[DiagnosisPart | None, tuple[Finding, ...]]:
+    """The diagnosis; where numbers nobody foresaw break it, both ways still stand and the reader is told."""
+    try:
+        return diagnose(identification.test, identification, settings.diagnosis)
+    except (ArithmeticError, LookupError, ValueError) as error:
+        told = " ".join(str(error).split())[:200]
+        message = (
+            f"the diagnosis failed ({type(error).__name__}: {told}); f_EI and K0 stand without it; please report it"
+        )
+        return None, (Finding(code="diagnosis/program-error", level="error", message=message),)
 
 
 def write(result: Result, folder: Path, settings: Settings | None = None) -> None:

@@ -10,9 +10,10 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-import pipeline
+import pipeline.run
 from pipeline.result import Result
 from tests.test_cli import HEAVY
 
@@ -79,3 +80,16 @@ def test_everything_offered_is_there():
         assert getattr(pipeline, name) is not None
     with pytest.raises(AttributeError, match="has no attribute 'mesure'"):
         pipeline.__getattr__("mesure")
+
+
+def test_a_diagnosis_that_breaks_costs_neither_way_nor_report(tmp_path, monkeypatch):
+    def broken(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(pipeline.run, "diagnose", broken)
+    result = pipeline.measure(ROOT / "fixtures/specimens/three")
+    assert result.diagnosis is None and result.inverse.curve is not None and result.balance.curve is not None
+    told = [finding.message for finding in result.findings if finding.code == "diagnosis/program-error"]
+    assert len(told) == 1 and "LinAlgError: Singular matrix" in told[0]
+    pipeline.write(result, tmp_path)
+    assert "Singular matrix" in (tmp_path / "report.html").read_text(encoding="utf-8")
