@@ -40,9 +40,9 @@ def rounded(value: float | None, std: float | None, *, decimal: str = ".") -> st
         return f"{plain(value, 6, decimal=decimal)} (exact)"
     power = math.floor(math.log10(max(abs(value), std)))
     if SMALLEST_FIXED <= power <= LARGEST_FIXED:
-        return " ± ".join(_fixed(number, _decimals(std), decimal) for number in (value, std))
+        return " ± ".join(fixed(number, _decimals(std), decimal) for number in (value, std))
     scale = 10.0**power
-    inner = " ± ".join(_fixed(number / scale, _decimals(std / scale), decimal) for number in (value, std))
+    inner = " ± ".join(fixed(number / scale, _decimals(std / scale), decimal) for number in (value, std))
     return f"({inner})·10{_superscript(power)}"
 
 
@@ -57,10 +57,10 @@ def plain(value: float, digits: int = 3, *, decimal: str = ".", zeros: bool = Fa
         return "0"
     power = math.floor(math.log10(abs(value)))
     if SMALLEST_FIXED <= power <= LARGEST_FIXED:
-        text = _fixed(value, max(0, digits - 1 - power), ".")
+        text = fixed(value, max(0, digits - 1 - power), ".")
         text = text.rstrip("0").rstrip(".") if "." in text and not zeros else text
         return text.replace(".", decimal)
-    return f"{_fixed(value / 10.0**power, digits - 1, decimal)}·10{_superscript(power)}"
+    return f"{fixed(value / 10.0**power, digits - 1, decimal)}·10{_superscript(power)}"
 
 
 def p_value(value: float, *, decimal: str = ".") -> str:
@@ -70,19 +70,19 @@ def p_value(value: float, *, decimal: str = ".") -> str:
     return f"p = {plain(value, 2, decimal=decimal)}"
 
 
-def _decimals(std: float) -> int:
-    """Decimal places the standard deviation supports, by the rule of the Particle Data Group; negative for tens."""
-    power = math.floor(math.log10(std))
-    leading = round(std / 10.0**power * 100.0)
-    return (1 if leading <= 354 else 0) - power
-
-
-def _fixed(value: float, decimals: int, decimal: str) -> str:
+def fixed(value: float, decimals: int, decimal: str = ".") -> str:
     """Fixed-point text with a true minus sign; a negative number of decimals rounds to tens, hundreds ..."""
     text = f"{round(value, decimals):.{max(0, decimals)}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")
     return text.replace("-", "−").replace(".", decimal)
+
+
+def _decimals(std: float) -> int:
+    """Decimal places the standard deviation supports, by the rule of the Particle Data Group; negative for tens."""
+    power = math.floor(math.log10(std))
+    leading = round(std / 10.0**power * 100.0)
+    return (1 if leading <= 354 else 0) - power
 
 
 def _superscript(power: int) -> str:

@@ -47,6 +47,7 @@ INSIDE = {
 PIPELINE = [
     ("errors",),
     ("rounding",),
+    ("units",),
     ("records",),
     ("settings",),
     ("result",),

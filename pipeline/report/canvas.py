@@ -22,13 +22,14 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextToPath
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from pipeline.rounding import plain
+from pipeline.rounding import fixed, plain
 
 # A figure of its own, or a part of a page.
 Area = Figure | SubFigure
@@ -204,7 +205,7 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
     axes.set_ylabel(y)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6))
-        axis.set_major_formatter(number_ticks(decimal))
+        axis.set_major_formatter(number_ticks(axis, decimal))
     axes.tick_params(length=3)
     if legend:
         place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
@@ -215,9 +216,17 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
     return axes
 
 
-def number_ticks(decimal: str) -> FuncFormatter:
-    """Tick labels with the decimal sign of the language and a true minus."""
-    return FuncFormatter(lambda value, _: plain(float(f"{value:.6g}"), 4, decimal=decimal))
+def number_ticks(axis: Axis, decimal: str) -> FuncFormatter:
+    """Tick labels with the decimal sign of the language and a true minus, all of an axis to the same decimal place."""
+
+    def label(value: float, _: int | None) -> str:
+        labels = [plain(float(f"{place:.6g}"), 4) for place in axis.get_majorticklocs()]
+        if any("·" in text for text in labels):  # with powers of ten
+            return plain(float(f"{value:.6g}"), 4, decimal=decimal)
+        places = max((len(text.partition(".")[2]) for text in labels), default=0)
+        return fixed(value, places, decimal)
+
+    return FuncFormatter(label)
 
 
 def _compact(svg: str, name: str, size: tuple[float, float], title: str, description: str) -> str:

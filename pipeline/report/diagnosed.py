@@ -11,13 +11,14 @@ from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import map_rms
 from pipeline.report.figures import force_unit
-from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
+from pipeline.units import suited
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
+NOTHING = "–"
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class DiagnosisView:
 
     named: list[NamedCause] = field(default_factory=list)
     gain: list[str] = field(default_factory=list)
+    heads: list[str] = field(default_factory=list)
     rows: list[list[str]] = field(default_factory=list)
     blind_spots: list[str] = field(default_factory=list)
     next_what: str = ""
@@ -56,10 +58,12 @@ def diagnosis_view(
     if part is None:
         return None
     following = part.next_experiment
+    heads, rows = _table(part, words)
     return DiagnosisView(
         named=_named(part, words),
         gain=_gain(part, result, words),
-        rows=[_row(row, words) for row in sorted(part.table, key=lambda row: -abs(row.z))],
+        heads=heads,
+        rows=rows,
         blind_spots=[
             words(
                 "blind_row",
@@ -89,12 +93,7 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     catalogue = {cause.name: cause for cause in CATALOGUE}
     named = []
     for cause in part.causes:
-        size = suited([cause.estimate], cause.unit, decimal=words.decimal) if cause.unit[:1] == "N" else None
-        estimate = (
-            size.text(cause.estimate, cause.std)
-            if size
-            else f"{words.measured(cause.estimate, cause.std)}{words.unit(cause.unit)}"
-        )
+        estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
         share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
@@ -127,22 +126,31 @@ def _gain(part: DiagnosisPart, result: Result, words: Words) -> list[str]:
     ]
 
 
+def _table(part: DiagnosisPart, words: Words) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows of the table of causes; a column without any entry is left out."""
+    keys = ("cause", "pull", "p", "estimate", "detectable", "survives", "twin", "heldout", "shift")
+    rows = [_row(row, words) for row in ranking.ranked(part)]
+    filled = [column for column in range(len(keys)) if any(row[column] != NOTHING for row in rows)]
+    return [words(f"col_{keys[column]}") for column in filled], [[row[column] for column in filled] for row in rows]
+
+
 def _row(row: CauseRow, words: Words) -> list[str]:
-    """Row of the table of causes."""
+    """Row of the table of causes; one that these data cannot see at all (its error is 0) has no numbers."""
 
     def percent(value: float | None) -> str:
-        return "–" if value is None else words.number(100.0 * value, SHARE_DIGITS)
+        return NOTHING if value is None else words.number(100.0 * value, SHARE_DIGITS)
 
-    unit = words.unit(row.unit)
-    twin = f"{words.cause(row.nearest_twin)} ({words.number(abs(row.twin_cosine), 3)})" if row.nearest_twin else "–"
+    unit = words.unit(row.unit, row.std, row.minimal_detectable or 0.0)
+    seen = row.std > 0.0
+    least = row.minimal_detectable
     return [
         words.cause(row.name),
-        f"{words.number(row.z, 2)} ± 1",
-        words.probability(row.p_adjusted),
-        f"{words.measured(row.estimate, row.std)}{unit}",
-        "–" if row.minimal_detectable is None else f"{words.number(row.minimal_detectable, 2)}{unit}",
+        words.measured(row.z, 1.0) if seen else NOTHING,
+        words.probability(row.p_adjusted) if seen else NOTHING,
+        unit.text(row.estimate, row.std) if seen else NOTHING,
+        NOTHING if least is None else unit.plain(least, SHARE_DIGITS),
         percent(row.surviving_fraction),
-        twin,
+        f"{words.cause(row.nearest_twin)} ({words.fixed(abs(row.twin_cosine), 2)})" if row.nearest_twin else NOTHING,
         percent(row.heldout_excess_removed),
         percent(row.stiffness_shift),
     ]
@@ -168,7 +176,7 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
         drawn["ranking"] = drawing(
             "ranking",
             lambda f: ranking.draw_ranking(f, part, words, settings),
-            size=(400.0, ranking.ranking_height(part, settings)),
+            size=(400.0, ranking.ranking_height(part)),
             title=words("fig_ranking"),
             description=words("fig_ranking_alt"),
         )
@@ -224,7 +232,7 @@ def _force_texts(before: ResidualMap, after: ResidualMap, words: Words) -> str:
     parts = []
     for residuals in (before, after):
         values = residuals.force_sigma
-        parts.append(", ".join("–" if value is None else words.number(value, 2) for value in values))
+        parts.append(", ".join(NOTHING if value is None else words.number(value, 2) for value in values))
     return " → ".join(part for part in parts if part)
 
 
@@ -232,6 +240,6 @@ def _closest(twins: dict[str, dict[str, float]], words: Words) -> str:
     """The pair of causes that are most alike."""
     pairs = [(abs(c), a, b) for a, row in twins.items() for b, c in row.items() if a != b]
     if not pairs:
-        return "–"
+        return NOTHING
     cosine, a, b = max(pairs)
     return f"{words.cause(a)}, {words.cause(b)} ({words.number(cosine)})"

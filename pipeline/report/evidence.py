@@ -12,10 +12,10 @@ import numpy as np
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
-from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
+from pipeline.units import Unit
 from pipeline.visited import curves
 
 TALL = (400.0, 350.0)
@@ -207,7 +207,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
                 unit.number(step.force_N, step.force_std_N),
                 "–" if step.force_fit_N is None else words.number(unit.factor * step.force_fit_N, 5),
                 "–" if rest is None else unit.number(rest, step.force_std_N),
-                "–" if sigma is None else words.number(sigma, 2),
+                "–" if sigma is None else words.fixed(sigma, 2),
             ]
         )
     return rows
@@ -215,8 +215,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
 
 def photo_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of photos: step, photo, outcome, chord, traced length, width, curvature seen."""
-    millimetres = suited([], "m", decimal=words.decimal)
-    rows = []
+    millimetres, rows = Unit(1e3, "mm", words.decimal), []
     for photo in result.photos:
         seen = seen_range(photo)
         lengths = (
@@ -229,15 +228,11 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
                 str(photo.step),
                 photo.image,
                 words(f"status_{photo.status}") + (f": {_reason(photo, words)}" if photo.reason else ""),
-                *(millimetres.number(_times(1e3, v), _times(1e3, std)) for v, std in lengths),
+                *(millimetres.number(value, std) for value, std in lengths),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]
         )
     return rows
-
-
-def _times(factor: float, value: float | None) -> float | None:
-    return None if value is None else factor * value
 
 
 def knot_rows(result: Result, words: Words) -> list[list[str]]:

@@ -15,10 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
-from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
 from pipeline.settings import ReportSettings
+from pipeline.units import Unit, suited
 from pipeline.visited import Visited, curves, visited
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}

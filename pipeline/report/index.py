@@ -22,10 +22,10 @@ from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
 from pipeline.report.repeats import repeats
 from pipeline.report.tables import csv_text
-from pipeline.report.units import Unit, suited
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, from_json
 from pipeline.settings import ReportSettings
+from pipeline.units import Unit, suited
 from pipeline.visited import Visited, best, pre_curvature
 
 SHAPE_POINTS = 14

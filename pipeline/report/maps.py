@@ -13,10 +13,10 @@ from matplotlib.cm import ScalarMappable
 from numpy.typing import NDArray
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, number_ticks, plot_area
-from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import ResidualMap, Result
 from pipeline.settings import ReportSettings
+from pipeline.units import suited
 
 Array = NDArray[np.float64]
 # More names than this on an axis cannot be annotated at 440 px.
@@ -114,7 +114,7 @@ def _scale(figure: Area, axes: Axes, image: ScalarMappable, label: str, words: W
     """Colour bar right of the axes."""
     box, width = axes.get_position(), figure.bbox.width
     bar = figure.add_axes((box.x1 + 12.0 / width, box.y0, 12.0 / width, box.height))
-    figure.colorbar(image, cax=bar, format=number_ticks(words.decimal))
+    figure.colorbar(image, cax=bar, format=number_ticks(bar.yaxis, words.decimal))
     bar.set_ylabel(label)
     bar.grid(False)
 
@@ -136,10 +136,8 @@ def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Word
     if len(names) <= ANNOTATED_NAMES:
         for (row, column), value in np.ndenumerate(table):
             if np.isfinite(value):
-                text = f"{value:.2f}".replace(".", words.decimal)
-                axes.text(
-                    column, row, text, ha="center", va="center", color="#000000" if value > 0.5 else "#fdfdfd", size=9
-                )
+                colour = "#000000" if value > 0.5 else "#fdfdfd"
+                axes.text(column, row, words.fixed(value, 2), ha="center", va="center", color=colour, size=9)
     _scale(figure, axes, image, words("axis_cosine"), words)
     return axes
 

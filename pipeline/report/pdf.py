@@ -293,7 +293,7 @@ def _diagnosis_sheet(
     for line in (*(cause.line for cause in view.named), *view.gain, *view.leftover):
         sheet.text(line)
     if part.table:
-        height = min(ranking.ranking_height(part, settings), 280.0)
+        height = min(ranking.ranking_height(part), 280.0)
         ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
     before, after = (residual_map(values) for values in (part.residuals_before, part.residuals_after))
     if before is not None and after is not None:

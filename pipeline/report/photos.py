@@ -14,10 +14,10 @@ from matplotlib.axes import Axes
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
 from pipeline.report.figures import band_width
-from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart
 from pipeline.settings import ReportSettings
+from pipeline.units import suited
 
 # A centerline of 200 points over a preview of 1000 px: more points than this cannot be told apart.
 LARGEST_PATH = 400

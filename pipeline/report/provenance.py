@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipeline.report.figures import force_unit
-from pipeline.report.units import suited
 from pipeline.report.words import Words
 from pipeline.result import Result
+from pipeline.units import suited
 
 # Shown in their own places, not in the list of plain facts.
 APART = ("command", "inputs", "inputs_sha256", "settings")

@@ -17,19 +17,19 @@ from pipeline.settings import ReportSettings
 ROW_PX = 21.0
 
 
-def ranked(diagnosis: DiagnosisPart, settings: ReportSettings) -> list[CauseRow]:
-    """Causes by pull, loudest first."""
-    return sorted(diagnosis.table, key=lambda row: -abs(row.z))[: settings.ranked_causes]
+def ranked(diagnosis: DiagnosisPart) -> list[CauseRow]:
+    """Causes by how little chance explains them, then by pull: one of a sign it cannot have (p = 1) is no suspect."""
+    return sorted(diagnosis.table, key=lambda row: (row.p_adjusted, -abs(row.z)))
 
 
-def ranking_height(diagnosis: DiagnosisPart, settings: ReportSettings) -> float:
+def ranking_height(diagnosis: DiagnosisPart) -> float:
     """Height of the figure in px."""
-    return 54.0 + ROW_PX * len(ranked(diagnosis, settings))
+    return 54.0 + ROW_PX * len(diagnosis.table)
 
 
 def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
     """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
-    rows, width = ranked(diagnosis, settings), figure.bbox.width
+    rows, width = ranked(diagnosis), figure.bbox.width
     named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}
     labels = [words.cause(row.name) for row in rows]
     left = label_width(labels, most=0.45 * width)

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from pipeline.report.canvas import LIGHT, Area, Drawing, drawing, finish, plot_area
 from pipeline.report.figures import band_width
 from pipeline.report.pooling import Pooled, pool
-from pipeline.report.units import Unit
 from pipeline.report.words import Words
 from pipeline.settings import ReportSettings
+from pipeline.units import Unit
 from pipeline.visited import Visited
 
 

@@ -13,7 +13,8 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.report.german import in_german
-from pipeline.rounding import p_value, plain, rounded
+from pipeline.rounding import fixed, p_value, plain, rounded
+from pipeline.units import Unit, suited
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 LANGUAGES = {"en": (0, "."), "de": (1, ",")}
@@ -114,6 +115,10 @@ class Words:
         """A chosen or exact number."""
         return plain(value, digits, decimal=self.decimal)
 
+    def fixed(self, value: float, decimals: int) -> str:
+        """An exact number to so many decimals, as columns want it."""
+        return fixed(value, decimals, self.decimal)
+
     def curvature(self, value: float) -> str:
         """A curvature as the end of a range, in 1/m: three digits, zeros kept."""
         return plain(value, 3, decimal=self.decimal, zeros=True)
@@ -128,6 +133,7 @@ class Words:
         text = rounded(value, std, decimal=self.decimal)
         return f"{text.partition(' (')[0]} ({self('exact')})" if std == 0.0 else text
 
-    def unit(self, unit: str) -> str:
-        """A unit of the contract as one writes it, with the blank before it; none for a plain number."""
-        return "" if unit == "-" else f" {unit.replace('^2', '²').replace(' per ', self('per'))}"
+    def unit(self, unit: str, *values: float) -> Unit:
+        """A unit of the contract as one writes it (nothing for a plain number), its prefix suited to the values."""
+        symbol = "" if unit == "-" else unit.replace("^2", "²").replace(" per ", self("per"))
+        return suited(values, symbol, decimal=self.decimal)

@@ -47,6 +47,3 @@ class ReportSettings(BaseModel):
     pooled_p_value: float = Field(
         0.05, gt=0.0, lt=1.0, description="repeat specimens differ below this p value; the usual one in twenty"
     )
-    ranked_causes: int = Field(
-        20, ge=1, description="causes in the ranking figure; the catalogue has 20, further ones are in the table"
-    )

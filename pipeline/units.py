@@ -1,6 +1,7 @@
 """Units with the prefix that makes the numbers readable: bending stiffnesses of cables span five powers of ten.
 
-Only the first unit of a product takes the prefix: mN m² are thousandths of a newton times square metres.
+Only the first unit of a product takes the prefix: mN m² are thousandths of a newton times square metres. A unit that
+starts with a number, such as 1/m, takes none, nor does a plain number.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class Unit:
 
     def text(self, value: float | None, std: float | None) -> str:
         """Value ± standard deviation, both given in SI units, with the unit."""
-        return f"{self.number(value, std)}\u00a0{self.symbol}"
+        return f"{self.number(value, std)}\u00a0{self.symbol}".rstrip()
 
     def number(self, value: float | None, std: float | None) -> str:
         """Value ± standard deviation, both given in SI units, without the unit."""
@@ -34,7 +35,7 @@ class Unit:
 
     def plain(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number, given in SI units, with the unit."""
-        return f"{plain(self.factor * value, digits, decimal=self.decimal)}\u00a0{self.symbol}"
+        return f"{plain(self.factor * value, digits, decimal=self.decimal)}\u00a0{self.symbol}".rstrip()
 
 
 def suited(values: Iterable[float], symbol: str, *, decimal: str = ".") -> Unit:
@@ -45,11 +46,11 @@ def suited(values: Iterable[float], symbol: str, *, decimal: str = ".") -> Unit:
     values : iterable of float
         In SI units.
     symbol : str
-        The SI unit, such as ``N m²``.
+        The SI unit, such as ``N m²``; empty for a plain number.
     decimal : str
         Decimal sign of the reader's language.
     """
     largest = max((abs(v) for v in values if math.isfinite(v)), default=0.0)
-    power = 0 if largest == 0.0 else 3 * math.floor(math.log10(largest * (1.0 + 1e-12)) / 3)
+    power = 0 if largest == 0.0 or not symbol[:1].isalpha() else 3 * math.floor(math.log10(largest * (1.0 + 1e-12)) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return Unit(10.0**-power, PREFIXES[power] + symbol, decimal)
