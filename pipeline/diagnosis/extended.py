@@ -5,7 +5,7 @@ covariance of the fit, correlations between control points and K0 included:
 
     df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
 
-Where several causes explain the same data, the distance between their curves widens the band.
+Where several causes or finer splines explain the same data, the distance between their curves widens the band.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def curve(fitted: Fit, *, points: int, rivals: Sequence[tuple[Fit, float]] = ())
     ----------
     fitted : Fit
     points : int
-    rivals : sequence of (Fit, probability)
-        Other explanations of the same class. How far their f_EI lies from this one is part of the band: the variance of
+    rivals : sequence of (Fit, weight)
+        Other explanations of the same data. How far their f_EI lies from this one is part of the band: the variance of
         a mixture, ``sum_k p_k (f_k - f)^2`` beside the covariance of the fit.
     """
     base = fitted.extension.base

@@ -18,8 +18,8 @@ from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
-from pipeline.diagnosis.workbench import Workbench
-from pipeline.result import BlindSpot, CausePart, CauseRow, DiagnosisPart, GainPart, NextExperiment
+from pipeline.diagnosis.workbench import Workbench, with_one_more_knot
+from pipeline.result import BlindSpot, CausePart, CauseRow, Curve, DiagnosisPart, GainPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 if TYPE_CHECKING:
@@ -60,12 +60,27 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
         gain=_valid(gain),
         blind_spots=blind_spots(bench, rows, settings),
         next_experiment=_next(bench, conclusion, settings, verdict),
-        extended=curve(accepted.fitted, points=settings.curve_points, rivals=_rivals(conclusion)) if accepted else None,
+        extended=_extended(bench, conclusion, settings),
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
         twins=confusable(bench, conclusion, settings),
     )
+
+
+def _extended(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve | None:
+    """f_EI of the extended model, with what the data cannot tell in its band.
+
+    That is the class of the cause, and how closely the spline can follow the law: the data do not ask for another
+    control point, but where it would move f_EI to counts (without it the 95 % band covered 90 to 92 %, with it 94 to
+    98 %, of fresh cables).
+    """
+    if conclusion.accepted is None:
+        return None
+    fitted = conclusion.accepted.fitted
+    finer = with_one_more_knot(bench.observation, fitted, settings)
+    rivals = [*_rivals(conclusion), *([] if finer is None else [(finer, 1.0)])]
+    return curve(fitted, points=settings.curve_points, rivals=rivals)
 
 
 def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:

@@ -108,18 +108,21 @@ def prepare(
         observation = observe(
             test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
         )
-        extension, vector = fitted.extension, fitted.vector
-        if len(base.knots) > 2:
-            extension, vector = with_knots(fitted, len(base.knots))
-        fitted = _fit(observation, extension, vector, settings, near=fitted)
+        spread = with_knots(fitted, len(base.knots)) if len(base.knots) > 2 else (fitted.extension, fitted.vector)
+        again = _fit(observation, *spread, settings, near=fitted)
+        if again.run.prediction is None:  # knots elsewhere may let the moment fall between them
+            again = _fit(observation, fitted.extension, fitted.vector, settings, near=fitted)
+        fitted = again
     suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     while (
         refine
         and 2 < len(fitted.extension.base.knots) < settings.knots_most
         and _law_is_too_coarse(suspicion, settings)
     ):
-        extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + 1)
-        fitted = _fit(observation, extension, vector, settings, near=fitted)
+        finer = _fit(observation, *with_knots(fitted, len(fitted.extension.base.knots) + 1), settings, near=fitted)
+        if finer.run.prediction is None:
+            break
+        fitted = finer
         suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     return scored(test, observation, fitted, suspicion, settings)
 
@@ -204,9 +207,15 @@ def with_finer_law(observation: Observation, fitted: Fit, causes: Sequence[Cause
         asked = suspect(observation, fitted, law, visible=settings.visible, trace=settings.trace)
         if asked.statistic.size == 0 or float(asked.statistic.max()) ** 2 <= settings.knot_gain:
             break
-        extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + 1)
-        finer = _fit(observation, extension, vector, settings, near=fitted)
-        if finer.run.prediction is None or fitted.chi2 - finer.chi2 < settings.knot_gain:
+        finer = with_one_more_knot(observation, fitted, settings)
+        if finer is None or fitted.chi2 - finer.chi2 < settings.knot_gain:
             break
         fitted = finer
     return fitted
+
+
+def with_one_more_knot(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit | None:
+    """The model with another control point, fitted again; None where that has no equilibrium."""
+    extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + 1)
+    finer = _fit(observation, extension, vector, settings, near=fitted)
+    return None if finer.run.prediction is None else finer
