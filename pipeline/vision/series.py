@@ -8,10 +8,13 @@ A photo that cannot be measured is a `pipeline.records.Rejected` in its place; t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
+import cv2
 import numpy as np
 
 from pipeline.records import Array, Centerline, Finding, LoadStep, Preview, Rejected, Scale, Specimen, Traces
@@ -28,6 +31,8 @@ from pipeline.vision.plane import PlaneMap
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -93,9 +98,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, "none: no photo could be measured"))
     named, side_findings = _name_sides(specimen, shots, found, calibration, settings)
-    lines = tuple(
-        _measure(shot.found, calibration.plane, specimen.diameter_m, shot.preview, settings) for shot in named
-    )
+    lines = tuple(_line(shot, calibration.plane, specimen.diameter_m, settings) for shot in named)
     if specimen.camera.scale_px_per_m is not None or specimen.camera.calibration is not None:
         pairs = zip(named, lines, strict=True)
         lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
@@ -189,7 +192,7 @@ def _find_all(
         cable = _expected(specimen, calibration, step.displacement_m - first.displacement_m)
         if cover_px is not None:
             cable = replace(cable, bearings=BearingHints(cover_px=cover_px))
-        found = find_cable(photo, settings, cable=cable, near=near)
+        found = _guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near))
         near = found if isinstance(found, RoughCable) else near
         shots.append(_Shot(step, found, reduce_photo(photo, settings.preview)))
     return shots
@@ -220,6 +223,23 @@ def _moved(axes: PixelPair, moving: str, travel_px: float) -> PixelPair:
     else:
         right = right - travel_px * along
     return (float(left[0]), float(left[1])), (float(right[0]), float(right[1]))
+
+
+def _guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
+    """The outcome of work on one photo; numbers nobody foresaw cost that photo, not the specimen."""
+    try:
+        return work()
+    except (ArithmeticError, LookupError, ValueError, cv2.error) as error:
+        told = " ".join(str(error).split())[:200]
+        reason = f"{image}: the tracing failed ({type(error).__name__}: {told}); please report it."
+        return Rejected(image, "photo/program-error", reason)
+
+
+def _line(shot: _Shot, plane: PlaneMap, diameter_m: float, settings: VisionSettings) -> Centerline | Rejected:
+    work = partial(_measure, shot.found, plane, diameter_m, shot.preview, settings)
+    line = _guarded(shot.found.image, work)
+    # the picture is shown also where the work on it broke
+    return replace(line, preview=shot.preview) if line.preview is None else line
 
 
 def _measure(

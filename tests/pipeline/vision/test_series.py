@@ -14,6 +14,7 @@ from pipeline.intake.folder import read_specimen
 from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Side, Specimen, Traces
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision import series as series_module
 from pipeline.vision import trace_photo, trace_series
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
@@ -243,3 +244,23 @@ def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data
     assert outcome.code == code
     assert outcome.figure
     assert outcome.preview is not None
+
+
+@pytest.mark.parametrize("stage", ["find_cable", "measure_centerline", "with_strip"])
+def test_photo_that_breaks_the_program_costs_that_photo_alone(
+    stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound, calls = getattr(series_module, stage), []
+
+    def broken(*args: object, **named: object) -> object:
+        calls.append(args)
+        if len(calls) == 2:
+            raise np.linalg.LinAlgError("Singular matrix")
+        return sound(*args, **named)
+
+    monkeypatch.setattr(series_module, stage, broken)
+    first, second, third = trace_series(series(tmp_path), SETTINGS).photos
+    assert isinstance(first, Centerline) and isinstance(third, Centerline)
+    assert isinstance(second, Rejected) and second.code == "photo/program-error"
+    assert "LinAlgError: Singular matrix" in second.reason
+    assert second.preview is not None
