@@ -254,11 +254,12 @@ class System:
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
     """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
-    count, pivot, tiny = 0, 1.0, np.finfo(float).tiny
+    count, pivot = 0, 1.0
     squares = np.concatenate(([0.0], off**2)).tolist()
+    smallest = float(np.finfo(float).tiny) * max(1.0, *squares)  # a pivot of 0 is moved so far that nothing overflows
     for d, b2 in zip(diagonal.tolist(), squares, strict=True):
         pivot = d - b2 / pivot
-        if pivot == 0.0:
-            pivot = tiny
+        if abs(pivot) < smallest:
+            pivot = smallest
         count += int(pivot < 0.0)
     return count

@@ -10,7 +10,7 @@ from rod.bending_test import BendingTest, simulate
 from rod.energy import HALF_BANDWIDTH, Potential
 from rod.equilibrium import Equilibrium
 from rod.laws import StickSlip
-from rod.reduction import System
+from rod.reduction import System, negative_pivots
 from rod.section import InternalFriction
 from rod.support import Support
 
@@ -87,6 +87,13 @@ def test_inertia_of_the_reduced_system_is_that_of_equation_4() -> None:
         assert system.excess_negatives(balance) == negative
         assert V.is_minimum(q, free) is (negative == 0)
     assert negative >= 3
+
+
+@pytest.mark.parametrize("unit", [1e-5, 1.0, 1e8])
+def test_inertia_where_a_pivot_vanishes(unit: float) -> None:
+    diagonal, off = unit * np.array([2.0, 0.5, 1.0, -3.0]), unit * np.array([1.0, 1.0, 2.0])  # second pivot 0.5 - 1/2
+    matrix = np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1)
+    assert negative_pivots(diagonal, off) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0.0)
 
 
 @pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
