@@ -10,15 +10,15 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import map_rms
-from pipeline.report.figures import force_unit
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
-from pipeline.units import suited
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
 NOTHING = "–"
+# Columns of the table of causes that hold names.
+NAMES = 2
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def diagnosis_view(
     heads, rows = _table(part, words)
     return DiagnosisView(
         named=_named(part, words),
-        gain=_gain(part, result, words),
+        gain=_gain(part, words),
         heads=heads,
         rows=rows,
         blind_spots=[
@@ -102,35 +102,29 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     return named
 
 
-def _gain(part: DiagnosisPart, result: Result, words: Words) -> list[str]:
+def _gain(part: DiagnosisPart, words: Words) -> list[str]:
     """What the extension bought on held-out steps."""
     gain = part.gain
     if gain is None:
         return []
-    force = force_unit(result, words)
-    length = suited(gain.shape_rmse_m, "m", decimal=words.decimal)
 
-    def pair(values: tuple[float, float], factor: float) -> str:
-        return " → ".join(words.number(factor * v) for v in values)
+    def pair(values: tuple[float, float], symbol: str) -> str:
+        unit = words.unit(symbol, *values)
+        return f"{words.number(unit.factor * values[0])} → {unit.plain(values[1])}"
 
-    percent = [words.number(100.0 * v, 4) for v in (gain.heldout_excess_removed, *gain.ci95)]
+    # by chance the model may remove more than there was beyond the noise
+    percent = [words.number(100.0 * min(v, 1.0)) for v in (gain.heldout_excess_removed, *gain.ci95)]
     return [
         words("gain_text", share=percent[0], low=percent[1], high=percent[2]),
-        words(
-            "gain_rmse",
-            force=pair(gain.force_rmse_N, force.factor),
-            unit=force.symbol,
-            shape=pair(gain.shape_rmse_m, length.factor),
-            length=length.symbol,
-        ),
+        words("gain_rmse", force=pair(gain.force_rmse_N, "N"), shape=pair(gain.shape_rmse_m, "m")),
     ]
 
 
 def _table(part: DiagnosisPart, words: Words) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of the table of causes; a column without any entry is left out."""
-    keys = ("cause", "pull", "p", "estimate", "detectable", "survives", "twin", "heldout", "shift")
+    """Heads and rows of the table of causes: names, twins, then numbers; columns without any number are left out."""
+    keys = ("cause", "twin", "pull", "p", "estimate", "detectable", "survives", "heldout", "shift")
     rows = [_row(row, words) for row in ranking.ranked(part)]
-    filled = [column for column in range(len(keys)) if any(row[column] != NOTHING for row in rows)]
+    filled = [k for k in range(len(keys)) if k < NAMES or any(row[k] != NOTHING for row in rows)]
     return [words(f"col_{keys[column]}") for column in filled], [[row[column] for column in filled] for row in rows]
 
 
@@ -140,17 +134,15 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     def percent(value: float | None) -> str:
         return NOTHING if value is None else words.number(100.0 * value, SHARE_DIGITS)
 
-    unit = words.unit(row.unit, row.std, row.minimal_detectable or 0.0)
-    seen = row.std > 0.0
-    least = row.minimal_detectable
+    seen, least = row.std > 0.0, row.minimal_detectable
     return [
         words.cause(row.name),
-        words.measured(row.z, 1.0) if seen else NOTHING,
-        words.probability(row.p_adjusted) if seen else NOTHING,
-        unit.text(row.estimate, row.std) if seen else NOTHING,
-        NOTHING if least is None else unit.plain(least, SHARE_DIGITS),
-        percent(row.surviving_fraction),
         f"{words.cause(row.nearest_twin)} ({words.fixed(abs(row.twin_cosine), 2)})" if row.nearest_twin else NOTHING,
+        words.fixed(row.z, 1) if seen else NOTHING,
+        words.probability(row.p_adjusted) if seen else NOTHING,
+        words.unit(row.unit, row.estimate, row.std).text(row.estimate, row.std) if seen else NOTHING,
+        NOTHING if least is None else words.unit(row.unit, least).plain(least, SHARE_DIGITS),
+        percent(row.surviving_fraction),
         percent(row.heldout_excess_removed),
         percent(row.stiffness_shift),
     ]

@@ -207,7 +207,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
                 unit.number(step.force_N, step.force_std_N),
                 "–" if step.force_fit_N is None else words.number(unit.factor * step.force_fit_N, 5),
                 "–" if rest is None else unit.number(rest, step.force_std_N),
-                "–" if sigma is None else words.fixed(sigma, 2),
+                "–" if sigma is None else words.fixed(sigma, 1),
             ]
         )
     return rows
@@ -238,5 +238,5 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
 def knot_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of control points: curvature, tangent."""
     unit = figures.stiffness_unit(result, words)
-    knots = result.inverse.knots if result.inverse else []
-    return [[f"{words.number(k.kappa_per_m)} ({words('exact')})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots]
+    knots, exact = result.inverse.knots if result.inverse else [], words("exact")
+    return [[f"{words.curvature(k.kappa_per_m)} ({exact})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots]

@@ -134,10 +134,11 @@ def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Word
     axes.grid(False)
     axes.spines[:].set_visible(False)
     if len(names) <= ANNOTATED_NAMES:
+        size = min(9.0, 0.36 * axes.bbox.width / len(names))  # four signs are 2.2 letters wide: a fifth stays free
         for (row, column), value in np.ndenumerate(table):
             if np.isfinite(value):
                 colour = "#000000" if value > 0.5 else "#fdfdfd"
-                axes.text(column, row, words.fixed(value, 2), ha="center", va="center", color=colour, size=9)
+                axes.text(column, row, words.fixed(value, 2), ha="center", va="center", color=colour, size=size)
     _scale(figure, axes, image, words("axis_cosine"), words)
     return axes
 

@@ -241,7 +241,7 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
     if len(pictures) > len(shown):
         sheet.text(words("more_photos", count=len(pictures) - len(shown)), size=8.5)
     sheet.text(words("nav_data"), size=13.0, bold=True)
-    source = provenance_rows(result)
+    source = provenance_rows(result, words)
     rows = [
         *specimen_rows(result, words),
         *fit_rows(result, words),

@@ -12,7 +12,7 @@ from pipeline.result import Result
 from pipeline.units import suited
 
 # Shown in their own places, not in the list of plain facts.
-APART = ("command", "inputs", "inputs_sha256", "settings")
+APART = ("clock", "command", "inputs_sha256", "settings")
 
 
 @dataclass(frozen=True)
@@ -25,27 +25,22 @@ class Provenance:
     settings: str
 
 
-def provenance_rows(result: Result) -> Provenance:
-    """Provenance as the page shows it; unknown entries are listed as facts."""
+def provenance_rows(result: Result, words: Words) -> Provenance:
+    """Provenance as the page shows it; entries without a word for them are listed by their own names."""
     source = result.provenance
-    facts: list[tuple[str, str]] = []
-    for key, value in source.items():
-        if key in APART:
-            continue
-        if isinstance(value, dict):
-            facts += [(f"{key}: {name}", _text(entry)) for name, entry in value.items()]
-        else:
-            facts.append((key, _text(value)))
-    inputs = source.get("inputs_sha256", source.get("inputs"))
+    plain = {key: value for key, value in source.items() if key not in APART} | source.get("clock", {})
     return Provenance(
         command=_text(source.get("command", "")),
-        facts=facts,
-        inputs=[(str(n), _text(h)) for n, h in inputs.items()] if isinstance(inputs, dict) else [],
+        facts=[(words.fact(key), _text(value)) for key, value in plain.items()],
+        inputs=list(source.get("inputs_sha256", {}).items()),
         settings=json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
     )
 
 
 def _text(value: Any) -> str:
+    """A fact as text; several facts of one kind, such as the versions of libraries, in one line."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_text(entry)}" for name, entry in value.items())
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 

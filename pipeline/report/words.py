@@ -108,8 +108,15 @@ class Words:
 
     def branch(self, name: str) -> str:
         """Branch of the test; a name the table does not have stays as it is."""
-        row = _table()["words"].get(f"branch_{name}")
-        return row[LANGUAGES[self.language][0]] if row else name
+        return self._known(f"branch_{name}", name)
+
+    def fact(self, name: str) -> str:
+        """A fact of the provenance; a name the table does not have stays as it is."""
+        return self._known(f"fact_{name}", name)
+
+    def _known(self, key: str, otherwise: str) -> str:
+        row = _table()["words"].get(key)
+        return row[LANGUAGES[self.language][0]] if row else otherwise
 
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""

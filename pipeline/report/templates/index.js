@@ -8,7 +8,7 @@
     status: node.dataset.status, verdict: node.dataset.verdict, type: node.dataset.type,
   }));
   const find = (id) => document.getElementById(id);
-  const search = find("search"), filters = ["status", "verdict", "type"].map(find);
+  const search = find("search"), filters = ["status", "verdict", "type"].map(find).filter(Boolean);
   // Rows are laid out a hundred at a time as the reader scrolls: two thousand at once would take seconds.
   const PAGE = 100;
   let order = rows, limit = PAGE;

@@ -114,7 +114,9 @@ def test_provenance_is_shown(page, full_result):
     text = Page(page).text
     assert full_result.provenance["command"] in text
     assert "ab" * 32 in text
-    assert "versions: numpy" in text
+    assert "libraries" in text
+    assert "numpy 2.4.6, scipy 1.17.1" in text
+    assert "measured (UTC)" in text
 
 
 @pytest.mark.parametrize("verdict", ["adequate", "named", "class", "two_causes", "unexplained", "underpowered"])

@@ -56,7 +56,7 @@ def test_folder_of_half_a_run_is_enough(batch, tmp_path):
 
 def test_empty_batch_gives_an_empty_index(tmp_path):
     page, summary = write_index(tmp_path, tmp_path)
-    assert "0 specimens" in page.read_text(encoding="utf-8")
+    assert "Specimens: 0" in page.read_text(encoding="utf-8")
     assert pd.read_csv(summary).empty
 
 
@@ -82,7 +82,7 @@ def test_repeat_specimens_are_pooled_by_type(full_result, tmp_path):
 
 def test_german_index(batch, tmp_path):
     page = write_index(batch, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
-    assert "4 Proben: 2 vermessen, 1 teilweise, 1 gescheitert." in page
+    assert "Proben: 4, davon 2 vermessen, 1 teilweise, 1 gescheitert." in page
     assert "20,00 ± 0,13" in page
 
 

@@ -261,12 +261,13 @@ def measured_result():
         agreement=agreement,
         findings=[FindingPart(code="camera/scale", level="info", message="The scale is the one given, 9.5 px/mm.")],
         provenance={
+            "program": "cablebend",
             "version": "0.1.0",
-            "versions": {"python": "3.11.2", "numpy": "2.4.6"},
-            "created": "2026-11-21T08:00:00+00:00",
+            "python": "3.11.2",
+            "libraries": {"numpy": "2.4.6", "scipy": "1.17.1"},
             "command": "cablebend run batch -o results",
-            "duration_s": 6.2,
-            "inputs": {"force.csv": "ab" * 32, "images/step_00.png": "cd" * 32},
+            "clock": {"created_utc": "2026-11-21T08:00:00+00:00"},
+            "inputs_sha256": {"force.csv": "ab" * 32, "images/step_00.png": "cd" * 32},
             "settings": {"report": {"language": "en"}},
         },
     )
