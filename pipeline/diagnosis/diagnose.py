@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.bootstrap import confirmed_limit
-from pipeline.diagnosis.explanation import Explanation, candidates, refit_one, refit_pairs
+from pipeline.diagnosis.explanation import Explanation, candidates, refit_one
 from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
 from pipeline.diagnosis.pairs import pair_gains
 from pipeline.diagnosis.presentation import present
-from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.twins import cosines
+from pipeline.diagnosis.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.verdict import credible_set, probabilities, with_twins
-from pipeline.diagnosis.workbench import Workbench, prepare, scored, with_finer_law
+from pipeline.diagnosis.workbench import Workbench, prepare, with_finer_law
 from pipeline.identify import Identification
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart
@@ -44,6 +44,8 @@ class Conclusion:
         How many of them form the set of names.
     accepted : Explanation or None
         What the model is extended by: the most probable single cause, or a pair.
+    two : TwoCauses or None
+        The pairs that the data cannot tell from the accepted one, which is the first; None for a single cause.
     left : Leftover
         Test of what the accepted model (or the base model) leaves.
     alien : bool
@@ -54,6 +56,7 @@ class Conclusion:
     probability: list[float]
     members: int
     accepted: Explanation | None
+    two: TwoCauses | None
     left: Leftover
     alien: bool
 
@@ -101,12 +104,10 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects, weigh them, look for a second cause and for what is left."""
     if bench.largest <= confirmed_limit(bench, settings):
-        left = _left_over(bench, bench.base, settings)
-        return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
+        return _concluded(bench, [], [], 0, masking(bench, settings), settings)
     singles = _refitted(bench, settings)
     if not singles:
-        left = _left_over(bench, bench.base, settings)
-        return Conclusion([], [], 0, None, left, left.p_value < settings.alien_false_alarm)
+        return _concluded(bench, [], [], 0, None, settings)
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
     weight = probabilities(
         [e.weighed for e in singles],
@@ -117,11 +118,26 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
-    accepted = _second_cause(bench, singles, named, settings) or singles[0]
-    accepted = _with_finer_law(bench, accepted, settings)
-    left = _left_over(bench, accepted.fitted, settings)
-    alien = left.p_value < settings.alien_false_alarm and left.excess > settings.explained_share * accepted.gain
-    return Conclusion(singles, chance, len(members), accepted, left, alien)
+    two = second_cause(bench, singles, named, settings)
+    return _concluded(bench, singles, chance, len(members), two, settings)
+
+
+def _concluded(
+    bench: Workbench,
+    singles: list[Explanation],
+    chance: list[float],
+    members: int,
+    two: TwoCauses | None,
+    settings: DiagnosisSettings,
+) -> Conclusion:
+    """The conclusion with the accepted model's law as fine as it asks for, and with what that model leaves."""
+    accepted = two.pairs[0] if two else next(iter(singles), None)
+    if accepted is not None:
+        accepted = _with_finer_law(bench, accepted, settings)
+    left = _left_over(bench, bench.base if accepted is None else accepted.fitted, settings)
+    share = settings.explained_share * (0.0 if accepted is None else accepted.gain)
+    alien = left.p_value < settings.alien_false_alarm and left.excess > share
+    return Conclusion(singles, chance, members, accepted, two, left, alien)
 
 
 def _members(
@@ -170,46 +186,11 @@ def _with_finer_law(bench: Workbench, accepted: Explanation, settings: Diagnosis
     return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 
-def _second_cause(
-    bench: Workbench, singles: list[Explanation], named: set[int], settings: DiagnosisSettings
-) -> Explanation | None:
-    """A pair that is accepted: significant beyond the best single cause, and neither of the two can be dropped.
-
-    Another control point of the law beside a cause is a finer base and no second cause; that pair stands for the cause
-    alone, which must then be one of those ``named`` by itself.
-    """
-    best = max(singles, key=lambda e: e.gain)
-    second = suspect(
-        bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
-    )
-    if second.statistic.size == 0:
-        return None
-    limit = scored(bench.test, bench.observation, best.fitted, second, settings).limit
-    least = max(limit**2, settings.pair_share * best.gain)
-    if float(second.statistic.max()) ** 2 <= least:
-        return None
-    pairs = refit_pairs(bench.observation, bench.base, bench.suspicion, best, second, settings)
-    alone = {e.causes[0]: e.gain for e in singles}
-    for pair in pairs:
-        beside_law = [c for c in pair.causes if bench.suspicion.causes[c].name != "nonlinear_stiffness"]
-        if len(beside_law) == 1 and beside_law[0] not in named:
-            continue
-        others = [alone.get(cause, _linear_gain(bench.suspicion, cause)) for cause in pair.causes]
-        if pair.gain - max(best.gain, *others) > least:
-            return pair
-    return None
-
-
-def _linear_gain(suspicion: Suspicion, cause: int) -> float:
-    own = suspicion.of(cause)
-    return float(np.max(suspicion.statistic[own]) ** 2) if own.size else 0.0
-
-
 def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Leftover:
     fields = smooth_fields(bench.observation, bench.facts, rows=len(fitted.residual))
     rng = np.random.default_rng(settings.seed)
-    kind = bench.observation.rows.kind
-    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng, kind=kind)
+    rows = bench.observation.rows
+    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng, rows=rows)
 
 
 def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

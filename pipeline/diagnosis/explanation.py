@@ -1,4 +1,4 @@
-"""Explanations: causes put into the model and fitted in full, alone and in pairs.
+"""Explanations: causes put into the model and fitted in full.
 
 Score tests are local; what is suspected is refitted from the linear estimate, with the form tuned where it has a free
 place or time, and with further forms of the same cause where several may add up (a profile along the cable).
@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fit import Extension, Fit, Term, fit, whole_residual
 from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.pairs import Pair, best_pairs, pair_gains
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.simulation import run
-from pipeline.diagnosis.twins import cosines
 from pipeline.diagnosis.verdict import Weighed, scan_share
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -82,14 +80,14 @@ def refit_one(
     for direction in _first_forms(suspicion, cause):
         if best is not None and best.chi2 < enough:
             break
-        found = _fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
+        found = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
         if found is not None and (best is None or _cost(found) < _cost(best)):
             best = found
     if best is None:
         return None
     if suspicion.causes[cause].combines and best.chi2 < hopeless:
         best = _with_more_forms(observation, best, suspicion.causes[cause].name, suspicion, settings)
-    return _explanation((cause,), base, best, suspicion)
+    return explanation_of((cause,), base, best, suspicion)
 
 
 def _cost(fitted: Fit) -> float:
@@ -114,59 +112,7 @@ NEARLY_AS_LOUD = 0.75
 """Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
 
 
-def refit_pairs(
-    observation: Observation,
-    base: Fit,
-    suspicion: Suspicion,
-    single: Explanation,
-    second: Suspicion,
-    settings: DiagnosisSettings,
-) -> list[Explanation]:
-    """Best pairs of the exhaustive linear search about the base model, and the best second causes given the first."""
-    cosine = cosines(suspicion.scores.unit)
-    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner, collinear=settings.pair_collinear)
-    found: list[Explanation] = []
-    pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
-    least = pairs[0].gain - max(settings.refit_least, settings.refit_margin * pairs[0].gain) if pairs else 0.0
-    for pair in pairs:
-        if pair.gain <= least:
-            break
-        refitted = _refit_pair(observation, base, suspicion, pair, settings, hopeless=single.fitted.chi2)
-        if refitted is not None:
-            found.append(refitted)
-    for cause in candidates(second, settings)[:2]:
-        if cause != single.causes[0]:
-            added = _add_cause(observation, single.fitted, second, cause, settings)
-            if added is not None:
-                found.append(_explanation((single.causes[0], cause), base, added, suspicion))
-    return sorted(found, key=lambda explanation: -explanation.gain)
-
-
-def _refit_pair(
-    observation: Observation,
-    base: Fit,
-    suspicion: Suspicion,
-    pair: Pair,
-    settings: DiagnosisSettings,
-    *,
-    hopeless: float,
-) -> Explanation | None:
-    z, c = suspicion.scores.z, float(suspicion.scores.unit[:, pair.first] @ suspicion.scores.unit[:, pair.second])
-    norm = suspicion.scores.norm
-    amounts = (
-        float((z[pair.first] - c * z[pair.second]) / (1.0 - c * c) / norm[pair.first]),
-        float((z[pair.second] - c * z[pair.first]) / (1.0 - c * c) / norm[pair.second]),
-    )
-    found = _fit_terms(
-        observation, base, suspicion, (pair.first, pair.second), settings, amounts=amounts, hopeless=hopeless
-    )
-    if found is None:
-        return None
-    causes = (int(suspicion.owner[pair.first]), int(suspicion.owner[pair.second]))
-    return _explanation(causes, base, found, suspicion)
-
-
-def _fit_terms(
+def fit_terms(
     observation: Observation,
     base: Fit,
     suspicion: Suspicion,
@@ -260,7 +206,7 @@ def _with_more_forms(
         added: Fit | None = None
         for statistic in (np.where(fresh, more.statistic, 0.0), more.statistic):
             if statistic.max(initial=0.0) ** 2 >= settings.shape_gain:
-                added = _fit_terms(observation, best, more, (int(np.argmax(statistic)),), settings)
+                added = fit_terms(observation, best, more, (int(np.argmax(statistic)),), settings)
             if added is not None and best.chi2 - added.chi2 >= settings.shape_gain:
                 break
         if added is None or best.chi2 - added.chi2 < settings.shape_gain:
@@ -293,23 +239,17 @@ def _without_needless_forms(observation: Observation, best: Fit, settings: Diagn
     return best
 
 
-def _add_cause(
-    observation: Observation, fitted: Fit, second: Suspicion, cause: int, settings: DiagnosisSettings
-) -> Fit | None:
-    direction = second.best(cause)
-    return None if direction is None else _fit_terms(observation, fitted, second, (direction,), settings)
-
-
-def _explanation(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: Suspicion) -> Explanation:
+def explanation_of(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: Suspicion) -> Explanation:
+    """A fitted model as the explanation by the causes in it, with what decides about it."""
     terms = fitted.extension.terms
-    first = suspicion.causes[causes[0]]
+    kinds = [suspicion.causes[cause] for cause in causes]
     gain = base.chi2 - fitted.chi2
     weighed = Weighed(
         gain=gain,
         tuned=sum(len(term.variant.tuned) for term in terms) + len(terms) - 1,
         scan=sum(scan_share(suspicion.statistic[suspicion.of(cause)]) for cause in causes),
-        signs=1 if first.sign else 2,
+        signs=int(np.prod([1 if kind.sign else 2 for kind in kinds])),
     )
     found = Explanation(causes, fitted, gain, weighed)
-    excess = found.amount(first)[0] / first.plausible(fitted.extension.facts)
+    excess = max(abs(found.amount(kind)[0]) / kind.plausible(fitted.extension.facts) for kind in kinds)
     return replace(found, weighed=replace(weighed, excess=excess))

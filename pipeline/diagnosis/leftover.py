@@ -4,7 +4,10 @@ The whitened residual (base model and accepted causes projected out) is tested a
 cable, each with every pattern over the steps: polynomials of the load level first, with the same and with the opposite
 sign on the two branches, then whatever changes from step to step as no level does. Forces and chords follow the same
 patterns. The fields are ordered from coarse to fine and the misfit is summed in growing groups, and over forces and
-chords alone; the smallest of the groups' p-values decides, and its distribution under "nothing is wrong" is simulated.
+chords alone. Beside the sums stands the strongest single pattern, one shape along the cable that comes and goes in any
+way from step to step: the largest singular value of the table photos x shape functions. Whatever one thing is wrong has
+such a trace, and noise spread over the whole table hardly adds to it. The smallest p-value decides; its distribution
+under "nothing is wrong" is simulated.
 """
 
 from __future__ import annotations
@@ -13,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import linalg, stats
 
-from pipeline.diagnosis.observation import Observation
+from pipeline.diagnosis.observation import Observation, Row
 from pipeline.diagnosis.prediction import Facts
 from pipeline.diagnosis.score import span
 
@@ -36,9 +39,9 @@ class Leftover:
     p_value : float
         Of the smallest group p-value, by simulation.
     chi2, size : float, int
-        Misfit along the group that decided, and its number of fields.
+        Misfit along the group or pattern that decided, and what noise puts there (a group: its number of fields).
     field : (N,)
-        The part of the residual along that group.
+        The part of the residual along it.
     """
 
     p_value: float
@@ -94,7 +97,7 @@ def test_leftover(
     *,
     draws: int,
     rng: np.random.Generator,
-    kind: NDArray[np.int_] | None = None,
+    rows: Row | None = None,
 ) -> Leftover:
     """Test the residual against the fields after projecting the Jacobian out.
 
@@ -107,8 +110,8 @@ def test_leftover(
         Coarse to fine, as of `smooth_fields`.
     draws : int
     rng : Generator
-    kind : (n,) int or None
-        Kinds of the first rows, as of `observation.Row`; the rest is prior knowledge.
+    rows : Row or None
+        Where the first rows come from; the rest is prior knowledge.
     """
     fitted = span(jacobian)
     kept = fields - fitted @ (fitted.T @ fields)
@@ -116,16 +119,66 @@ def test_leftover(
     seen = np.linalg.norm(kept, axis=0) > 1e-3 * np.maximum(np.linalg.norm(fields, axis=0), 1e-300)
     basis = _ordered_basis(kept[:, seen])
     component = basis.T @ residual
-    groups = _groups(basis, np.zeros(0, dtype=int) if kind is None else kind)
-    p_values = _group_p(component[None, :], groups)[0]
+    groups = _groups(basis, np.zeros(0, dtype=int) if rows is None else rows.kind)
+    table = _photo_table(rows)
+    clean = (residual - fitted @ (fitted.T @ residual))[table]
+    null_component, null_table = _drawn(fitted, basis, table, draws=draws, rng=rng)
+    heights = _height(null_table)
+    p_values = np.r_[_group_p(component[None, :], groups)[0], _rank_p(_height(clean[None]), heights)]
+    null = np.minimum(np.min(_group_p(null_component, groups), axis=1), _rank_p(heights, heights))
     deciding = int(np.argmin(p_values))
-    null = np.min(_group_p(rng.standard_normal((draws, basis.shape[1])), groups), axis=1)
     smaller = float(np.sum(null <= p_values[deciding]))
     p_value = (smaller + 1.0) / (draws + 1.0)
     if smaller < 20.0:  # beyond the draws: Bonferroni over the groups, which is on the safe side
-        p_value = min(p_value, len(groups) * float(p_values[deciding]))
-    own = groups[deciding]
-    return Leftover(p_value, float(np.sum(component[own] ** 2)), len(own), basis[:, own] @ component[own])
+        p_value = min(p_value, len(p_values) * float(p_values[deciding]))
+    if deciding < len(groups):
+        own = groups[deciding]
+        return Leftover(p_value, float(np.sum(component[own] ** 2)), len(own), basis[:, own] @ component[own])
+    left, weight, right = np.linalg.svd(clean, full_matrices=False)
+    field = np.zeros(len(residual))
+    field[table] = weight[0] * np.outer(left[:, 0], right[0])
+    return Leftover(p_value, float(weight[0] ** 2), round(float(np.mean(heights**2))), field)
+
+
+def _photo_table(rows: Row | None) -> NDArray[np.int_]:
+    """Rows (photos, functions) of the residual: chord and shape of every photo, coarse to fine."""
+    if rows is None:
+        return np.zeros((0, 0), dtype=int)
+    of_photo = [np.flatnonzero((rows.kind > 0) & (rows.step == step)) for step in np.unique(rows.step[rows.kind > 0])]
+    common = min((len(own) for own in of_photo), default=0)
+    return np.array([own[:common] for own in of_photo], dtype=int).reshape(len(of_photo), common)
+
+
+def _drawn(
+    fitted: Array, basis: Array, table: NDArray[np.int_], *, draws: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Draws of pure noise after the fit: components (draws, k) along the basis, and tables (draws, photos, functions).
+
+    Noise is drawn for the rows of the table; all other rows act through few sums, which are drawn as such.
+    """
+    inside = np.zeros(len(basis), dtype=bool)
+    inside[table.ravel()] = True
+    sums = np.hstack([fitted, basis])
+    triangle = linalg.qr(sums[~inside], mode="r")[0][: sums.shape[1]]
+    noise = rng.standard_normal((draws, table.size))
+    total = noise @ sums[table.ravel()] + rng.standard_normal((draws, len(triangle))) @ triangle
+    along, component = total[:, : fitted.shape[1]], total[:, fitted.shape[1] :]
+    return component, (noise - along @ fitted[table.ravel()].T).reshape(draws, *table.shape)
+
+
+def _height(tables: Array) -> Array:
+    """Largest singular value (n,) of tables (n, photos, functions); 0 where there are none."""
+    if not tables[0].size:
+        return np.zeros(len(tables))
+    turned = tables.transpose(0, 2, 1)
+    square = tables @ turned if tables.shape[1] < tables.shape[2] else turned @ tables
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(square)[:, -1], 0.0))
+
+
+def _rank_p(heights: Array, null: Array) -> Array:
+    """p-values of heights among those of noise."""
+    below = np.searchsorted(np.sort(null), heights, side="left")
+    return np.asarray((len(null) - below + 1.0) / (len(null) + 1.0))
 
 
 def _groups(basis: Array, kind: NDArray[np.int_]) -> list[NDArray[np.int_]]:

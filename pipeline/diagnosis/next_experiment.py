@@ -60,7 +60,10 @@ def next_experiment(
     if not rivals:
         return None
     causes = bench.suspicion.causes
-    names = [causes[probable.causes[0]].name, *(causes[rival.causes[0]].name for rival in rivals)]
+    every = (probable, *rivals)
+    common = set(probable.causes).intersection(*(rival.causes for rival in rivals))
+    differing = list(dict.fromkeys(cause for e in every for cause in e.causes if cause not in common))
+    names = [causes[cause].name for cause in differing]
     best: tuple[float, Protocol] | None = None
     for protocol in protocols(bench.facts):
         apart = min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
@@ -68,7 +71,7 @@ def next_experiment(
             return NextExperiment(what=protocol.what, separates=names)
         if best is None or apart > best[0]:
             best = (apart, protocol)
-    outside = [causes[e.causes[0]] for e in (probable, *rivals) if causes[e.causes[0]].seat != "cable"]
+    outside = [causes[cause] for cause in differing if causes[cause].seat != "cable"]
     if outside:
         return NextExperiment(what=f"{outside[0].settled_by} ({outside[0].name})", separates=names)
     assert best is not None

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 Array = NDArray[np.float64]
 
@@ -58,3 +59,21 @@ def best_pairs(gains: Array, owner: NDArray[np.int_], *, count: int) -> list[Pai
             seen.add(names)
             found.append(Pair(int(row[at]), int(column[at]), float(value[at])))
     return found
+
+
+def null_pair_gain(
+    unit: Array,
+    sign: Array,
+    owner: NDArray[np.int_],
+    *,
+    collinear: float,
+    level: float,
+    draws: int,
+    rng: np.random.Generator,
+) -> float:
+    """Gain the best pair exceeds with probability ``level`` when nothing is wrong: draws of scores N(0, U^T U)."""
+    triangle = linalg.qr(unit, mode="r")[0][: unit.shape[1]]
+    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
+    scores = rng.standard_normal((draws, len(triangle))) @ triangle
+    best = [float(pair_gains(z, cosine, sign, owner, collinear=collinear).max(initial=0.0)) for z in scores]
+    return float(np.quantile(best, 1.0 - level))

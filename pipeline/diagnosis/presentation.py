@@ -84,30 +84,30 @@ def _extended(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetti
 
 
 def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
-    """The other members of the class of the accepted cause, with their share of the class's probability."""
-    if conclusion.accepted is None or len(conclusion.accepted.causes) > 1:
-        return []
+    """The other members of the class of the accepted cause, or of the set of pairs, with their probability in it."""
+    if conclusion.two is not None:
+        return [(e.fitted, p) for e, p in zip(conclusion.two.pairs[1:], conclusion.two.probability[1:], strict=True)]
     chance = conclusion.probability[: conclusion.members]
-    others = zip(conclusion.singles[: conclusion.members], chance, strict=True)
-    return [(e.fitted, p / sum(chance)) for e, p in others if e.causes != conclusion.accepted.causes]
+    others = zip(conclusion.singles[1 : conclusion.members], chance[1:], strict=True)
+    return [(e.fitted, p / sum(chance)) for e, p in others]
 
 
 def named_causes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     """One entry for each cause that was found, with its class of names."""
-    if conclusion.accepted is None:
+    catalogue, accepted, two = bench.suspicion.causes, conclusion.accepted, conclusion.two
+    if accepted is None:
         return []
-    catalogue = bench.suspicion.causes
-    accepted = conclusion.accepted
-    if len(accepted.causes) == 1:
-        names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
-        return [_part(bench, accepted, accepted.causes[0], names, conclusion.probability[0])]
+    names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
     # a law with one more control point is no second cause, only a finer base
-    found = [cause for cause in accepted.causes if catalogue[cause].name != "nonlinear_stiffness"]
-    if len(found) == 1:
-        names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
+    found = [cause for cause in accepted.causes if catalogue[cause].name != "nonlinear_stiffness"] or [*accepted.causes]
+    if two is None or len(found) == 1:
         name = catalogue[found[0]].name
         return [_part(bench, accepted, found[0], [name, *(n for n in names if n != name)], conclusion.probability[0])]
-    return [_part(bench, accepted, cause, [catalogue[cause].name], 1.0) for cause in accepted.causes]
+    classes = [[catalogue[k].name for k in two.names(place)] for place in (0, 1)]
+    return [
+        _part(bench, accepted, cause, group, two.chance(cause))
+        for cause, group in zip(accepted.causes, classes, strict=True)
+    ]
 
 
 def _part(bench: Workbench, found: Explanation, cause: int, names: list[str], probability: float) -> CausePart:
@@ -204,9 +204,9 @@ def blind_spots(bench: Workbench, rows: list[CauseRow], settings: DiagnosisSetti
 
 def _next(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, verdict: str) -> NextExperiment | None:
     """What separates the set of names; without one, what settles the worst blind spot."""
-    if conclusion.accepted is not None and conclusion.members > 1:
-        rivals = conclusion.singles[1 : conclusion.members]
-        return next_experiment(bench, conclusion.singles[0], rivals, settings)
+    confused = conclusion.two.pairs if conclusion.two else conclusion.singles[: conclusion.members]
+    if len(confused) > 1:
+        return next_experiment(bench, confused[0], confused[1:], settings)
     if verdict == "unexplained":
         return NextExperiment(what="repeat the test with the cable turned end for end, and unload", separates=[])
     if not bench.facts.returns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.verdict import Verdict
-from pipeline.rounding import plain, rounded
+from pipeline.units import amount_unit
 
 
 def spoken(name: str) -> str:
@@ -51,7 +51,7 @@ def headline(
         return f"Nothing was found, but these data could hardly have shown it; {weakest}."
     if verdict == "unexplained":
         return f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}."
-    sizes = [f"{rounded(value, std)} {unit}".rstrip(" -") for value, std, unit in amounts]
+    sizes = [amount_unit(unit, value, std).text(value, std) for value, std, unit in amounts]
     gain = (
         ""
         if explained is None
@@ -73,7 +73,8 @@ def could_have_been_seen(seen: list[tuple[str, float, str]], total: int) -> str:
     """What the data could have shown: the clearest three of the causes detectable at a plausible size."""
     if not seen:
         return f"none of {total} causes would have shown at a plausible size"
-    clearest = ", ".join(f"{spoken(name)} from {plain(size, 2)} {unit}".rstrip(" -") for name, size, unit in seen[:3])
+    sizes = ((spoken(name), amount_unit(unit, size).plain(size, 2)) for name, size, unit in seen[:3])
+    clearest = ", ".join(f"{name} from {size}" for name, size in sizes)
     return f"{len(seen)} of {total} causes would have shown at a plausible size, such as {clearest}"
 
 

@@ -119,8 +119,8 @@ def prepare(
         and 2 < len(fitted.extension.base.knots) < settings.knots_most
         and _law_is_too_coarse(suspicion, settings)
     ):
-        finer = _fit(observation, *with_knots(fitted, len(fitted.extension.base.knots) + 1), settings, near=fitted)
-        if finer.run.prediction is None:
+        finer = with_one_more_knot(observation, fitted, settings)
+        if finer is None:
             break
         fitted = finer
         suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)

@@ -88,6 +88,14 @@ class DiagnosisSettings(BaseModel):
     )
     pair_collinear: float = Field(0.985, description="|cos| above which the split between two causes is noise")
     pairs_refitted: int = Field(6, description="best pairs of the exhaustive linear search that are refitted; time")
+    masked_least: float = Field(
+        20.0,
+        description="chi-square of the best pair below which it is never significant, so no null is simulated; time",
+    )
+    masked_false_alarm: float = Field(
+        1e-3, description="probability of naming two causes where neither scores by itself; on top of false_alarm"
+    )
+    masked_draws: int = Field(5000, description="draws behind that threshold; five lie beyond it")
     pair_share: float = Field(
         0.02,
         description="share of the first cause's chi-square that a second must remove besides being significant",
