@@ -54,3 +54,8 @@ def suited(values: Iterable[float], symbol: str, *, decimal: str = ".") -> Unit:
     power = 0 if largest == 0.0 or not symbol[:1].isalpha() else 3 * math.floor(math.log10(largest * (1.0 + 1e-12)) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return Unit(10.0**-power, PREFIXES[power] + symbol, decimal)
+
+
+def amount_unit(unit: str, *amounts: float, decimal: str = ".") -> Unit:
+    """Unit of amounts of a cause: the contract writes ``N m^2``, and ``-`` for a plain number."""
+    return suited(amounts, "" if unit == "-" else unit.replace("^2", "²"), decimal=decimal)

@@ -109,8 +109,8 @@ def _stiffness(way: str, curve: Curve, truth: dict[str, Any]) -> list[tuple[str,
 
 def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
     """Cells of a row: the measured value with its uncertainty, the truth to the same place, the difference in std."""
-    from pipeline.rounding import rounded
+    from pipeline.rounding import fixed, rounded
 
     text = rounded(value, std)
     places = len(text.partition(" ")[0].partition(".")[2])
-    return text, f"{true:.{places}f}", f"{(value - true) / std:+.1f} std" if std > 0.0 else ""
+    return text, fixed(true, places), f"{fixed((value - true) / std, 1)} std" if std > 0.0 else ""

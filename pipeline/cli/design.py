@@ -78,11 +78,13 @@ def echo_outlook(found: Design) -> None:
     from rich.text import Text
 
     from pipeline.rounding import plain
+    from pipeline.units import amount_unit
 
     kappa = found.extent.kappa_per_m
     click.echo(
-        f"f_EI from {plain(kappa[0])} to {plain(kappa[-1])} 1/m within {found.stiffness_std:.2%} (1 std, rms), "
-        f"K0 within {plain(found.pre_curvature_std, 2)} 1/m; a cause shows beyond {found.threshold:.2f} std"
+        f"f_EI from {plain(kappa[0])} to {plain(kappa[-1])} 1/m within {plain(100.0 * found.stiffness_std, 2)} % "
+        f"(1 std, rms), K0 within {plain(found.pre_curvature_std, 2)} 1/m; "
+        f"a cause shows beyond {plain(found.threshold, 2)} std"
     )
     table = Table(box=SIMPLE_HEAD)
     headings = (
@@ -98,15 +100,15 @@ def echo_outlook(found: Design) -> None:
     for heading in headings:
         table.add_column(heading)
     for cause in found.causes:
-        least = "never" if cause.minimal_detectable is None else f"{plain(cause.minimal_detectable, 2)} {cause.unit}"
+        least, likely = cause.minimal_detectable, cause.plausible
         cells = (
             cause.name,
-            least,
-            f"{plain(cause.plausible, 2)} {cause.unit}",
+            "never" if least is None else amount_unit(cause.unit, least).plain(least, 2),
+            amount_unit(cause.unit, likely).plain(likely, 2),
             "yes" if cause.visible else "no",
             f"{cause.surviving_fraction:.2f}",
-            f"{cause.nearest_twin} {cause.twin_cosine:.2f}",
-            f"{cause.stiffness_bias_at_plausible_size:.2%}",
+            f"{cause.nearest_twin} {cause.twin_cosine:.2f}" if cause.nearest_twin else "–",
+            f"{plain(100.0 * cause.stiffness_bias_at_plausible_size, 2)} %",
             cause.separated_by,
         )
         table.add_row(*map(Text, cells))

@@ -81,7 +81,8 @@ def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[In
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
     for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
-        click.echo(f"cablebend: {folder}: has photos and a table but no specimen.toml; write one with init.", err=True)
+        told = f"has photos and a table but no specimen.toml; write one with `cablebend init {folder}`"
+        click.echo(f"cablebend: {folder}: {told}.", err=True)
     return list(specimens), refused
 
 

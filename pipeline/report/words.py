@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pipeline.report.german import in_german
 from pipeline.rounding import fixed, p_value, plain, rounded
-from pipeline.units import Unit, suited
+from pipeline.units import Unit, amount_unit
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 LANGUAGES = {"en": (0, "."), "de": (1, ",")}
@@ -142,5 +142,4 @@ class Words:
 
     def unit(self, unit: str, *values: float) -> Unit:
         """A unit of the contract as one writes it (nothing for a plain number), its prefix suited to the values."""
-        symbol = "" if unit == "-" else unit.replace("^2", "²").replace(" per ", self("per"))
-        return suited(values, symbol, decimal=self.decimal)
+        return amount_unit(unit.replace(" per ", self("per")), *values, decimal=self.decimal)

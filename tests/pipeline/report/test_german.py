@@ -130,7 +130,7 @@ SEEN = could_have_been_seen([("stiffness_varying", 0.00051, "-"), ("displacement
             "named",
             [["hysteresis"]],
             {},
-            "Der Simulation fehlt: Hysterese (0,00488 ± 0,00017 N m); auf Schritten, die das Modell nicht kannte, "
+            "Der Simulation fehlt: Hysterese (4,88 ± 0,17\u00a0mN m); auf Schritten, die das Modell nicht kannte, "
             "beseitigt das 94 % der Abweichung, und f_EI ändert sich um 20 % (eff.).",
         ),
         (
@@ -138,22 +138,22 @@ SEEN = could_have_been_seen([("stiffness_varying", 0.00051, "-"), ("displacement
             [["bearing_friction", "hysteresis", "plastic_set"]],
             {"change": None},
             "Eine Ursache, die diese Daten nicht sicher benennen können: Lagerreibung, Hysterese oder bleibende "
-            "Verformung (als Lagerreibung: 0,00488 ± 0,00017 N m); auf Schritten, die das Modell nicht kannte, "
+            "Verformung (als Lagerreibung: 4,88 ± 0,17\u00a0mN m); auf Schritten, die das Modell nicht kannte, "
             "beseitigt das 94 % der Abweichung.",
         ),
         (
             "two_causes",
             [["hysteresis"], ["pre_curvature_varying"]],
             {"explained": None, "change": None},
-            "Zwei Ursachen wirken zusammen: Hysterese (0,00488 ± 0,00017 N m) und veränderliche Vorkrümmung "
-            "(0,7000 ± 0,0014 1/m).",
+            "Zwei Ursachen wirken zusammen: Hysterese (4,88 ± 0,17\u00a0mN m) und veränderliche Vorkrümmung "
+            "(0,7000 ± 0,0014\u00a01/m).",
         ),
         (
             "adequate",
             [],
             {"weakest": SEEN},
             "Nichts jenseits des Rauschens: Die Simulation erklärt Kräfte und Fotos; 2 von 19 Ursachen hätten sich "
-            "bei plausibler Größe gezeigt, etwa veränderliche Steifigkeit ab 0,00051, Wegnullpunkt ab 3,5·10⁻⁶ m.",
+            "bei plausibler Größe gezeigt, etwa veränderliche Steifigkeit ab 0,00051, Wegnullpunkt ab 3,5\u00a0µm.",
         ),
     ],
 )
