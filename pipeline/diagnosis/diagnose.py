@@ -7,13 +7,14 @@ that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.bootstrap import confirmed_limit
+from pipeline.diagnosis.conclusion import Conclusion
 from pipeline.diagnosis.explanation import Explanation, candidates, refit_one
 from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
@@ -24,41 +25,11 @@ from pipeline.diagnosis.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.verdict import credible_set, probabilities, with_twins
 from pipeline.diagnosis.workbench import Workbench, prepare, with_finer_law
 from pipeline.identify import Identification
+from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
-
-
-@dataclass(frozen=True, eq=False)
-class Conclusion:
-    """What was concluded, before it is put into words.
-
-    Attributes
-    ----------
-    singles : list of Explanation
-        Refitted single causes, most probable first.
-    probability : list of float
-        Of each.
-    members : int
-        How many of them form the set of names.
-    accepted : Explanation or None
-        What the model is extended by: the most probable single cause, or a pair.
-    two : TwoCauses or None
-        The pairs that the data cannot tell from the accepted one, which is the first; None for a single cause.
-    left : Leftover
-        Test of what the accepted model (or the base model) leaves.
-    alien : bool
-        Whether that exceeds noise and is no small share.
-    """
-
-    singles: list[Explanation]
-    probability: list[float]
-    members: int
-    accepted: Explanation | None
-    two: TwoCauses | None
-    left: Leftover
-    alien: bool
 
 
 def diagnose(
@@ -92,7 +63,8 @@ def diagnose(
         again = prepare(faults.joined(fault), settings, knots=knots)
         if not isinstance(again, str) and again.largest <= again.limit:
             faults, bench = faults.joined(fault), again
-    return present(bench, conclude(bench, settings), settings), faults.findings
+    known = None if identification is None else curve_of(identification.inverse)
+    return present(bench, conclude(bench, settings), settings, identified=known), faults.findings
 
 
 def chosen_knots(identification: Identification | None, settings: DiagnosisSettings) -> int:
@@ -155,7 +127,7 @@ def _members(
 
 def _refitted(bench: Workbench, settings: DiagnosisSettings) -> list[Explanation]:
     """All suspects refitted that remove anything, the best first."""
-    suspects = candidates(bench.suspicion, settings)
+    suspects = candidates(bench.suspicion, settings, any_sign="mounted" not in bench.facts.branch)
     found = _explanations(bench, suspects, settings)
     if max((e.gain for e in found), default=0.0) < CONFIRMED * bench.largest**2:
         # A base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit.

@@ -51,10 +51,14 @@ class Explanation:
         return float(self.fitted.vector[at].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
-def candidates(suspicion: Suspicion, settings: DiagnosisSettings) -> list[int]:
-    """Causes worth a refit: by linear chi-square gain, within a margin of the best."""
+def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: bool = False) -> list[int]:
+    """Causes worth a refit: by linear chi-square gain, within a margin of the best.
+
+    ``any_sign``: scores of an inadmissible sign count too. About a base model in a false valley of K0 the sign of a
+    score says nothing: friction of the bearings on loading alone asks for a negative amount there.
+    """
     gains = np.zeros(len(suspicion.causes))
-    np.maximum.at(gains, suspicion.owner, suspicion.statistic**2)
+    np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
     order = np.argsort(-gains, kind="stable")
     needed = gains[order[0]] - max(settings.refit_least, settings.refit_margin * gains[order[0]])
     return [int(k) for k in order[: settings.refit_most] if gains[k] > max(needed, 0.0)]
@@ -78,9 +82,13 @@ def refit_one(
     enough = settings.fits * (len(base.residual) - base.extension.size)
     best: Fit | None = None
     for direction in _first_forms(suspicion, cause):
-        if best is not None and best.chi2 < enough:
+        if best is not None and best.converged and best.chi2 < enough:
             break
         found = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
+        if found is not None and not found.converged and suspicion.terms[direction].variant.tuned:
+            # where the trace has kinks (slip), a form that is tuned along may stall: the form as it is scored does not
+            held = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless, tuned=False)
+            found = held if held is not None and _cost(held) < _cost(found) else found
         if found is not None and (best is None or _cost(found) < _cost(best)):
             best = found
     if best is None:
@@ -121,9 +129,15 @@ def fit_terms(
     *,
     amounts: tuple[float, ...] | None = None,
     hopeless: float = np.inf,
+    tuned: bool = True,
 ) -> Fit | None:
-    """Fit with the given directions as terms, from the linear estimate, or from less of it where that fails."""
+    """Fit with the given directions as terms, from the linear estimate, or from less of it where that fails.
+
+    Unless ``tuned``, places and times stay as scored.
+    """
     terms = tuple(suspicion.terms[k] for k in directions)
+    if not tuned:
+        terms = tuple(Term(term.cause, replace(term.variant, tuned=())) for term in terms)
     extension = Extension(base.extension.base, base.extension.facts, (*base.extension.terms, *terms))
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)

@@ -92,6 +92,23 @@ def stiffness_change(before: Fit, after: Fit) -> float:
     return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
 
 
+def curve_change(before: Curve, after: Curve) -> float | None:
+    """Relative rms difference of two curves of f_EI where both are supported; None where they have no range in common.
+
+    Curves are compared on the points of ``after``.
+    """
+    K, f = np.array(after.kappa_per_m), np.array(after.tangent_Nm2)
+    known = np.array(before.supported, dtype=bool)
+    at = np.array(before.kappa_per_m)[known]
+    if at.size < 2:
+        return None
+    common = (at[0] <= K) & (at[-1] >= K)
+    if not np.any(common):
+        return None
+    there = np.interp(K[common], at, np.array(before.tangent_Nm2)[known])
+    return float(np.sqrt(np.mean((f[common] / there - 1.0) ** 2)))
+
+
 def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Array:
     """The same (k,), to first order, for effects that are in the data but not in the model.
 

@@ -126,7 +126,7 @@ def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
                 "photo/doubled",
                 "warning",
                 f"the photos of steps {steps[i].step} and {steps[j].step} are the same picture; the one of step "
-                f"{steps[wrong].step}, which fits its displacement less well, is left out of the diagnosis",
+                f"{steps[wrong].step}, which fits its displacement less well, is left out",
             )
         )
     return Faults(found.test, tuple(findings), frozenset(dropped))
@@ -187,8 +187,8 @@ def _order_of_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
             Finding(
                 "photo/order",
                 "warning",
-                f"the photos of steps {names} fit the displacements of each other: they are out of order and left out "
-                "of the diagnosis; correct the column `image` of the force log",
+                f"the photos of steps {names} fit the displacements of each other: they are out of order and left out; "
+                "correct the column `image` of the force log",
             ),
         ),
         frozenset(int(used[k]) for k in np.flatnonzero(wrong)),
@@ -281,7 +281,7 @@ def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
         f"{what}/outlier",
         "warning",
         f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is "
-        "left out of the diagnosis",
+        "left out",
     )
     index = frozenset({outlier.index})
     return Faults(

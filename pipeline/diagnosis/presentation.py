@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.conclusion import Conclusion
 from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.extended import curve, stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.extended import curve, curve_change, stiffness_change, stiffness_change_linear
 from pipeline.diagnosis.fit import Fit
 from pipeline.diagnosis.heldout import measured_gain
 from pipeline.diagnosis.maps import residual_map, smooth_share
@@ -22,14 +23,13 @@ from pipeline.diagnosis.workbench import Workbench, with_one_more_knot
 from pipeline.result import BlindSpot, CausePart, CauseRow, Curve, DiagnosisPart, GainPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
-if TYPE_CHECKING:
-    from pipeline.diagnosis.diagnose import Conclusion
-
 Array = NDArray[np.float64]
 
 
-def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> DiagnosisPart:
-    """Fill the part of the result."""
+def present(
+    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, identified: Curve | None = None
+) -> DiagnosisPart:
+    """Fill the part of the result; ``identified`` is f_EI before the diagnosis, which people compare with."""
     accepted = conclusion.accepted
     gain, held = measured_gain(bench, accepted.fitted, settings) if accepted else (None, None)
     rows = table(bench, conclusion, settings, heldout=held.removed if held else None)
@@ -43,12 +43,13 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
         powerless=len(seen) < settings.powerless * len(rows),
     )
     leftover = describe_leftover(bench, conclusion)
+    extended = _extended(bench, conclusion, settings)
     sentence = headline(
         verdict,
         names=[cause.class_ for cause in causes],
         amounts=[(cause.estimate, cause.std, cause.unit) for cause in causes],
         explained=None if gain is None else gain.heldout_excess_removed,
-        change=stiffness_change(bench.base, accepted.fitted) if accepted else None,
+        change=_change(bench, accepted, extended, identified),
         weakest=could_have_been_seen(seen, len(rows)),
         leftover=leftover["message"],
     )
@@ -60,12 +61,38 @@ def present(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetting
         gain=_valid(gain),
         blind_spots=blind_spots(bench, rows, settings),
         next_experiment=_next(bench, conclusion, settings, verdict),
-        extended=_extended(bench, conclusion, settings),
+        extended=extended,
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
         twins=confusable(bench, conclusion, settings),
+        left_out_photos=photos,
+        left_out_forces=forces,
     )
+
+
+def left_out(bench: Workbench) -> tuple[list[int], list[int]]:
+    """Steps whose photo, and steps whose force, the data at fault took out of the diagnosis."""
+    used = {photo.step for photo in bench.observation.photos}
+    steps = list(enumerate(bench.test.steps))
+    return (
+        [step.step for k, step in steps if step.shape is not None and k not in used],
+        [step.step for k, step in steps if bench.observation.forces[k].size == 0],
+    )
+
+
+def _change(
+    bench: Workbench, accepted: Explanation | None, extended: Curve | None, identified: Curve | None
+) -> float | None:
+    """Relative rms change of f_EI by the extension: of the curve that stands in the result, else of the base model's.
+
+    The base model here has a smooth law and a K0 of its own; without the cause both may run far from what the
+    identification found, and a change of the one would say nothing about the other.
+    """
+    if accepted is None or extended is None:
+        return None
+    change = None if identified is None else curve_change(identified, extended)
+    return stiffness_change(bench.base, accepted.fitted) if change is None else change
 
 
 def _extended(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve | None:

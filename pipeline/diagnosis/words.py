@@ -97,7 +97,7 @@ def explain(name: str) -> str:
     if name == "pre_curvature":
         return (
             "pre_curvature (K0, 1/m)\n\nThe cable is uniformly bent at rest. K0 is part of the base model and fitted "
-            "on every specimen;\nonly `rediscover`, which starts from a straight cable of constant stiffness, has to "
+            "on every specimen;\nonly a simulation that starts from a straight cable of constant stiffness has to "
             "find it.\n"
         )
     cause = cause_by_name(name)

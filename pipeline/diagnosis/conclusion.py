@@ -1,0 +1,40 @@
+"""What was concluded about one specimen, before it is put into words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.diagnosis.explanation import Explanation
+from pipeline.diagnosis.leftover import Leftover
+from pipeline.diagnosis.two_causes import TwoCauses
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """What was concluded, before it is put into words.
+
+    Attributes
+    ----------
+    singles : list of Explanation
+        Refitted single causes, most probable first.
+    probability : list of float
+        Of each.
+    members : int
+        How many of them form the set of names.
+    accepted : Explanation or None
+        What the model is extended by: the most probable single cause, or a pair.
+    two : TwoCauses or None
+        The pairs that the data cannot tell from the accepted one, which is the first; None for a single cause.
+    left : Leftover
+        Test of what the accepted model (or the base model) leaves.
+    alien : bool
+        Whether that exceeds noise and is no small share.
+    """
+
+    singles: list[Explanation]
+    probability: list[float]
+    members: int
+    accepted: Explanation | None
+    two: TwoCauses | None
+    left: Leftover
+    alien: bool

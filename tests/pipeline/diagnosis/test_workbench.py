@@ -1,0 +1,50 @@
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import THREE, hidden_test
+from pipeline.diagnosis import workbench
+from pipeline.diagnosis.extended import curve_change
+from pipeline.diagnosis.faults import faults_of_input
+from pipeline.result import Curve
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+SETTINGS = DiagnosisSettings()
+
+
+def test_a_finer_law_without_equilibrium_leaves_the_coarser_one(monkeypatch):
+    """Between control points moved by a refinement the moment may fall; the law is then kept as it was."""
+    faults = faults_of_input(hidden_test(Cable(), THREE, largest=0.0138, seed=6), SETTINGS)
+    plain = workbench.prepare(faults, SETTINGS, knots=5)
+    refined = workbench.with_knots
+
+    def falling(fitted, count):
+        extension, vector = refined(fitted, count)
+        vector[:count:2] -= 8.0  # every second control point at e^-8 of its stiffness: the spline swings below zero
+        return extension, vector
+
+    monkeypatch.setattr(workbench, "with_knots", falling)
+    assert workbench.with_one_more_knot(plain.observation, plain.base, SETTINGS) is None
+    kept = workbench.prepare(faults, SETTINGS, knots=5)
+    assert len(kept.base.extension.base.knots) == 5
+    assert kept.base.chi2 == pytest.approx(plain.base.chi2, rel=0.05)  # its control points stayed where they were
+
+
+def curve(kappa, tangent, supported):
+    zero = [0.0] * len(kappa)
+    return Curve(
+        kappa_per_m=kappa,
+        moment_Nm=zero,
+        moment_std_Nm=zero,
+        tangent_Nm2=tangent,
+        tangent_std_Nm2=zero,
+        secant_Nm2=zero,
+        secant_std_Nm2=zero,
+        supported=supported,
+    )
+
+
+def test_change_of_f_is_that_of_the_curves_where_both_are_supported():
+    before = curve([0.0, 1.0, 2.0, 9.0], [1.0, 1.0, 1.0, 50.0], [True, True, True, False])
+    after = curve([1.0, 2.0, 3.0], [1.1, 0.9, 7.0], [True] * 3)
+    assert curve_change(before, after) == pytest.approx(0.1)
+    assert curve_change(before, curve([3.0, 4.0], [1.0, 1.0], [True] * 2)) is None
