@@ -107,11 +107,6 @@ class Rod:
         return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
 
     @cached_property
-    def arc_length(self) -> Array:
-        """Arc length of the n + 1 joints from the left axis, m."""
-        return np.asarray(np.cumsum(self.edges[:-1]))
-
-    @cached_property
     def length_beyond(self) -> Array:
         """Length to the right of each edge's middle, (n + 2,) m."""
         return np.asarray(0.5 * self.edges + (self.length - np.cumsum(self.edges)))

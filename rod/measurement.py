@@ -8,7 +8,7 @@ Both ways to the bending stiffness characteristic read these records and nothing
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,7 +128,6 @@ class MeasuredTest:
         In the order of the test.
     moving : str
         ``left`` or ``right``: the bearing that is pushed.
-    notes : tuple of str
     picture_half_diagonal : m or None
         Half the diagonal of the picture on the plane of the cable.
     """
@@ -138,6 +137,5 @@ class MeasuredTest:
     scale_std: float
     steps: tuple[MeasuredStep, ...]
     moving: str = "left"
-    notes: tuple[str, ...] = field(default=())
     picture_half_diagonal: float | None = None
     axis_std: float = 0.0
