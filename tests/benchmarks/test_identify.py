@@ -34,7 +34,7 @@ def six_photos():
 
 @pytest.fixture(scope="module")
 def model(six_photos):
-    return fit_model(six_photos, step_data(six_photos), place_knots(2.0, 9.2, 7), tau=6.0, elements=100)
+    return fit_model(six_photos, step_data(six_photos), place_knots(2.0, 9.2, 7), elements=100)
 
 
 def seconds(function, repeats=5):
