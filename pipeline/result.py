@@ -278,6 +278,8 @@ class DiagnosisPart(Part):
     residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
     residuals_after: dict[str, Any] | None = None
     twins: dict[str, dict[str, float]] = Field({}, description="cosines of confusable causes")
+    left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
+    left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
 
 
 class FindingPart(Part):

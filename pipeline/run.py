@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pipeline.assembly import assemble
 from pipeline.diagnosis import diagnose
-from pipeline.identify import Identification, identify
+from pipeline.identify import Identification, identify, identify_without
 from pipeline.intake.folder import read_specimen
 from pipeline.records import Finding
 from pipeline.report.document import write_report
@@ -47,6 +47,9 @@ def measure(folder: Path | str, settings: Settings | None = None, *, command: st
     traces = trace_series(specimen, settings.vision)
     identification = identify(specimen, traces, settings.identify)
     diagnosis, findings = _diagnosed(identification, settings)
+    if diagnosis is not None and (diagnosis.left_out_photos or diagnosis.left_out_forces):
+        wrong = diagnosis.left_out_photos, diagnosis.left_out_forces
+        identification = identify_without(identification, *wrong, settings.identify)
     return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
 
 

@@ -44,6 +44,7 @@ def present(
     )
     leftover = describe_leftover(bench, conclusion)
     extended = _extended(bench, conclusion, settings)
+    photos, forces = left_out(bench)
     sentence = headline(
         verdict,
         names=[cause.class_ for cause in causes],

@@ -7,7 +7,7 @@ goes into ``result.json``).
 
 from pipeline.identify.measured import measured_test
 from pipeline.identify.parts import IdentificationParts, identification_parts
-from pipeline.identify.ways import Identification, identify, identify_test
+from pipeline.identify.ways import Identification, identify, identify_test, identify_without
 
 __all__ = [
     "Identification",
@@ -15,5 +15,6 @@ __all__ = [
     "identification_parts",
     "identify",
     "identify_test",
+    "identify_without",
     "measured_test",
 ]

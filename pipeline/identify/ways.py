@@ -6,6 +6,7 @@ for all steps together, and a test says whether the two show the same characteri
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -94,6 +95,33 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
         agreement = compare(test, inverse, graph, level=settings.agreement_level)
         found = replace(found, agreement=agreement)
     return replace(found, findings=identification_findings(found, settings))
+
+
+def identify_without(
+    found: Identification, photos: Collection[int], forces: Collection[int], settings: IdentifySettings
+) -> Identification:
+    """Both ways again without what contradicts all else: a wrong force or photo is no property of the cable.
+
+    Parameters
+    ----------
+    found : Identification
+        With everything; its test stays what was measured.
+    photos, forces : collections of int
+        Steps whose photo, or force, is at fault. A shape without its force tells neither way the scale of f_EI, so a
+        step without force is left out as a whole.
+    settings : IdentifySettings
+
+    Returns
+    -------
+    Identification
+    """
+    steps = tuple(
+        replace(step, shape=None, chord=None, chord_std=None) if step.step in photos else step
+        for step in found.test.steps
+        if step.step not in forces
+    )
+    again = identify_test(replace(found.test, steps=steps), settings)
+    return replace(again, test=found.test, images=found.images)
 
 
 def inverse_options(settings: IdentifySettings) -> InverseOptions:

@@ -84,6 +84,7 @@ def test_one_bad_photo_is_no_cause(honest):
     part, findings = diagnose(with_steps(honest, step3={"shape": spoiled}), None, SETTINGS)
     assert [finding.code for finding in findings] == ["photo/outlier"]
     assert "step 3" in findings[0].message and part.verdict == "adequate"
+    assert (part.left_out_photos, part.left_out_forces) == ([3], [])
 
 
 def test_one_bad_force_is_no_cause(honest):
@@ -91,6 +92,7 @@ def test_one_bad_force_is_no_cause(honest):
     part, findings = diagnose(with_steps(honest, step4={"hold_forces": forces}), None, SETTINGS)
     assert [finding.code for finding in findings] == ["force/outlier"]
     assert "step 4" in findings[0].message and part.verdict == "adequate"
+    assert (part.left_out_photos, part.left_out_forces) == ([], [4])
 
 
 def test_without_photos_nothing_can_be_held_against_the_simulation(honest):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.identify import identification_parts, identify_test
+from pipeline.identify import identification_parts, identify_test, identify_without
 from pipeline.identify.agreement import Characterised, difference_covariance, rest_curvature, source_covariance
 from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
 from pipeline.result import Result, SpecimenPart, from_json, to_json
 from rod.inverse import InverseOutcome
-from rod.inverse.knots import prior_forms
+from rod.inverse.law_prior import forms
 
 
 def with_steps(test, change):
@@ -44,11 +44,11 @@ def test_both_ways_are_compared_on_the_range_both_visited(found):
 
 def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     """What the comparison sends through a way is all that its band holds, away from the ends of the range."""
-    way, model = found.inverse, found.inverse.model
+    way = found.inverse
     noise = sum(
         gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.gains.items()
     )
-    short = way.shortfall @ prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.kappa)
+    short = way.shortfall @ forms(way.model.knots, way.law_covariance, way.kappa)
     ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.log_covariance))
     # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
     # mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.
@@ -126,6 +126,19 @@ def test_chord_against_displacement(measured, settings):
 def test_wrong_zero_of_displacement_leaves_the_result_alone(measured, settings, found):
     moved = with_steps(measured, lambda s: replace(s, displacement=s.displacement + 1e-3))
     assert np.allclose(identify_test(moved, settings).inverse.tangent, found.inverse.tangent, rtol=1e-9)
+
+
+def test_what_is_at_fault_is_left_out_of_both_ways(measured, settings, law):
+    wrong = with_steps(measured, lambda s: replace(s, force=1.25 * s.force) if s.step == 3 else s)
+    spoiled = identify_test(wrong, settings)
+    again = identify_without(spoiled, photos=[], forces=[3], settings=settings)
+    for way in (again.inverse, again.balance):
+        truth = law.tangent(way.kappa)
+        # what is left is the noise of the data; with the force a quarter too high it is 5 % or more
+        assert np.sqrt(np.mean((way.tangent / truth - 1.0) ** 2)) < 0.02
+    assert again.test is wrong, "what was measured stays in the result"
+    assert "identify/misfit-force" in codes(spoiled.findings)
+    assert "identify/misfit-force" not in codes(again.findings)
 
 
 def test_tension_and_a_load_cell_off_zero_are_told(measured, settings):
