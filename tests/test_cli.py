@@ -1,6 +1,7 @@
 """The command line: exit codes, stdout and stderr, settings, and nothing heavy before it is needed."""
 
 import json
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -90,6 +91,29 @@ def test_json_of_a_run(cheap):
     assert document["specimens"][1]["code"] == "log/empty"
     assert document["counts"] == {"total": 3, "measured": 2, "failed": 1, "kept": 0}
     assert document["interrupted"] is False
+
+
+def test_command_that_reproduces_a_result_can_be_copied_and_runs_nothing_else(cheap):
+    strange = cheap / 'batch/a $(touch pwned) "b"'
+    (cheap / "batch/a").rename(strange)
+    call("run", strange.relative_to(cheap), "-o", "out", "--set", 'report.language="de"', *IN_PROCESS)
+    command = json.loads((cheap / "out/a/result.json").read_text())["provenance"]["command"]
+    assert shlex.split(command)[:5] == ["cablebend", "run", 'batch/a $(touch pwned) "b"', "-o", "out"]
+    assert shlex.split(command)[5:7] == ["--set", 'report.language="de"']
+    subprocess.run(["sh", "-c", command.replace("cablebend", "true", 1)], cwd=cheap, check=True)
+    assert not (cheap / "pwned").exists()
+
+
+def test_log_that_cannot_be_written_costs_no_result(cheap):
+    (cheap / "out").mkdir()
+    (cheap / "out/cablebend.log").symlink_to("/dev/full")
+    done = call("run", "batch", "-o", "out", *IN_PROCESS)
+    assert done.exit_code == 0
+    assert "Logging error" not in done.stderr
+    (cheap / "taken/cablebend.log").mkdir(parents=True)
+    done = call("run", "batch", "-o", "taken", *IN_PROCESS)
+    assert done.exit_code == 2
+    assert "taken: cannot be written (is a directory)" in done.stderr
 
 
 def test_one_specimen_folder(cheap):
@@ -214,8 +238,13 @@ def test_all_settings_can_be_written_and_read_back(tmp_path):
     path = tmp_path / "settings.toml"
     path.write_text(call("init", "--settings").stdout, encoding="utf-8")
     assert read_settings(path, ()) == Settings()
-    undescribed = [line for line in commented_settings(Settings()).split("\n#  = ") if not line]
-    assert not undescribed
+
+
+def test_every_setting_says_what_it_is_and_why():
+    lines = commented_settings(Settings()).splitlines()
+    values = [number for number, line in enumerate(lines) if " = " in line and not line.startswith("# ")]
+    assert len(values) > 100
+    assert [lines[number] for number in values if not lines[number - 1].startswith("# ")] == []
 
 
 def test_settings_from_file_and_assignments(tmp_path):

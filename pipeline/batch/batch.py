@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,7 @@ def run_batch(
     from pipeline.batch.engine import measure_all  # dask takes half a second to load
 
     store, stages = Store(out.absolute()), stages or Stages.of_pipeline()
-    with store.locked(), _log(out) as log:
+    with store.locked(), _log(store) as log:
         orders = make_orders(folders, out, settings, options=options)
         tally = Tally(len(orders), tuple(order.name for order in orders))
         log.info("begin: %d specimens", len(orders))
@@ -149,13 +149,18 @@ def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> 
 
 
 @contextmanager
-def _log(out: Path) -> Iterator[logging.Logger]:
+def _log(store: Store) -> Iterator[logging.Logger]:
     """A log file beside the results, one line a specimen, appended to by each run."""
     log = logging.Logger("cablebend.batch")  # not registered: no other logger of the process is touched
-    handler = logging.FileHandler(out / LOG_NAME, encoding="utf-8", errors="backslashreplace")
+    try:
+        handler = logging.FileHandler(store.out / LOG_NAME, encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        raise store.unwritable(error) from error
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+    handler.handleError = lambda record: None  # a full disk: the default prints a traceback for every line
     log.addHandler(handler)
     try:
         yield log
     finally:
-        handler.close()
+        with suppress(OSError):
+            handler.close()

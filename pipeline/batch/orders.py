@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import shlex
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,9 +64,8 @@ def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, optio
 
 
 def quoted(path: Path | str) -> str:
-    """A path as a shell takes it, readable even if its bytes are no text."""
-    text = str(path).encode("utf-8", "replace").decode("utf-8")
-    return text if text and all(char.isalnum() or char in "/._-+=:@~" for char in text) else f'"{text}"'
+    """A path as a shell takes it and nothing more: a folder named ``$(command)`` by a stranger runs no command."""
+    return shlex.quote(str(path).encode("utf-8", "replace").decode("utf-8"))
 
 
 def result_names(folders: Sequence[Path], settings: Settings) -> list[str]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import shlex
 import textwrap
 import tomllib
 from collections.abc import Sequence
@@ -107,8 +109,9 @@ def _merged(tables: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
 
 def as_options(file: Path | None, assignments: Sequence[str]) -> str:
     """The options as they are typed, for the command that reproduces a result."""
-    parts = [] if file is None else [f'--settings "{file}"']
-    return " ".join([*parts, *(f'--set "{assignment}"' for assignment in assignments)])
+    options = [] if file is None else [("--settings", str(file))]
+    options += [("--set", assignment) for assignment in assignments]
+    return shlex.join(itertools.chain.from_iterable(options))
 
 
 def commented_settings(settings: Settings) -> str:

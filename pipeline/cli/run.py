@@ -70,6 +70,7 @@ def run(
 
 def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
+    from pipeline.batch.orders import quoted
     from pipeline.intake.folder import find_specimens, find_undescribed
 
     specimens: dict[Path, None] = {}
@@ -81,7 +82,7 @@ def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[In
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
     for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
-        told = f"has photos and a table but no specimen.toml; write one with `cablebend init {folder}`"
+        told = f"has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`"
         click.echo(f"cablebend: {folder}: {told}.", err=True)
     return list(specimens), refused
 
