@@ -1,6 +1,6 @@
 """Cross-sections of a strip at reduced resolution: its colour against the ground, its middle and width along the path.
 
-Rows of a cross-cut are sections along the path (one cell apart), columns are offsets along the normal, positive to the
+Rows of a cross-cut are sections along the path, columns are offsets along the normal, positive to the
 right of the walking direction on the photo (the normal of the tangent ``(du, dv)`` is ``(-dv, du)``).
 All lengths in cells.
 """
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Standout
-from pipeline.vision.flanks import find_flanks
+from pipeline.vision.backdrop import Image, Standout
+from pipeline.vision.flanks import Flanks, find_flanks
 
 _MAD_TO_STD = 1.4826
 
@@ -82,36 +82,67 @@ def cut_across(
     """
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
-    offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
-    u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
-    v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
-    straight = cv2.remap(standout.residual, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    straight = straight.reshape(*u.shape, -1)
+    straight, rows, offsets = _straighten(standout.residual, path, normal, width, settings)
     weights = _projection(straight, offsets / width, standout.covariance)
     grey = straight @ weights.astype(np.float32)
     core, flank = np.abs(offsets) < 0.35 * width, (np.abs(offsets) > 0.9 * width) & (np.abs(offsets) < 1.7 * width)
     ground = np.median(grey[:, flank], axis=1)
     sign = -1.0 if np.median(np.median(grey[:, core], axis=1) - ground) < 0 else 1.0
     relief = sign * (grey - ground[:, None])
-    flanks = find_flanks(relief, offsets, width, settings, known=known)
-    inner = np.abs(offsets - flanks.middle[:, None]) < 0.35 * flanks.width
-    step = np.nanmedian(np.where(inner, relief, np.nan), axis=1)
+    pitch = len(path) / len(rows)
+    flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
+    step = _core_level(relief, offsets, flanks)
     # a shadow runs along the cable: it is no texture, and what texture does along the path it does across, too
     beside = grey[:, flank] - ground[:, None]
-    beside = beside - gaussian_filter1d(beside, settings.texture_widths * width, axis=0, mode="nearest")
+    # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
+    light = round(np.sqrt(12.0) * settings.texture_widths * width / pitch)
+    beside = beside - uniform_filter1d(beside, light, axis=0, mode="nearest")
     texture = float(np.hypot(_MAD_TO_STD * np.median(np.abs(beside)), settings.min_ground_std))
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
-    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width, mode="nearest")
+    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")
+    nearest = np.rint(np.interp(np.arange(len(path)), rows, np.arange(len(rows)))).astype(int)
     return CrossCut(
-        path=path + normal * middle[:, None],
-        width=flanks.right - flanks.left,
-        step=step,
+        path=path + normal * np.interp(np.arange(len(path)), rows, middle)[:, None],
+        width=(flanks.right - flanks.left)[nearest],
+        step=step[nearest],
         contrast=float(np.median(step)),
         texture=texture,
         weights=weights,
         dark=sign < 0,
     )
+
+
+def _core_level(relief: Array, offsets: Array, flanks: Flanks) -> Array:
+    """Median of each section ``(n,)`` over the core of the cable."""
+    spacing = float(offsets[1] - offsets[0])
+    half = int(0.35 * flanks.width / spacing)
+    column = np.rint((flanks.middle - offsets[0]) / spacing).astype(int)[:, None] + np.arange(-half, half + 1)
+    return np.asarray(np.median(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
+
+
+def _straighten(
+    picture: Image, path: Array, normal: Array, width: float, settings: SegmentationSettings
+) -> tuple[Image, Array, Array]:
+    """Picture ``(n, m, c)`` along the path, the places of its rows on it, and the offsets of its columns.
+
+    A wide strip is averaged to as many rows and twice as many columns a width as a cable of known diameter has cells.
+    """
+    offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
+    u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
+    v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
+    straight = cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    rows = round(len(path) / max(1, int(width / settings.cells_across)))
+    columns = len(offsets) // max(1, int(0.5 * width / settings.cells_across))
+    if (columns, rows) != (len(offsets), len(path)):
+        straight = cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA)
+    place, offset = _centres(len(path), rows), _centres(len(offsets), columns)
+    return straight.reshape(rows, columns, -1), place, np.interp(offset, np.arange(len(offsets)), offsets)
+
+
+def _centres(many: int, few: int) -> Array:
+    """Places of ``few`` means of equal size among ``many`` points."""
+    return (np.arange(few) + 0.5) * (many / few) - 0.5
 
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
@@ -32,18 +31,26 @@ class Flanks:
 
 
 def find_flanks(
-    relief: NDArray[np.float32], offsets: Array, width: float, settings: SegmentationSettings, *, known: bool
+    relief: NDArray[np.float32],
+    offsets: Array,
+    width: float,
+    pitch: float,
+    settings: SegmentationSettings,
+    *,
+    known: bool,
 ) -> Flanks:
     """Edges of the cable.
 
     Parameters
     ----------
     relief : (n, m)
-        Straightened picture, sections one cell apart; positive in the cable.
+        Straightened picture; positive in the cable.
     offsets : (m,)
         Evenly spaced.
     width : cells
         The cable's if ``known``, else that of the mask, which a shadow may have widened.
+    pitch : cells
+        Distance of neighbouring sections.
     known : bool
 
     Returns
@@ -57,40 +64,44 @@ def find_flanks(
     # Most sections tell how strong an edge is; letters count no more, and a highlight's edge, which may be three times
     # as strong as a flank, less than twice (the root).
     usual = float(np.median(np.abs(slope).max(axis=1))) + 1e-12
-    pooling = settings.pair_pooling_widths * width
-    rise, fall = (
-        np.sqrt(gaussian_filter1d(np.clip(edge / usual, 0.0, 1.0), pooling, axis=0, mode="nearest"))
-        for edge in (slope, -slope)
-    )
-    near = np.abs(offsets) <= settings.pair_search_widths * width
-    best = _pair_width(rise, fall, offsets, near, width, known, settings)
+    pooling = settings.pair_pooling_widths * width / pitch
+    rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
+    near = np.flatnonzero(np.abs(offsets) <= settings.pair_search_widths * width)
+    best = spacing * _pair_width(rise, fall, near, width / spacing, known, settings)
     # Pooled sections repeat each other: every half width of them is enough for the course.
     every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
-    score = _pair_score(rise[every], fall[every], offsets, best)[:, near]
+    score = _pair_score(rise[every], fall[every], near, np.array([best / spacing]))[:, 0]
     course = offsets[near][_best_course(score, settings.pair_wander_cost)]
     middle = np.interp(np.arange(len(relief)), every, course)
     least = settings.least_edge_share * usual
-    slope = gaussian_filter1d(slope, pooling, axis=0, mode="nearest")
+    slope = _pooled(slope, pooling)
     left = _steepest(slope, offsets, middle - 0.5 * best, settings.edge_reach_widths * best, least)
     right = _steepest(-slope, offsets, middle + 0.5 * best, settings.edge_reach_widths * best, least)
     return Flanks(left, right, middle, best)
 
 
-def _pair_score(rise: Array, fall: Array, offsets: Array, width: float) -> Array:
-    """Strength ``(n, m)`` of a pair of edges ``width`` apart about each offset; the weaker edge counts twice."""
-    half = 0.5 * width / float(offsets[1] - offsets[0])
-    first, second = _shifted(rise, -half), _shifted(fall, half)
+def _pooled(values: Array, std: float) -> Array:
+    """Gaussian mean over neighbouring sections."""
+    return cv2.GaussianBlur(values, (1, 2 * round(4.0 * std) + 1), 1.0, sigmaY=std, borderType=cv2.BORDER_REPLICATE)
+
+
+def _pair_score(rise: Array, fall: Array, columns: Array, widths: Array) -> Array:
+    """Strength ``(n, w, k)`` of pairs of edges about ``columns`` ``(k,)``, for each of ``widths`` ``(w,)`` in columns.
+
+    The weaker edge counts twice.
+    """
+    half = 0.5 * widths[:, None]
+    first, second = _at(rise, columns - half), _at(fall, columns + half)
     return np.asarray(first + second + np.minimum(first, second))
 
 
-def _shifted(values: Array, by: float) -> Array:
-    """Values ``by`` columns farther on, linear between columns, 0 outside."""
-    columns = np.arange(values.shape[1]) + by
+def _at(values: Array, columns: Array) -> Array:
+    """Values ``(n, ...)`` at fractions of columns ``(...)``, linear between columns, 0 outside."""
     low = np.floor(columns).astype(int)
-    share = columns - low
+    share = (columns - low).astype(values.dtype)
     padded = np.pad(values, ((0, 0), (1, 2)))
     at = np.clip(low + 1, 0, values.shape[1] + 1)
-    return np.asarray((1.0 - share) * padded[:, at] + share * padded[:, at + 1])
+    return np.asarray((1 - share) * padded[:, at] + share * padded[:, at + 1])
 
 
 def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
@@ -115,21 +126,15 @@ def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
 
 
 def _pair_width(
-    rise: Array,
-    fall: Array,
-    offsets: Array,
-    near: NDArray[np.bool_],
-    width: float,
-    known: bool,
-    settings: SegmentationSettings,
+    rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool, settings: SegmentationSettings
 ) -> float:
-    """Distance of the edges that fits best along the whole strip.
+    """Distance in columns of the edges that fits best along the whole strip; ``near`` are the columns of its middle.
 
     An unknown width is the largest of nearly the best ones: a highlight splits a cable, nothing doubles it.
     """
     tried = width * np.geomspace(*settings.pair_width_range, settings.pair_widths)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
-    totals = np.array([_pair_score(rise, fall, offsets, each)[:, near].max(axis=1).mean() for each in tried])
+    totals = _pair_score(rise, fall, near, tried).max(axis=2).mean(axis=0)
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / settings.pair_width_std) ** 2)
         return float(tried[np.argmax(totals * (settings.pair_width_doubt + (1.0 - settings.pair_width_doubt) * trust))])

@@ -22,6 +22,8 @@ from pipeline.settings.vision_stages import SegmentationSettings
 
 Mask = NDArray[np.uint8]
 
+_LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
+
 
 @dataclass(frozen=True)
 class Strip:
@@ -67,7 +69,16 @@ def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSet
 
 def thick_part(mask: Mask, width: float, settings: SegmentationSettings) -> Mask:
     """Things clearly wider than the cable: clamps, covers, the holder."""
-    return cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(settings.thick_widths * width))
+    disc = _disc(settings.thick_widths * width)
+    if len(disc) <= _LARGE_DISC:
+        return cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc)
+    # The same by distances, whose time does not grow with the disc.
+    radius = len(disc) // 2
+    core = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius
+    if not core.any():
+        return np.zeros_like(mask)
+    outside = np.logical_not(core).astype(np.uint8)
+    return np.asarray(cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius).astype(np.uint8)
 
 
 def find_strips(mask: Mask, thick: Mask, width: float, settings: SegmentationSettings) -> list[Strip]:
