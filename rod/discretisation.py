@@ -35,7 +35,13 @@ RIGIDITY = 1e9
 
 
 def graded(elements: int, ratio: float) -> Array:
-    """Relative element lengths, (elements,) of sum one: at mid-span ``ratio`` times as long as at the ends."""
+    """Relative element lengths, (elements,) of sum one: at mid-span ``ratio`` times as long as at the ends.
+
+    Raises
+    ------
+    ValueError
+        For fewer than two elements or a ratio that is not positive.
+    """
     if elements < 2 or not ratio > 0.0:
         raise ValueError(f"need at least two elements and a positive ratio, got {elements} and {ratio}")
     centre = (np.arange(elements) + 0.5) / elements
@@ -113,7 +119,13 @@ class Rod:
 
     @cached_property
     def stiffness_scale(self) -> float:
-        """Typical bending stiffness, N m^2: size of the law times the largest profile value."""
+        """Typical bending stiffness, N m^2: size of the law times the largest profile value.
+
+        Raises
+        ------
+        ValueError
+            If that is not positive: without stiffness nothing has a scale.
+        """
         profile = self.section.profile
         scale = self.section.law.stiffness_scale * (1.0 if profile is None else float(np.max(np.abs(profile))))
         friction = self.section.friction
