@@ -29,7 +29,8 @@ ROD = [
 INSIDE = {
     "rod.inverse": [
         ("whitening", "knots", "options"),
-        ("photo_residual", "fit_model"),
+        ("photo_residual", "law_prior"),
+        ("fit_model",),
         ("evaluation",),
         ("smoothness",),
         ("control_points", "estimate"),

@@ -9,7 +9,7 @@ sent through both,
     V = sum (G_1 - G_2) S (G_1 - G_2)^T + (B_1 - B_2) F F^T (B_1 - B_2)^T
 
 over the sources with covariance S (of photos, forces, nuisances), for laws of the forms F that the smoothness prior
-allows (`rod.inverse.knots.prior_forms`, of the sizes of largest evidence). What both miss alike cancels. Over cables of
+allows (`rod.inverse.law_prior`, with the weights that the data give them). What both miss alike cancels. Over cables of
 the accuracy study the test of level 5 % rejects 2 to 4 %, with and without a force-free photo, for both kinds of law.
 
 The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
@@ -25,7 +25,7 @@ from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
-from rod.inverse.knots import prior_forms
+from rod.inverse.law_prior import forms
 from rod.measurement import MeasuredTest
 
 Source = tuple[str, int]
@@ -88,9 +88,9 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
     if grid is None or inverse.model is None:
         return None
     ratio = one.curve.log_on(grid) - two.curve.log_on(grid)
-    model = inverse.model
-    forms, same = (prior_forms(model.knots, tau=model.tau, slope=model.slope, at=way.curve.kappa) for way in (one, two))
-    covariance = difference_covariance(test, one, two, (forms, same), grid)
+    knots, law = inverse.model.knots, inverse.law_covariance
+    laws = forms(knots, law, one.curve.kappa), forms(knots, law, two.curve.kappa)
+    covariance = difference_covariance(test, one, two, laws, grid)
     p = p_value(parts_difference(one.curve, two.curve, grid), covariance)
     return Agreement(
         range_per_m=(float(grid[0]), float(grid[-1])),
@@ -104,14 +104,14 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
 
 
 def difference_covariance(
-    test: MeasuredTest, one: Characterised, two: Characterised, forms: tuple[Array, Array], grid: Array
+    test: MeasuredTest, one: Characterised, two: Characterised, laws: tuple[Array, Array], grid: Array
 ) -> Array:
     """Covariance of the difference of two ways, mean over each part of the grid, (parts, parts); see the module.
 
-    `forms` are the laws sent through both, each on the way's own grid, (n, p).
+    `laws` are those sent through both, each on the way's own grid, (n, p).
     """
     first, second = one.curve.contraction(grid), two.curve.contraction(grid)
-    short = first @ one.shortfall @ forms[0] - second @ two.shortfall @ forms[1]
+    short = first @ one.shortfall @ laws[0] - second @ two.shortfall @ laws[1]
     total: Array = short @ short.T
     for source in one.gains | two.gains:
         moved = first @ one.gains[source] if source in one.gains else 0.0

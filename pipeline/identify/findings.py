@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from pipeline.records import Finding, Level
+from pipeline.rounding import p_value
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
@@ -157,7 +158,7 @@ def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[
             "warning",
             "loading and unloading show different characteristics: pre-curvature "
             f"{one.pre_curvature:.3f} +- {one.pre_curvature_std:.3f} against "
-            f"{two.pre_curvature:.3f} +- {two.pre_curvature_std:.3f} 1/m (p = {found.branches_p:.1e}); "
+            f"{two.pre_curvature:.3f} +- {two.pre_curvature_std:.3f} 1/m ({p_value(found.branches_p)}); "
             "the common fit is a mean of both",
         )
     agreement = found.agreement
@@ -166,5 +167,5 @@ def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[
             "identify/agreement",
             "warning",
             f"inverse and balance differ by {agreement.rms_relative:.1%} rms, more than their joint uncertainty "
-            f"(p = {agreement.p_value:.1e}); " + "; ".join(agreement.hints),
+            f"({p_value(agreement.p_value)}); " + "; ".join(agreement.hints),
         )

@@ -70,7 +70,8 @@ class BalanceOptions:
     points : int
         Points per photo: more than a curvature spline has parameters; further ones hold no new information.
     coefficients : int
-        Splines of the compliance; the penalty decides the form, ten can follow any stick-slip law.
+        Splines of the compliance; the penalty decides the form. Ten can follow a law of stick and slip, but not one
+        that falls within a tenth of the range: with 16 the worst of 40 such cables is 3 % off instead of 20 %.
     floor : relative
         Curvature that no photo resolves, over the range met: the error of the smooth curve's own spline.
     roughness : (low, high)
@@ -85,7 +86,7 @@ class BalanceOptions:
     """
 
     points: int = 60
-    coefficients: int = 10
+    coefficients: int = 16
     floor: float = 2e-4
     roughness: tuple[float, float] = (0.1, 60.0)
     grid: int = 61
@@ -271,10 +272,10 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
 def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source, Array]:
     """Response of log(tangent) to every source of error: the estimate moves by -response J^T W d(residual)."""
     # With the normal matrix A and a common error e of prior variance 1 the law is off by (A^-1 (A - 1) e) = -A^-1 e.
-    common = -by_log @ found.posterior.response[:, model.common]
+    common = -by_log @ found.posterior.covariance[:, model.common]
     gains: dict[Source, Array] = {("scale", -1): common[:, :1], ("axes", -1): common[:, 1:]}
     for data, row in zip(model.data, found.rows, strict=True):
-        response = -by_log @ found.posterior.response @ model.columns(data, row).T
+        response = -by_log @ found.posterior.covariance @ model.columns(data, row).T
         for name, columns in row.by_source.items():
             gains[name, data.step.step] = response @ row.whitener @ columns
         gains["floor", data.step.step] = model.floor * response @ row.whitener

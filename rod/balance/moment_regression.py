@@ -39,15 +39,14 @@ class Posterior:
     ----------
     mean : (q,)
     covariance : (q, q)
-    response : (q, q)
-        Mean of the inverse normal matrices.
+        Also the response: a change dr of the whitened residual moves the mean by -covariance J^T dr, the weights of the
+        sizes included, since d log(evidence) of each is -(J (its mean - mean))^T dr up to a common term.
     shrinkage : (q, p)
         By how much the mean falls short of a law with the coefficients a of log c, per unit of a.
     """
 
     mean: Array
     covariance: Array
-    response: Array
     shrinkage: Array
 
 
@@ -59,7 +58,7 @@ class Regression:
     ----------
     curve : ComplianceCurve
     unknowns : (q,)
-        Where the rows were taken; see the module for their order.
+        See the module for their order; the rows were taken within a hundredth of a standard deviation of them.
     posterior : Posterior
     rows : tuple of Residual
         Whitened, one entry per photo.
@@ -137,35 +136,43 @@ class MomentModel:
         return columns
 
     def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
-        """Mean and covariance of the unknowns, averaged over the priors' sizes with their evidence as the weight."""
+        """Mean and covariance of the unknowns, averaged over the priors' sizes with their evidence as the weight.
+
+        The priors act on the coefficients alone: all other unknowns are eliminated once, and follow.
+        """
         p, size = self.size, J.shape[1]
         prior = np.zeros(size)
         prior[self.common] = 1.0
         if not self.varying:  # a prior far sharper than any photo switches them off
             prior[self.common.stop :] = (1e6 / self.floor) ** 2
         normal, pull = J.T @ J + np.diag(prior), J.T @ (J @ unknowns - value)
+        law, rest = slice(0, p), slice(p, size)
+        unit = 1.0 / np.sqrt(np.diag(normal)[rest])  # unknowns of very different size
+        inner = unit[:, None] * np.linalg.inv(unit[:, None] * normal[rest, rest] * unit) * unit
+        back = -inner @ normal[rest, law]
+        schur, force = normal[law, law] + normal[law, rest] @ back, pull[law] + back.T @ pull[rest]
         rough = np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS)
         steep = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
         log_tau, log_slope = (axis.ravel() for axis in np.meshgrid(rough, steep))
-        sized = np.zeros((log_tau.size, size, p))
-        sized[:, :p] = np.exp(-2.0 * log_tau)[:, None, None] * self.basis.roughness
-        sized[:, :p] += np.exp(-2.0 * log_slope)[:, None, None] * np.outer(
-            self.basis.first_slope, self.basis.first_slope
-        )
-        A = np.repeat(normal[None], log_tau.size, axis=0)
-        A[:, :, :p] += sized
-        unit = 1.0 / np.sqrt(np.diagonal(A, axis1=1, axis2=2))  # unknowns of very different size
-        scaled = unit[:, :, None] * A * unit[:, None, :]
-        inverses = unit[:, :, None] * np.linalg.inv(scaled) * unit[:, None, :]
-        means = inverses @ pull
-        log_det = np.linalg.slogdet(scaled)[1] - 2.0 * np.sum(np.log(unit), axis=1)
+        flat = np.outer(self.basis.first_slope, self.basis.first_slope)
+        A = schur + np.exp(-2.0 * log_tau)[:, None, None] * self.basis.roughness
+        A += np.exp(-2.0 * log_slope)[:, None, None] * flat
+        inverses = np.linalg.inv(A)
+        means = inverses @ force
         # Each prior counts as often as it has directions: the roughness leaves straight lines free.
-        evidence = 0.5 * (means @ pull - log_det) - (p - 2) * log_tau - log_slope
+        evidence = 0.5 * (means @ force - np.linalg.slogdet(A)[1]) - (p - 2) * log_tau - log_slope
         weight = np.exp(evidence - evidence.max())
         weight /= weight.sum()
-        mean, response, shrinkage = (np.tensordot(weight, parts, 1) for parts in (means, inverses, inverses @ sized))
+        mean = weight @ means
         spread = means - mean
-        return Posterior(mean, response + (weight[:, None] * spread).T @ spread, response, shrinkage)
+        covariance = np.tensordot(weight, inverses, 1) + (weight[:, None] * spread).T @ spread
+        shrinkage = np.eye(p) - covariance @ schur
+        across = back @ covariance
+        return Posterior(
+            np.concatenate([mean, inner @ pull[rest] + back @ mean]),
+            np.block([[covariance, across.T], [across, inner + across @ back.T]]),
+            np.vstack([shrinkage, back @ shrinkage]),
+        )
 
 
 def bow_terms(data: MomentPoints) -> Array:
@@ -179,14 +186,15 @@ def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -
     p = model.size
     unknowns = np.concatenate([np.zeros(p), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
     for _ in range(iterations):
-        curve, rows = model.rows(unknowns)
+        rows = model.rows(unknowns)[1]
         value = np.concatenate([row.value for row in rows])
         J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
         posterior = model.posterior(unknowns, value, J)
         move = posterior.mean - unknowns
         # A hundredth of a standard deviation is nothing anyone could see.
         if np.all(np.abs(move) <= 0.01 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
-            return Regression(curve, unknowns, posterior, rows, J)
+            mean = posterior.mean  # the last move is made, its rows are not taken again
+            return Regression(compliance_curve(model.basis, mean[:p]), mean, posterior, rows, J)
         # One unit of log c is a factor e in stiffness: longer steps leave the range of the linearisation.
         unknowns = unknowns + move * min(1.0, 1.0 / max(float(np.max(np.abs(move[:p]))), 1e-12))
     return None
@@ -204,7 +212,7 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
     rows = model.rows(found.unknowns)[1]
     J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
     value = np.concatenate([row.value for row in rows])
-    response = model.posterior(found.unknowns, value, J).response
+    response = model.posterior(found.unknowns, value, J).covariance
     value = value - J @ (response @ (J.T @ value))  # nothing where the model is the one that was fitted
     bow = np.vstack([row.whitener @ bow_terms(d) for d, row in zip(model.data, rows, strict=True)])
     photo = np.zeros((value.size, len(rows)))

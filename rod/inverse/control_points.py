@@ -16,13 +16,11 @@ from rod.equilibrium import Equilibrium
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel
 from rod.inverse.knots import place_knots
+from rod.inverse.law_prior import LawPrior, first_prior
 from rod.inverse.options import InverseOptions
 from rod.inverse.smoothness import Averaged, averaged, evidence_of_knots
 
 Array = NDArray[np.float64]
-
-FIRST_TAU = 6.0
-"""Smoothness of the first fits: between straight line and mid-range the law may differ by a factor e^(6/8)."""
 
 FIRST_BLUR = (10.0, 10.0)
 """Of the first fit: with few control points the simulation cannot follow good photos, and must not try."""
@@ -100,14 +98,14 @@ def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), 
     return Fit(model, best, count, result.status > 0)
 
 
-def refit(known: Fit, knots: Array, *, tau: float, evaluations: int, blur: tuple[float, float] | None = None) -> Fit:
-    """The same data with other control points, and another blur if given, started from a fit that is known."""
-    model = replace(known.model, knots=knots, tau=tau, blur=known.model.blur if blur is None else blur)
+def refit(known: Fit, knots: Array, prior: LawPrior, *, blur: tuple[float, float], evaluations: int) -> Fit:
+    """The same data with other control points and another blur, started from a fit that is known."""
+    model = replace(known.model, knots=knots, prior=prior, blur=blur)
     u = known.evaluation.unknowns
     law = known.model.characteristic(u)
     # Outside its knots the old law is a straight line, which must not start a control point below zero.
     ordinates = np.maximum(law.f(knots), 0.05 * law.ordinates.min())
-    start = np.concatenate([np.log(ordinates), u[known.model.knots.size :]])
+    start = np.concatenate([np.log(ordinates / model.unit), u[known.model.knots.size :]])
     return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations)
 
 
@@ -126,7 +124,7 @@ def rich_fit(first: Fit, options: InverseOptions) -> tuple[Fit, int]:
     rich, used = first, 0
     for _ in range(SETTLING):
         knots, blur = place_knots(*rich.visited(), options.knots[1]), blur_needed(rich)
-        found = refit(rich, knots, tau=FIRST_TAU, evaluations=options.evaluations, blur=blur)
+        found = refit(rich, knots, first_prior(knots), blur=blur, evaluations=options.evaluations)
         used += found.evaluations
         if found.evaluation.failure is not None:
             break
@@ -162,19 +160,16 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
     }
     best = max(evidence, key=lambda count: evidence[count])
     count = min(best + options.spare, most)
-    broad = rich.posterior(options.tau)
-    sized = replace(rich, model=replace(rich.model, slope=broad.slope))
-    chosen = refit(sized, place_knots(low, high, count), tau=broad.tau, evaluations=options.evaluations)
+    knots, broad = place_knots(low, high, count), rich.posterior(options.tau).prior
+    prior = replace(broad, places=np.interp(knots, rich.model.knots, broad.places))
+    chosen = refit(rich, knots, prior, blur=rich.model.blur, evaluations=options.evaluations)
     used += chosen.evaluations
     if chosen.evaluation.failure is not None:  # the start with fewer control points has no equilibrium
         chosen = rich
     posterior = chosen.posterior(options.tau)
-    mean = evaluate(
-        replace(chosen.model, tau=posterior.tau, slope=posterior.slope),
-        posterior.mean,
-        starts=chosen.evaluation.equilibria,
-    )
+    model = replace(chosen.model, prior=posterior.prior)
+    mean = evaluate(model, posterior.mean, starts=chosen.evaluation.equilibria)
     used += 1
     if mean.failure is None:
-        chosen = replace(chosen, model=replace(chosen.model, tau=posterior.tau, slope=posterior.slope), evaluation=mean)
+        chosen = replace(chosen, model=model, evaluation=mean)
     return chosen, {n: value - evidence[best] for n, value in evidence.items()}, used

@@ -79,6 +79,8 @@ class Estimate:
         beside these ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` (-1: common to all photos).
     shortfall : (n, n)
         Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
+    law_covariance : (k, k)
+        Of log(tangent) at the knots by the smoothness prior alone, its level held at the first.
     evidence : dict of int -> float
         Log evidence of each number of control points tried, against the best.
     model, evaluation, unknowns, covariance
@@ -107,6 +109,7 @@ class Estimate:
     log_covariance: Array = field(default_factory=_none)
     gains: dict[Source, Array] = field(default_factory=dict)
     shortfall: Array = field(default_factory=_none)
+    law_covariance: Array = field(default_factory=_none)
     evidence: dict[int, float] = field(default_factory=dict)
     model: FitModel | None = None
     evaluation: Evaluation | None = None
@@ -165,8 +168,9 @@ def read_off(
         secant=secant,
         secant_std=std(by_secant),
         log_covariance=by_log @ covariance @ by_log.T,
-        gains=_gains(model, found, by_log @ posterior.response),
+        gains=_gains(model, found, by_log @ covariance),
         shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
+        law_covariance=posterior.law_covariance,
         model=model,
         evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
         unknowns=u,

@@ -1,8 +1,8 @@
 """One evaluation of the inverse problem: simulate all steps, hold them against the data, with exact derivatives.
 
 Residuals, each divided by its standard deviation: distance of the midline from the simulated shape along the normal
-(whitened, `rod.inverse.whitening`), force measured minus simulated, the prior of each nuisance, and the smoothness of z
-(`rod.inverse.knots`).
+(whitened, `rod.inverse.whitening`), force measured minus simulated, the prior of each nuisance, and that of the form of
+the law (`rod.inverse.law_prior`).
 
 The chord of a photo is imposed on the simulation as measured, the errors of the axes taken back:
 ``chord = measured (1 + scale) + left_along - right_along``. Steps without a photo are imposed by the displacement log,
@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from rod.bending_test import simulate
 from rod.equilibrium import Equilibrium, Outcome
 from rod.inverse.fit_model import POSE, FitModel, StepData
-from rod.inverse.knots import first_slope, roughness
 from rod.inverse.photo_residual import Pose, Simulated, distance
 from rod.sensitivity import derivatives
 
@@ -32,7 +31,7 @@ PARAMETERS = ("ordinates", "pre_curvature", "length", "chord")
 """Of the simulated rod, in the order of the derivatives of `Simulated`."""
 
 LOG_RANGE = 60.0
-"""Of log f_EI, N m^2: what lies beyond, 26 orders of magnitude either way, is a fit on its way to nowhere."""
+"""Of log f_EI over its unit: what lies beyond, 26 orders of magnitude either way, is a fit on its way to nowhere."""
 
 CHORD_OF_ARC = 1e-2
 """How sharply the chord of a force-free photo is that of the arc, in standard deviations of an axis: almost exactly."""
@@ -155,7 +154,7 @@ def _chain(model: FitModel, u: Array, chord_by: Array) -> Array:
     """Derivatives of ordinates, K0, length and chord by all unknowns, (k + 3, q)."""
     k = model.knots.size
     chain = np.zeros((k + 3, model.size))
-    chain[np.arange(k), np.arange(k)] = np.exp(u[:k])
+    chain[np.arange(k), np.arange(k)] = model.ordinates(u)
     chain[k, k] = 1.0 / model.length
     chain[k + 1, model.index("length")] = model.nuisances["length"]
     chain[k + 2] = chord_by
@@ -238,14 +237,8 @@ def _whitened(model: FitModel, u: Array, fits: tuple[StepFit, ...], equilibria: 
     prior = np.zeros((len(model.nuisances), model.size))
     prior[:, model.laws :] = np.eye(len(model.nuisances))
     add("prior", u[model.laws :], prior)
-    root = np.vstack([_root(roughness(model.knots)) / model.tau, first_slope(model.knots)[None] / model.slope])
+    root = model.prior.rows()
     smooth = np.zeros((root.shape[0], model.size))
     smooth[:, : model.knots.size] = root
     add("smoothness", root @ u[: model.knots.size], smooth)
     return Evaluation(u, np.concatenate(values), np.vstack(rows), blocks, fits, equilibria)
-
-
-def _root(S: Array) -> Array:
-    """R with R^T R = S, S of rank p - 2."""
-    values, vectors = np.linalg.eigh(S)
-    return np.asarray(np.sqrt(np.maximum(values[2:], 0.0))[:, None] * vectors[:, 2:].T)

@@ -2,7 +2,7 @@
 
 Unknowns u, all of order one:
 
-    z      log f_EI at the knots (tangent reading), so the stiffness is positive
+    z      log of f_EI (tangent reading) at the knots over a unit of the cable's size, so the stiffness is positive
     k0     K0 times the length
     then, in units of their prior standard deviations, the nuisances: the cable's ``length``, the common ``scale`` of
     the photos, the ``zero`` of displacement (only where a step has no photo), and the position of both bearing axes,
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
+from rod.inverse.law_prior import LawPrior, first_prior, places_of
 from rod.inverse.whitening import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
 
@@ -67,8 +68,10 @@ class FitModel:
     length : m
         As told.
     knots : (k,) 1/m
-    tau, slope : float
-        Prior standard deviations of d^2 log f / dt^2, and of d log f / dt at the first knot; see `rod.inverse.knots`.
+    prior : LawPrior
+        Of the form of the law.
+    unit : N m^2
+        Stiffness of z = 0: with one of the cable's own size, the fit of a cable a thousand times stiffer is the same.
     elements : int
         Of the simulated rod.
     zero : m or None
@@ -83,12 +86,12 @@ class FitModel:
     data: tuple[StepData, ...]
     length: float
     knots: Array
-    tau: float
+    prior: LawPrior
+    unit: float
     elements: int
     zero: float | None
     nuisances: dict[str, float]
     blur: tuple[float, float] = (1.0, 1.0)
-    slope: float = 3.0
 
     @property
     def size(self) -> int:
@@ -128,7 +131,15 @@ class FitModel:
 
     def characteristic(self, u: Array) -> Characteristic:
         """f_EI through the control points, tangent reading."""
-        return Characteristic.from_ordinates(self.knots, np.exp(u[: self.knots.size]), reading="tangent")
+        return Characteristic.from_ordinates(self.knots, self.ordinates(u), reading="tangent")
+
+    def ordinates(self, u: Array) -> Array:
+        """f_EI at the knots, (k,) N m^2."""
+        return np.asarray(self.unit * np.exp(u[: self.knots.size]))
+
+    def places(self, u: Array) -> tuple[Array, ...]:
+        """Places of the knots along which the law may be smooth; see `rod.inverse.law_prior`."""
+        return places_of(self.characteristic(u), self.knots, self.pre_curvature(u))
 
     def bending_test(self, u: Array) -> BendingTest:
         """The simulated experiment."""
@@ -137,7 +148,7 @@ class FitModel:
     def start(self, ordinates: Array, pre_curvature: float) -> Array:
         """Unknowns of the given control points (k,) N m^2 and K0, nuisances at their prior means."""
         u = np.zeros(self.size)
-        u[: self.knots.size] = np.log(ordinates)
+        u[: self.knots.size] = np.log(ordinates / self.unit)
         u[self.knots.size] = pre_curvature * self.length
         return u
 
@@ -180,8 +191,16 @@ def zero_of_displacement(data: tuple[StepData, ...]) -> tuple[float, float] | No
     return float(zeros.mean()), float(np.hypot(spread, stds.max()))
 
 
-def fit_model(test: MeasuredTest, data: tuple[StepData, ...], knots: Array, *, tau: float, elements: int) -> FitModel:
-    """Model of the given steps with its nuisances."""
+def fit_model(
+    test: MeasuredTest,
+    data: tuple[StepData, ...],
+    knots: Array,
+    *,
+    elements: int,
+    prior: LawPrior | None = None,
+    unit: float = 1.0,
+) -> FitModel:
+    """Model of the given steps with its nuisances; the prior is that of first fits if none is given."""
     nuisances = {
         "length": max(test.length_std, NO_ERROR * test.length),
         "scale": max(test.scale_std, NO_ERROR),
@@ -194,4 +213,5 @@ def fit_model(test: MeasuredTest, data: tuple[StepData, ...], knots: Array, *, t
     for d in data:
         if d.midline is not None:
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}
-    return FitModel(data, test.length, knots, tau, elements, None if zero is None else zero[0], nuisances)
+    prior = prior or first_prior(knots)
+    return FitModel(data, test.length, knots, prior, unit, elements, None if zero is None else zero[0], nuisances)

@@ -1,15 +1,7 @@
-"""Control points of the characteristic on the visited range: their places, and how rough the law between them may be.
+"""Control points of the characteristic on the visited range: their places, and the natural spline through them.
 
-The unknowns of the inverse problem are ``z = log f_EI`` at the knots, so the stiffness is positive. A smoothness prior,
-density ``exp(-int (d^2 z / dt^2)^2 dt / (2 tau^2))`` with ``t`` from 0 to 1 over the knots, leaves straight lines free;
-it makes the number of knots harmless from above, and its size tau follows from the data. With the natural spline
-through the control points the integral is the quadratic form of `roughness`.
-
-A cable that was never set bends alike to both sides of its rest curvature: f_EI is even about K0 and its slope there
-zero. Not every cable is such, so the slope at the first knot has a prior of its own, ``N(0, sigma^2)``, whose size
-follows from the data too, from "none" to "any".
-
-Units: knots in 1/m; z, t and tau are pure numbers.
+Quadratic forms of the spline through values z at k places are taken with ``t`` from 0 to 1 over these places, whatever
+their unit: what the smoothness prior (`rod.inverse.law_prior`) is made of.
 """
 
 from __future__ import annotations
@@ -38,9 +30,9 @@ def place_knots(low: float, high: float, count: int) -> Array:
     return low + (high - low) * np.concatenate([[0.0], np.cumsum(widths) / widths.sum()])
 
 
-def roughness(knots: Array) -> Array:
-    """Matrix S with ``z @ S @ z = int (d^2 z / dt^2)^2 dt`` of the natural spline through z at the knots, (p, p)."""
-    t = (knots - knots[0]) / (knots[-1] - knots[0])
+def roughness(places: Array) -> Array:
+    """Matrix S with ``z @ S @ z = int (d^2 z / dt^2)^2 dt`` of the natural spline through z at the places, (k, k)."""
+    t = _from_0_to_1(places)
     bend = CubicSpline(t, np.eye(t.size), bc_type="natural")(t, 2)
     # Second derivatives are linear between knots: Simpson integrates their products exactly.
     h = np.diff(t)[:, None, None]
@@ -53,23 +45,11 @@ def roughness(knots: Array) -> Array:
     return np.asarray(np.sum(h / 6.0 * (square(left) + 4.0 * square(middle) + square(right)), axis=0))
 
 
-def first_slope(knots: Array) -> Array:
-    """Row g with ``g @ z = dz/dt`` of the natural spline through z at the first knot, (p,)."""
-    t = (knots - knots[0]) / (knots[-1] - knots[0])
+def first_slope(places: Array) -> Array:
+    """Row g with ``g @ z = dz/dt`` of the natural spline through z at the first place, (k,)."""
+    t = _from_0_to_1(places)
     return np.asarray(CubicSpline(t, np.eye(t.size), bc_type="natural")(0.0, 1))
 
 
-def log_prior_volume(S: Array) -> float:
-    """Half the log determinant of S between fixed end knots: what the prior's density has for tau = 1."""
-    return 0.5 * float(np.linalg.slogdet(S[1:-1, 1:-1])[1]) if S.shape[0] > 2 else 0.0
-
-
-def prior_forms(knots: Array, *, tau: float, slope: float, at: Array) -> Array:
-    """Forms of log f at the curvatures `at` (n,) 1/m, one standard deviation of both priors each, (n, k - 1).
-
-    Their outer products add up to the prior covariance of log f but for its level, of which the priors say nothing.
-    """
-    g = first_slope(knots)
-    values, vectors = np.linalg.eigh(roughness(knots) / tau**2 + np.outer(g, g) / slope**2)
-    spline = CubicSpline(knots, vectors[:, 1:] / np.sqrt(values[1:]), bc_type="natural")
-    return np.asarray(spline(at))
+def _from_0_to_1(places: Array) -> Array:
+    return np.asarray((places - places[0]) / (places[-1] - places[0]))

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.equilibrium import Outcome
-from rod.inverse.control_points import FIRST_BLUR, FIRST_TAU, Fit, chosen_knots, fit
+from rod.inverse.control_points import FIRST_BLUR, Fit, chosen_knots, fit
 from rod.inverse.estimate import Estimate, InverseOutcome, read_off
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel, StepData, fit_model, step_data
@@ -123,7 +123,7 @@ def first_fit(
     seen = np.concatenate([d.step.shape.kappa[d.step.shape.seen] for d in data if d.step.shape is not None])
     low, high = line[1], float(np.quantile(seen, 0.995))
     knots = place_knots(min(low, high - 0.2 * abs(high)), high, 3)
-    model = replace(fit_model(test, data, knots, tau=FIRST_TAU, elements=options.elements), blur=FIRST_BLUR)
+    model = replace(fit_model(test, data, knots, elements=options.elements, unit=line[0]), blur=FIRST_BLUR)
     u = model.start(np.full(3, EI), K0)
     trial = evaluate(model, u)
     if trial.failure is None:

@@ -1,15 +1,14 @@
-"""Linearised posterior of the inverse problem, averaged over the smoothness of the law; evidence of fewer knots.
+"""Linearised posterior of the inverse problem, averaged over the priors of the law's form; evidence of fewer knots.
 
-Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every size of the
-priors of the law's form (`rod.inverse.knots`) follow from one normal matrix. What the data leave open about those sizes
-widens the bands.
+Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every prior of the
+law's form (`rod.inverse.law_prior`: smooth along curvature or moment, how smooth, how steep at rest) follow from one
+normal matrix. What the data leave open about the prior widens the bands.
 The same matrix, projected on splines through fewer control points, gives the evidence of their number without a fit.
 """
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,8 @@ from scipy.interpolate import CubicSpline
 
 from rod.inverse.evaluation import Evaluation
 from rod.inverse.fit_model import FitModel
-from rod.inverse.knots import first_slope, log_prior_volume, roughness
+from rod.inverse.knots import first_slope, roughness
+from rod.inverse.law_prior import LawPrior, log_volume
 
 Array = NDArray[np.float64]
 
@@ -36,23 +36,23 @@ class Averaged:
     ----------
     mean : (q,)
     covariance : (q, q)
-    response : (q, q)
-        Mean inverse normal matrix: a change dr of the whitened data residual moves the mean by -response J^T dr.
+        Also the response: a change dr of the whitened data residual moves the mean by -covariance J^T dr, priors whose
+        weight it changes included, since d log(evidence) of each is -(J (its mean - mean))^T dr up to a common term.
     shrinkage : (q, k)
-        By how much the mean falls short of a law with the values z at its k knots, per unit of z: zero for every
-        straight line whose slope the data show.
-    tau, slope : float
-        Sizes of roughness and of the slope at K0 of largest evidence.
+        By how much the mean falls short of a law with the values z at its k knots, per unit of z.
+    prior : LawPrior
+        Of largest evidence.
+    law_covariance : (k, k)
+        Of z by the priors alone, of the sizes that the data make likely, with the level held at the first knot.
     log_evidence : float
         Of the model, up to a constant of the data.
     """
 
     mean: Array
     covariance: Array
-    response: Array
     shrinkage: Array
-    tau: float
-    slope: float
+    prior: LawPrior
+    law_covariance: Array
     log_evidence: float
 
 
@@ -61,7 +61,7 @@ def averaged(
 ) -> Averaged:
     """Posterior from the rows of an evaluation, the blocks named in `without` left out."""
     J, value = _data_rows(found, without)
-    return _average(value, J, found.unknowns, model.knots, taus)
+    return _average(value, J, found.unknowns, model.places(found.unknowns), taus)
 
 
 def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus: tuple[float, float]) -> float:
@@ -73,7 +73,8 @@ def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus:
     moved = value + J[:, :k] @ (onto @ z - found.unknowns[:k])
     projected = np.hstack([J[:, :k] @ onto, J[:, k:]])
     unknowns = np.concatenate([z, found.unknowns[k:]])
-    return _average(moved, projected, unknowns, knots, taus).log_evidence
+    places = replace(model, knots=knots).places(unknowns)
+    return _average(moved, projected, unknowns, places, taus).log_evidence
 
 
 def _data_rows(found: Evaluation, without: tuple[str, ...]) -> tuple[Array, Array]:
@@ -83,58 +84,85 @@ def _data_rows(found: Evaluation, without: tuple[str, ...]) -> tuple[Array, Arra
     return found.jacobian[keep], found.value[keep]
 
 
-def _average(value: Array, J: Array, unknowns: Array, knots: Array, taus: tuple[float, float]) -> Averaged:
-    """Average over the sizes of roughness and slope; only the laws' unknowns (control points, K0) change with them.
+def _priors(places: tuple[Array, ...], taus: tuple[float, float]) -> tuple[list[LawPrior], Array, Array]:
+    """All priors averaged over, their precisions of z and K0 (n, k + 1, k + 1), and the logs of their norms (n,)."""
+    k = places[0].size
+    sizes = np.meshgrid(_even(taus, TAU_STEPS), _even(SLOPES, SLOPE_STEPS), indexing="ij")
+    tau, slope = (np.exp(axis.ravel()) for axis in sizes)
+    precisions = np.zeros((len(places), tau.size, k + 1, k + 1))
+    norms = np.zeros((len(places), tau.size))
+    for at, precision, norm in zip(places, precisions, norms, strict=True):
+        g = first_slope(at)
+        precision[:, :k, :k] = roughness(at) / tau[:, None, None] ** 2 + np.outer(g, g) / slope[:, None, None] ** 2
+        # Each prior counts as often as it has directions: the roughness leaves straight lines free.
+        norm[:] = log_volume(at) - (k - 2) * np.log(tau) - np.log(slope)
+    priors = [LawPrior(at, float(a), float(b)) for at in places for a, b in zip(tau, slope, strict=True)]
+    return priors, precisions.reshape(-1, k + 1, k + 1), norms.ravel()
+
+
+def _even(bounds: tuple[float, float], count: int) -> Array:
+    """Logarithms of `count` sizes between bounds, a constant factor apart."""
+    return np.linspace(np.log(bounds[0]), np.log(bounds[1]), count)
+
+
+def _average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], taus: tuple[float, float]) -> Averaged:
+    """Average over the priors of the law's form; only the laws' unknowns (control points, K0) change with them.
 
     The other unknowns are eliminated once: with A = [[A_ll, A_ln], [A_nl, A_nn]] every prior acts on the Schur
     complement of A_nn, and mean, covariance and response of all unknowns are linear in what is found there.
     """
-    k, size = knots.size, unknowns.size
-    law, rest = slice(0, k + 1), slice(k + 1, size)
+    k = places[0].size
+    law, rest = slice(0, k + 1), slice(k + 1, unknowns.size)
     A, pull, chi2 = J.T @ J, -J.T @ value, float(value @ value)
     inner = np.asarray(np.linalg.inv(A[rest, rest]), dtype=np.float64)
     back = -inner @ A[rest, law]
     schur, force = A[law, law] + A[law, rest] @ back, pull[law] + back.T @ pull[rest]
     chi2 -= float(pull[rest] @ inner @ pull[rest])
-    _, log_det_rest = np.linalg.slogdet(A[rest, rest])
-    S, g = np.zeros((k + 1, k + 1)), np.zeros(k + 1)
-    S[:k, :k], g[:k] = roughness(knots), first_slope(knots)
-    volume, z = log_prior_volume(S[:k, :k]), unknowns[law]
-    grid = np.linspace(np.log(taus[0]), np.log(taus[1]), TAU_STEPS)
-    slopes = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
-    unit = 1.0 / np.sqrt(np.diag(schur))
-    evidence, moves, inverses, shrunk, sizes = [], [], [], [], []
-    for log_tau, log_slope in itertools.product(grid, slopes):
-        prior = S * np.exp(-2.0 * log_tau) + np.outer(g, g) * np.exp(-2.0 * log_slope)
-        scaled = unit[:, None] * (schur + prior) * unit
-        inverse = unit[:, None] * np.linalg.inv(scaled) * unit
-        toward = force - prior @ z
-        move = inverse @ toward
-        log_det = float(np.linalg.slogdet(scaled)[1]) - 2.0 * float(np.sum(np.log(unit)))
-        misfit = chi2 + float(z @ prior @ z) - float(toward @ move)
-        evidence.append(-0.5 * (misfit + log_det + log_det_rest) + volume - (k - 2) * log_tau - log_slope)
-        moves.append(move)
-        inverses.append(inverse)
-        shrunk.append(inverse @ prior)
-        sizes.append((float(np.exp(log_tau)), float(np.exp(log_slope))))
-    top = max(evidence)
-    share = np.exp(np.array(evidence) - top)
-    log_evidence = float(top + np.log(share.mean()))
+    log_det_rest = float(np.linalg.slogdet(A[rest, rest])[1])
+
+    priors, precisions, norms = _priors(places, taus)
+    z = unknowns[law]
+    unit = 1.0 / np.sqrt(np.diag(schur))  # unknowns of very different size
+    scaled = unit[:, None] * (schur + precisions) * unit
+    inverses = unit[:, None] * np.linalg.inv(scaled) * unit
+    toward = force - precisions @ z
+    moves = np.einsum("nij,nj->ni", inverses, toward)
+    log_det = np.linalg.slogdet(scaled)[1] - 2.0 * float(np.sum(np.log(unit)))
+    misfit = chi2 + (precisions @ z) @ z - np.sum(toward * moves, axis=1)
+    evidence = norms - 0.5 * (misfit + log_det + log_det_rest)
+
+    top = float(evidence.max())
+    share = np.exp(evidence - top)
+    log_evidence = top + float(np.log(share.mean()))
     share /= share.sum()
-    move, response, shrinkage = (np.tensordot(share, parts, 1) for parts in (moves, inverses, shrunk))
-    spread = np.array(moves) - move
-    covariance = response + (share[:, None] * spread).T @ spread
+    move = share @ moves
+    spread = moves - move
+    covariance = np.tensordot(share, inverses, 1) + (share[:, None] * spread).T @ spread
+    shrinkage = np.eye(k + 1) - covariance @ schur
     whole = np.concatenate([move, inner @ pull[rest] + back @ move])
-    tau, slope = sizes[int(np.argmax(evidence))]
     return Averaged(
         unknowns + whole,
         _extended(covariance, inner, back),
-        _extended(response, inner, back),
         np.vstack([shrinkage, back @ shrinkage])[:, :k],
-        tau,
-        slope,
+        priors[int(np.argmax(evidence))],
+        _typical_covariance(priors, share, places),
         log_evidence,
     )
+
+
+def _typical_covariance(priors: list[LawPrior], share: Array, places: tuple[Array, ...]) -> Array:
+    """Prior covariance of z for the geometric means of tau and slope along each of the places.
+
+    A mean of the covariances themselves would be that of the widest priors, however unlikely the data make them.
+    """
+    k = places[0].size
+    covariance = np.zeros((k, k))
+    logs = np.log([(prior.tau, prior.slope) for prior in priors]).reshape(len(places), -1, 2)
+    for at, weights, sizes in zip(places, share.reshape(len(places), -1), logs, strict=True):
+        tau, slope = np.exp(weights @ sizes / weights.sum())
+        rows = LawPrior(at, float(tau), float(slope)).rows()[:, 1:]
+        covariance[1:, 1:] += weights.sum() * np.linalg.inv(rows.T @ rows)
+    return covariance
 
 
 def _extended(law: Array, inner: Array, back: Array) -> Array:

@@ -1,0 +1,82 @@
+"""What is known of the form of a law before its data: log f_EI is smooth, and its slope at rest is moderate.
+
+The unknowns of the inverse problem are ``z = log f_EI`` at the knots, so the stiffness is positive. The smoothness
+prior, density ``exp(-int (d^2 z / dt^2)^2 dt / (2 tau^2))``, leaves straight lines free; it makes the number of knots
+harmless from above. A cable that was never set bends alike to both sides of its rest curvature: f_EI is even about K0
+and its slope there zero. Not every cable is such, so the slope at the first knot has a prior of its own,
+``N(0, slope^2)``.
+
+Along what a law is smooth depends on the law. One that softens as layers slip does so within a small part of the
+curvature but over a large part of the bending moment, and is smooth along the moment; one that stiffens is smooth along
+the curvature. So ``t`` from 0 to 1 runs with the one or with the other (`places_of`), and which of them, tau and slope
+follow from the data: they are averaged over in `rod.inverse.smoothness`.
+
+Units: knots in 1/m; z, t and the sizes are pure numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rod.characteristic import Characteristic
+from rod.inverse.knots import first_slope, roughness
+
+Array = NDArray[np.float64]
+
+LEAST_RISE = 1e-3
+"""Of the moment between neighbouring knots, against an even rise: less is no order that a spline could be laid on."""
+
+
+FIRST_SIZES = (6.0, 3.0)
+"""tau and slope of fits before the data are known: between a straight line and mid-range the law may differ by a factor
+e^(6/8), and over the range of its first slope by e^3."""
+
+
+@dataclass(frozen=True)
+class LawPrior:
+    """Prior of one form.
+
+    Attributes
+    ----------
+    places : (k,)
+        Of the knots: curvatures or moments, in any unit.
+    tau, slope : float
+        Prior standard deviations of d^2 z / dt^2, and of dz / dt at the first knot.
+    """
+
+    places: Array
+    tau: float
+    slope: float
+
+    def rows(self) -> Array:
+        """Matrix R with ``(R @ z)^2 / 2`` minus the log density of z, (k - 1, k): all but the level has a prior."""
+        g = first_slope(self.places)
+        values, vectors = np.linalg.eigh(roughness(self.places) / self.tau**2 + np.outer(g, g) / self.slope**2)
+        return np.asarray(np.sqrt(values[1:])[:, None] * vectors[:, 1:].T)
+
+
+def first_prior(knots: Array) -> LawPrior:
+    """Wide, along the curvature: for fits before which there is no law whose moments could be taken."""
+    return LawPrior(knots, *FIRST_SIZES)
+
+
+def places_of(law: Characteristic, knots: Array, pre_curvature: float) -> tuple[Array, ...]:
+    """Places of the knots (k,) on the curvature, 1/m, and on the moment of the law, N m, where that grows with it."""
+    moments = law.moment(knots, pre_curvature)
+    rises = np.diff(moments)
+    return (knots, moments) if rises.min() > LEAST_RISE * np.ptp(moments) / rises.size else (knots,)
+
+
+def log_volume(places: Array) -> float:
+    """Half the log determinant of the roughness between fixed end knots: of the density's norm for sizes of one."""
+    return 0.5 * float(np.linalg.slogdet(roughness(places)[1:-1, 1:-1])[1])
+
+
+def forms(knots: Array, covariance: Array, at: Array) -> Array:
+    """Forms of log f at the curvatures `at` (n,) 1/m, one standard deviation each, from the covariance of z, (n, k)."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(CubicSpline(knots, vectors * np.sqrt(np.maximum(values, 0.0)), bc_type="natural")(at))
