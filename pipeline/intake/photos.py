@@ -178,7 +178,7 @@ def _present_name(
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
         return None, [doubtful("photo/outside", f"{place}: photo {written!r} leads out of the folder and was not read")]
-    if _exists(path):
+    if _exists(path) or name in present:  # what is there but no ordinary file is refused with its reason later
         return name, []
     alike = [other for other in present if _loose(other) == _loose(name)]
     alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]

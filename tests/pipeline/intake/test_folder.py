@@ -193,7 +193,11 @@ def test_pipes_are_not_opened(specimen_folder):
     folder = specimen_folder()
     (folder.path / "images/step_1.png").unlink()
     os.mkfifo(folder.path / "images/step_1.png")
-    assert len(folder.read().images) == 2  # and does not wait for a writer
+    specimen = folder.read()
+    assert len(specimen.images) == 2  # and does not wait for a writer
+    codes = {finding.code for finding in specimen.findings}
+    assert "photo/not-a-file" in codes
+    assert not any("'images/step_1.png' was taken to be" in finding.message for finding in specimen.findings)
     (folder.path / "force.csv").unlink()
     os.mkfifo(folder.path / "force.csv")
     with pytest.raises(InputError) as refused:
