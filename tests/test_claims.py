@@ -1,6 +1,7 @@
 """What the README claims of the whole road, on specimens of another simulator and renderer: from folder to result.
 
-The tolerances are the product's claims, not what happens to come out: 0.3 px, 3 % and 6 % rms, 0.1 1/m, 1 % of force.
+The tolerances are the product's claims, not what happens to come out: midline 0.3 px, f_EI 1 % rms by either way, K0
+0.01 1/m, forces 1 %; where the README prints 0.3 % and 0.001 1/m, three times that is left to other noise.
 """
 
 import json
@@ -56,8 +57,12 @@ def test_centerlines_follow_the_true_path(benches, truths, name):
 
 def test_both_ways_find_the_characteristic(benches, truths):
     result, truth = benches["a"], truths["a"]
-    assert rms_relative(result.inverse.curve, truth) < 0.03
-    assert rms_relative(result.balance.curve, truth) < 0.06
+    for curve in (result.inverse.curve, result.balance.curve):
+        assert rms_relative(curve, truth) < 0.01
+        kappa, tangent, std = (np.array(v) for v in (curve.kappa_per_m, curve.tangent_Nm2, curve.tangent_std_Nm2))
+        covered = np.abs(tangent - stiffness(truth, kappa)) < 1.96 * std
+        # one curve counts for about three independent points: 0.7 is missed by chance once in a hundred curves
+        assert np.mean(covered[curve.supported]) > 0.7
     assert result.agreement.compatible
     low, high = result.inverse.supported_per_m
     reached = max(max(step["kappa"]) for step in truth["steps"])
@@ -66,8 +71,8 @@ def test_both_ways_find_the_characteristic(benches, truths):
 
 def test_pre_curvature_and_forces(benches, truths):
     result, truth = benches["a"], truths["a"]
-    for value, _ in result.agreement.pre_curvature.values():
-        assert value == pytest.approx(truth["K0"], abs=0.1)
+    for value, std in result.agreement.pre_curvature.values():
+        assert abs(value - truth["K0"]) < max(0.01, 4.0 * std)
     largest = max(step["F"] for step in truth["steps"])
     for step, true in zip(result.steps, truth["steps"], strict=True):
         assert step.force_fit_N == pytest.approx(true["F"], abs=0.01 * largest)
