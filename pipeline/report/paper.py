@@ -19,9 +19,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.report.canvas import Area, Drawing, drawing
-from pipeline.report.document import TEMPLATES, environment, palette_css
+from pipeline.report.document import asset, environment, palette_css
 from pipeline.report.files import write_atomic
 from pipeline.report.paper_figures import draw_difference, draw_evolution, draw_iterates, draw_shapes, draw_straight
+from pipeline.rounding import fixed
 from rod.bending_test import TABLE_1, TABLE_1_ORDINATES
 from rod.characteristic import Reading
 from rod.paper import (
@@ -86,8 +87,7 @@ def write_paper(folder: Path) -> Paper:
         write_atomic(folder / f"{figure.name}.svg", standalone(figure))
     write_atomic(folder / "paper.json", json.dumps(numbers(paper), indent=1) + "\n")
     page = environment().get_template("paper.html")
-    css = (TEMPLATES / "page.css").read_text(encoding="utf-8")
-    text = page.render(palette=palette_css(), css=css, statements=statements(paper), figures=figures)
+    text = page.render(palette=palette_css(), css=asset("page.css"), statements=statements(paper), figures=figures)
     write_atomic(folder / "paper.html", text)
     return paper
 
@@ -155,7 +155,7 @@ def statements(paper: Paper) -> list[Statement]:
         Statement(
             "Sec. 4, Fig. 6",
             "with K0 = 0 the fitted characteristic becomes negative at low curvature",
-            f"f_EI(0) = {low:.2f} mN m²: a wrong model is paid for where nothing holds the curve",
+            f"f_EI(0) = {fixed(low, 2)} mN m²: a wrong model is paid for where nothing holds the curve",
         ),
         Statement(
             "Sec. 5, Fig. 7",

@@ -29,6 +29,7 @@ def test_numbers_have_the_contracts_names(folder):
 def test_figures_stand_alone_and_on_the_page(folder):
     page = (folder / "paper.html").read_text(encoding="utf-8")
     assert "http://" not in page.replace("http://www.w3.org/", "") and "https://" not in page
+    assert "&#" not in page.partition("<style>")[2].partition("</style>")[0]  # escaped quotes end a style sheet
     figures = sorted(path.stem for path in folder.glob("*.svg"))
     assert figures == ["fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "fig7d"]
     for name in figures:
