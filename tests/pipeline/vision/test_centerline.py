@@ -28,8 +28,6 @@ from tests.pipeline.vision.bow_scene import (
     traced_errors,
 )
 
-GLOSSY = {"gloss": 0.4}
-
 
 def even(rng, **options):
     return bow_scene(rng, **options)
@@ -40,15 +38,15 @@ def lit(rng, **options):
     return bow_scene(rng, **({"light": directional(rng), "sheath": Sheath(gloss=0.4, text=text)} | options))
 
 
-# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. At 5 % noise the target is that of all
-# even light, 0.15 and 1.5, and is missed: 0.185 and 1.52 on these scenes, 0.165 and 1.24 on 16 others. The sections'
-# scatter is 1.27 times the limit for the place alone, which would give about 0.135: the grey values of sheath and
-# ground, free on each section, cost the rest. To hold them to their neighbours gained at 5 px/mm what it lost in side
-# light.
+# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. At 5 % noise 0.15 inside is missed:
+# 0.164 on these scenes, 0.158 on 16 others. It is what the pixels hold: edges at the limit of Cramer and Rao, one row
+# sqrt(2 sqrt(pi) w) n/A, give this curve 0.150 over 29 such bows if the grey values of sheath and ground were known
+# exactly, and 0.175 if they are found with the place. A stiffer penalty (order 4) gained a tenth inside and lost a
+# fifth at the ends; to hold the grey values to their neighbours gained 4 % and lost 17 % in side light.
 CASES = {
     "even": (even, {}, {}, (0.02, 0.15, 1.5)),
     "even, noise 0.5 %": (even, {"noise": 0.005}, {}, (0.02, 0.15, 1.5)),
-    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.20, 1.6)),
+    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.175, 1.5)),
     "directional": (lit, {}, {}, (0.25, 0.35, 2.5)),
     "directional, noise 5 %": (lit, {"noise": 0.05}, {}, (0.25, 0.35, 2.5)),
     "directional, JPEG 75": (lit, {}, {"quality": 75}, (0.25, 0.35, 2.5)),
