@@ -5,9 +5,10 @@ Parts: `measured` (pixels and log to `rod.measurement.MeasuredTest`), `ways` (bo
 goes into ``result.json``).
 """
 
+from pipeline.identify.identification import Identification
 from pipeline.identify.measured import measured_test
 from pipeline.identify.parts import IdentificationParts, identification_parts
-from pipeline.identify.ways import Identification, identify, identify_test, identify_without
+from pipeline.identify.ways import identify, identify_test, identify_without
 
 __all__ = [
     "Identification",

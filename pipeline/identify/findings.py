@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtrc
 
+from pipeline.identify.identification import Identification
 from pipeline.records import Finding, Level
 from pipeline.rounding import p_value
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
-
-if TYPE_CHECKING:
-    from pipeline.identify.ways import Identification
 
 
 def identification_findings(found: Identification, settings: IdentifySettings) -> tuple[Finding, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.identify.findings import pre_curvature_sources
-from pipeline.identify.ways import Identification
+from pipeline.identify.identification import Identification
 from pipeline.records import Array, Finding
 from pipeline.result import (
     AgreementPart,
@@ -19,6 +19,7 @@ from pipeline.result import (
     PointwisePart,
     StepPart,
 )
+from pipeline.rounding import plain
 from rod.balance import BalanceGraph
 from rod.balance.moment_points import pointwise_graph
 from rod.inverse import Estimate, InverseOutcome
@@ -91,7 +92,6 @@ def inverse_part(found: Identification) -> InversePart:
             outcome=way.outcome.name.lower(), advice=way.outcome.value, converged=False, iterations=way.iterations
         )
     stds = np.sqrt(np.diag(way.covariance))
-    tried = ", ".join(f"{n}: {value:.1f}" for n, value in way.evidence.items())
     return InversePart(
         outcome=way.outcome.name.lower(),
         advice=way.outcome.value,
@@ -104,7 +104,7 @@ def inverse_part(found: Identification) -> InversePart:
             KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))
             for k, f, std in zip(law.knots, law.ordinates, way.ordinates_std, strict=True)
         ],
-        knots_chosen_by=f"evidence (log, against the best) {tried}; spare ones added to hold laws that are not splines",
+        knots_chosen_by=_choice(way.evidence, len(law.knots)),
         curve=curve(way),
         misfit=misfit_part(way),
         nuisance={
@@ -112,6 +112,16 @@ def inverse_part(found: Identification) -> InversePart:
             for name, std in model.nuisances.items()
         },
         branches={name: part for name, branch in found.branches.items() if (part := curve(branch)) is not None},
+    )
+
+
+def _choice(evidence: dict[int, float], used: int) -> str:
+    """How the number of control points was chosen, in words."""
+    best = max(evidence, key=lambda count: evidence[count])
+    others = ", ".join(f"{n}: {plain(value, 2)}" for n, value in evidence.items() if n != best)
+    return (
+        f"{used} control points: {best} have the largest evidence, the others hold laws that are no splines; "
+        f"log evidence of other numbers against it: {others or 'none tried'}"
     )
 
 

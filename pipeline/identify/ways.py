@@ -7,55 +7,24 @@ for all steps together, and a test says whether the two show the same characteri
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
-from pipeline.identify.agreement import Agreement, Characterised, compare, rest_curvature
+from pipeline.identify.agreement import Characterised, compare, rest_curvature
 from pipeline.identify.contrast import chi_square, parts_difference
 from pipeline.identify.findings import identification_findings
+from pipeline.identify.identification import Identification
 from pipeline.identify.measured import measured_test
-from pipeline.records import Finding, Specimen, Traces
+from pipeline.records import Specimen, Traces
 from pipeline.settings.identify import IdentifySettings
-from rod.balance import BalanceGraph, BalanceOptions, balance
+from rod.balance import BalanceOptions, balance
 from rod.inverse import Estimate, InverseOptions, estimate
 from rod.measurement import MeasuredTest
 
 LEAST_PHOTOS = 2
 """Photos of loaded steps that a branch needs to be fitted on its own."""
-
-
-@dataclass(frozen=True)
-class Identification:
-    """What both ways make of one test.
-
-    Attributes
-    ----------
-    test : MeasuredTest
-    inverse : Estimate
-        All steps together.
-    balance : BalanceGraph
-    branches : dict of branch -> Estimate
-        ``loading`` (with the force-free photo) and ``unloading`` apart, where the test has both.
-    branches_p : float or None
-        Probability of a difference between the branches as large as this if both had one characteristic.
-    rest : (K0, std) or None
-        Mean curvature of the force-free photo, 1/m.
-    agreement : Agreement or None
-    images : dict of step -> name of its photo
-    findings : tuple of Finding
-    """
-
-    test: MeasuredTest
-    inverse: Estimate
-    balance: BalanceGraph
-    branches: dict[str, Estimate] = field(default_factory=dict)
-    branches_p: float | None = None
-    rest: tuple[float, float] | None = None
-    agreement: Agreement | None = None
-    images: dict[int, str] = field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
 
 
 def identify(specimen: Specimen, traces: Traces, settings: IdentifySettings) -> Identification:

@@ -124,7 +124,6 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
                 slope.x,
                 slope.y,
                 slope.theta,
-                slope.kappa,
                 slope.force,
             )
     fits = tuple(_step_fit(model, u, d, shapes[k], imposed[k]) for k, d in enumerate(model.data))
@@ -188,7 +187,6 @@ def _arc(model: FitModel, u: Array) -> Simulated:
         by(x_K0, stretch * np.cos(theta) - 0.5 * K0 * s * np.sin(a) * sinc),
         by(y_K0, stretch * np.sin(theta) + 0.5 * K0 * s * np.cos(a) * sinc),
         by(0.5 * length - s, K0 * (0.5 - stretch)),
-        by(np.ones_like(s), none),
         np.zeros(model.knots.size + 3),
     )
 

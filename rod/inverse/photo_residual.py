@@ -36,7 +36,6 @@ class Simulated:
         At the vertices.
     force : N
     x_by, y_by, theta_by : (n, q) m, m, rad
-    kappa_by : (n, q) 1/m
     force_by : (q,) N
     """
 
@@ -49,7 +48,6 @@ class Simulated:
     x_by: Array
     y_by: Array
     theta_by: Array
-    kappa_by: Array
     force_by: Array
 
 

@@ -11,7 +11,7 @@ from rod.inverse.estimate import invisible_combinations
 from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
-from tests.rod.virtual_photo import Camera, bending_test, moved_axes, stretched
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, random_cable, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -57,6 +57,21 @@ def test_evidence_asks_for_more_control_points_where_the_law_bends():
 def test_far_starts_find_the_same_optimum(EI0, factor, shift):
     law = replace(LAW, EI0=EI0, EI1=0.3 * EI0)
     test = measured(law=law)
+    far = estimate(test, start=(factor * EI0, law.K0 + shift), options=QUICK)
+    near = estimate(test, options=QUICK)
+    assert far.pre_curvature == pytest.approx(near.pre_curvature, abs=0.05 * near.pre_curvature_std)
+    assert np.all(np.abs(far.tangent - near.tangent) < 0.05 * near.tangent_std)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_far_starts_find_the_same_optimum_of_any_cable(number):
+    """Other laws, lengths, steps and K0, with and without the force-free photo: four decades of stiffness."""
+    rng = np.random.default_rng([5, number])
+    law, length, chords = random_cable(rng)
+    EI0 = 10.0 ** (-4.0 + number)
+    law = replace(law, EI0=EI0, EI1=EI0 * law.EI1 / law.EI0)
+    test = bending_test(law, length, chords[:: len(chords) // 3], rng, mounted=number % 2 == 0)[0]
+    factor, shift = 10.0 ** (1 - 2 * (number % 2)), 3.0 - 6.0 * (number // 2)
     far = estimate(test, start=(factor * EI0, law.K0 + shift), options=QUICK)
     near = estimate(test, options=QUICK)
     assert far.pre_curvature == pytest.approx(near.pre_curvature, abs=0.05 * near.pre_curvature_std)
