@@ -21,7 +21,10 @@ class IntakeSettings(BaseModel):
         50_000_000, gt=0, description="bytes; a day at 10 samples a second is 40 MB, read in a few seconds"
     )
     photo_max_bytes: int = Field(
-        500_000_000, gt=0, description="bytes; an uncompressed 16 bit colour photo of 80 Mpx is 480 MB"
+        800_000_000,
+        gt=0,
+        description="bytes; 120 Mpx of 16-bit colour are 720 MB; as vision.photo.max_file_megabytes, for photos "
+        "measured without a folder",
     )
     photos_max: int = Field(10_000, gt=0, description="photos in one folder; a test has tens of steps")
     search_depth: int = Field(12, gt=0, description="folders below the given one; deeper trees are linked or a mistake")
