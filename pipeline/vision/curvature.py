@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -88,8 +87,7 @@ def make_frame(start: float, end: float, *, intervals: int, order: int, breaks: 
     spline = BSpline(knots, np.eye(count), DEGREE)
     edges = np.unique(knots)
     each = max(2, round(_CELLS / intervals)) + 1
-    cells = [np.linspace(a, b, each) for a, b in pairwise(edges)]
-    nodes = np.unique(np.concatenate(cells))
+    nodes = np.interp(np.arange((each - 1) * (len(edges) - 1) + 1) / (each - 1), np.arange(len(edges)), edges)
     grid = np.empty(2 * len(nodes) - 1)
     grid[::2], grid[1::2] = nodes, 0.5 * (nodes[1:] + nodes[:-1])
     anchor = 2 * (len(nodes) // 2)
@@ -365,7 +363,7 @@ def _bow_roughness(curve: PlaneCurve, order: int) -> float:
     """
     knots = curve.frame.knots
     length = float(knots[-1] - knots[0])
-    amplitude2 = float(np.var(curve.curvature(np.linspace(knots[0], knots[-1], 65)))) / (0.5 - 4.0 / np.pi**2)
+    amplitude2 = float(np.var(curve.frame.values @ curve.coefficients)) / (0.5 - 4.0 / np.pi**2)
     return amplitude2 * 0.5 * length * float((np.pi / length) ** (2 * order))
 
 

@@ -53,16 +53,13 @@ class Sections:
         Along the path the sections were laid on.
     first, second : (k, 2)
         Edge points at negative and positive t.
-    middle : (k, 2)
     std : (k,)
         Of the midpoint along the normal, from the scatter of the pixels.
-    width, width_smooth : (k,)
-        Raw, and running median.
+    width : (k,)
+        As measured, without smoothing.
     balance : (k,)
         ``2 sqrt(v1 v2) / (v1 + v2)``: 1 where both edges count alike, 0 where only one counts. So much of half the
         width's error is the midpoint's.
-    off_path : (k,)
-        Offset of the midpoint from the path.
     systematic_std : px
     share : float
         Of the sections asked for, those that were measured.
@@ -76,12 +73,9 @@ class Sections:
     s: Array
     first: Array
     second: Array
-    middle: Array
     std: Array
     width: Array
-    width_smooth: Array
     balance: Array
-    off_path: Array
     systematic_std: float
     share: float
     profiles: Profiles
@@ -146,12 +140,9 @@ def measure_sections(
         s=s,
         first=where - (half_width + place[:, :1] - aside) * across,
         second=where + (half_width + place[:, 1:] + aside) * across,
-        middle=where + off[:, None] * across,
         std=np.hypot(*(trust * std.T)),
         width=width,
-        width_smooth=smooth_width,
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
-        off_path=off,
         systematic_std=_systematic(profiles, s, smooth_width, std, doubt, diameter),
         share=float(np.mean(keep)),
         profiles=profiles,
