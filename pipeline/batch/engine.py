@@ -25,7 +25,8 @@ from pipeline.result import FindingPart
 from pipeline.settings.batch import BatchSettings
 
 # One specimen at a time in a worker, the next one waits in the scheduler and not in a process that may die with it;
-# spilling and pausing are for data in workers, and there is none.
+# spilling and pausing are for data in workers, and there is none. A worker that died is started again by its nanny,
+# however long that takes on a busy machine: dask gives it up after 15 s, and a batch without workers waits forever.
 LOCAL = {
     "distributed.nanny.pre-spawn-environ": ONE_THREAD,
     "distributed.scheduler.worker-saturation": 1.0,
@@ -36,6 +37,7 @@ LOCAL = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.preload": ["pipeline.batch.worker"],
     "distributed.admin.low-level-log-length": 0,
+    "distributed.deploy.lost-worker-timeout": "7 days",
 }
 CONNECT_S = 5.0  # to a scheduler given by its address; those that answer do so within a second
 
