@@ -77,7 +77,15 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
     # The scale of the photos may be off by its own standard deviation; its part grows with the way.
     allowed = settings.chord_sigma * np.hypot(std[worst], test.scale_std * np.ptp(moved))
     if abs(off[worst]) > allowed:
-        slope = -np.polyfit(moved, chord, 1)[0] if np.ptp(moved) > 0.0 else np.nan
+        if np.ptp(moved) == 0.0:
+            yield Finding(
+                "identify/chord-displacement",
+                "warning",
+                f"the chords on the photos differ by {1e3 * np.ptp(chord):.3f} mm, but the log has one displacement "
+                "for all steps",
+            )
+            return
+        slope = -np.polyfit(moved, chord, 1)[0]
         yield Finding(
             "identify/chord-displacement",
             "warning",

@@ -123,6 +123,12 @@ def test_chord_against_displacement(measured, settings):
     assert "97.9%" in finding.message or "98.0%" in finding.message  # 1 / 1.02 but for the photos' noise
 
 
+def test_one_displacement_for_all_steps_is_told(measured, settings):
+    still = with_steps(measured, lambda s: replace(s, displacement=0.01))
+    (finding,) = chord_findings(still, settings)
+    assert finding.message.endswith("but the log has one displacement for all steps")
+
+
 def test_wrong_zero_of_displacement_leaves_the_result_alone(measured, settings, found):
     moved = with_steps(measured, lambda s: replace(s, displacement=s.displacement + 1e-3))
     assert np.allclose(identify_test(moved, settings).inverse.tangent, found.inverse.tangent, rtol=1e-9)
