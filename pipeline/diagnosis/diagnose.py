@@ -53,6 +53,8 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     if not any(step.shape is not None and step.branch != "mounted" for step in test.steps):
         return _nothing_to_compare("no photo under load was measured"), ()
+    if not any(step.force for step in test.steps):
+        return _nothing_to_compare("all forces in the log are zero"), ()
     faults = faults_of_input(test, settings)
     bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
     if isinstance(bench, str):

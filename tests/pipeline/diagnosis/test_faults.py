@@ -99,3 +99,9 @@ def test_without_photos_nothing_can_be_held_against_the_simulation(honest):
     steps = tuple(replace(step, shape=None, chord=None) for step in honest.steps)
     part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
     assert part.verdict == "underpowered" and findings == ()
+
+
+def test_without_forces_nothing_can_be_held_against_the_simulation(honest):
+    steps = tuple(replace(step, force=0.0, hold_forces=0.0 * step.hold_forces) for step in honest.steps)
+    part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
+    assert part.verdict == "underpowered" and "all forces in the log are zero" in part.headline and findings == ()
