@@ -156,7 +156,7 @@ def _explanations(bench: Workbench, causes: list[int], settings: DiagnosisSettin
 
 def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:
     """The accepted explanation with f_EI identified again: more control points, and a range that fits its shapes."""
-    finer = with_finer_law(bench.observation, accepted.fitted, bench.suspicion.causes, settings)
+    finer = with_finer_law(bench.observation, accepted.fitted, settings)
     return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 

@@ -19,7 +19,7 @@ from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
-from pipeline.diagnosis.workbench import Workbench, with_one_more_knot
+from pipeline.diagnosis.workbench import Workbench, with_more_knots
 from pipeline.result import BlindSpot, CausePart, CauseRow, Curve, DiagnosisPart, GainPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -106,7 +106,7 @@ def _extended(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSetti
     if conclusion.accepted is None:
         return None
     fitted = conclusion.accepted.fitted
-    finer = with_one_more_knot(bench.observation, fitted, settings)
+    finer = with_more_knots(bench.observation, fitted, settings)
     rivals = [*_rivals(conclusion), *([] if finer is None else [(finer, 1.0)])]
     return curve(fitted, points=settings.curve_points, rivals=rivals)
 

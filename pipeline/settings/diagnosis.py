@@ -122,6 +122,9 @@ class DiagnosisSettings(BaseModel):
     # base model
     knots: int = Field(5, description="control points of the base characteristic where no identification chose them")
     knots_most: int = Field(7, description="control points of the base characteristic at most; more would eat causes")
+    knots_extended: int = Field(
+        9, description="control points of the extended model at most; what is named is in it and can be eaten no more"
+    )
     knot_gain: float = Field(
         16.0,
         description="chi-square that another control point must remove, beyond what any cause removes, to be taken",
