@@ -235,18 +235,39 @@ class BearingSettings(StageSettings):
     light_reach_px: float = Field(
         4.0, ge=2, description="px; half range about an edge in which the light's slopes are fitted with it"
     )
+    bevel_spread_share: float = Field(
+        0.22,
+        ge=0,
+        description="of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18"
+        " rendered covers",
+    )
     min_rim: float = Field(
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"
     )
     sure_rim: float = Field(0.7, gt=0, lt=1, description="share of the rim; with so much seen no other centre is tried")
     dot_radii: tuple[float, ...] = Field(
-        (0.12, 0.16, 0.21, 0.28, 0.37),
-        description="radii of a cover; sizes of a dot or screw on its axis that are tried",
+        (0.12, 0.16, 0.21, 0.28, 0.37, 0.5, 0.9),
+        description="radii of a cover; sizes of a dot, screw or bevel on its axis that are tried",
     )
     cover_radii_widths: tuple[float, float] = Field(
         (0.9, 3.2),
         description="widths of the cable; range of radii searched where no size is given: covers of 2 to 6 diameters,"
         " and the mask may be a tenth wider or narrower than the cable",
+    )
+    astray_radii: float = Field(
+        0.16, gt=0, lt=0.5, description="radii; how far a rim that is not sure may lie off the centre: half a bevel"
+    )
+    sure_center_radii: float = Field(
+        0.004,
+        gt=0,
+        description="radii; a centre with a wider std is not sure: shadow or bevel took part of the rim",
+    )
+    ring_range: tuple[float, float] = Field(
+        (0.1, 0.96), description="radii; where dots, grooves and bevels lie: below is a punch mark, above the rim"
+    )
+    rings: int = Field(2, ge=0, description="rings of a cover that are fitted at most: the strongest tell the most")
+    same_axis_radii: float = Field(
+        0.03, gt=0, description="radii; a ring farther off was not turned on the axis: a sticker, a hole beside it"
     )
     same_radius: float = Field(
         0.04, gt=0, lt=1, description="relative; covers of one rig are turned alike, light and blur move a rim less"

@@ -21,6 +21,7 @@ from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rim import Circle, Radius, fit_circle
+from pipeline.vision.rings import with_rings
 
 
 def find_cover(
@@ -57,14 +58,14 @@ def find_cover(
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             found = _best_circle(photo, window, radius, on_cable, prior, softness, settings)
             if found is not None and found.rim >= least:
-                return found
+                return with_rings(photo, found, radius, settings)
     return _by_dot(photo, window, radius.px, along, aside, settings)
 
 
 def _by_dot(
     photo: Photo, window: _Window, radius_px: float, along: Array, aside: Array, settings: BearingSettings
 ) -> Circle | None:
-    """Cover of the ground's own look: the cable ends at its rim, and a dot or screw marks the axis."""
+    """Cover of the ground's own look: the cable ends at its rim, and a dot, screw or bevel marks the axis."""
     spread = settings.aside_std_radii * radius_px
     prior = np.exp(-0.5 * (aside / spread) ** 2 - 0.5 * ((along - radius_px) / spread) ** 2)
     nowhere = np.zeros(prior.shape, bool)

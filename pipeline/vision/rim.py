@@ -54,14 +54,21 @@ class Radius:
 
 
 def fit_circle(
-    photo: Photo, center: Array, expected: Radius, settings: BearingSettings, *, softness: float = 1.0
+    photo: Photo,
+    center: Array,
+    expected: Radius,
+    settings: BearingSettings,
+    *,
+    softness: float = 1.0,
+    on_cover: bool = False,
 ) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
     Strategy: the shift with most of one circle on edges; then radial profiles from there, twice; the edge is the
     centroid of the slope about its steepest place, at last with the slopes of light beside it; Gauss-Newton on the
     radial residuals with Tukey's biweight. The slope is taken over ``softness`` px: sought over its own blur, an edge
-    stands out of noise the most.
+    stands out of noise the most. A ring ``on_cover`` is not sought, for its place is known to a pixel; no shadow lies
+    beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
     """
     radius = expected.px
     count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
@@ -69,12 +76,13 @@ def fit_circle(
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, settings.search_radii * radius)
     parameters = np.array([*center, radius])
-    parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
+    if not on_cover:
+        parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
     reach = max(3.0, settings.near_radii * radius)
     for beside in (False, True):
         slopes = _radial_slopes(photo, parameters, ray, reach, softness, settings.pooled_rays)
         edge, trust = _radial_edges(slopes, reach, softness, settings)
-        if beside:
+        if beside and not on_cover:
             edge = _without_light(slopes, edge, settings)
         fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
         if fitted is None:
@@ -91,13 +99,18 @@ def fit_circle(
         std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
         return Circle((float(parameters[0]), float(parameters[1])), radius, std, 0.1 * radius, rim)
     # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
-    excess = max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
+    excess = 0.0 if on_cover else max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
     std = float(
         np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
     )
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
     doubt = 0.0 if rim >= settings.sure_rim else excess
-    radius_std = float(np.linalg.norm([np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt]))
+    # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
+    bevel = settings.bevel_spread_share * float(
+        np.sqrt(max(_spread(slopes, edge, settings)[2] ** 2 - softness**2, 0.0))
+    )
+    parts = [np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt, bevel]
+    radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
 
@@ -160,12 +173,13 @@ def _best_shift(
     level = gaussian_filter1d(np.minimum(slopes.strength / usual, 1.0), step, axis=1) * slopes.seen[:, None]
     shifts = np.arange(-12, 13) * step
     wider = np.clip(np.arange(-2, 3) * expected.std * expected.px, -0.5 * span, 0.5 * span)
-    rows = np.arange(len(ray))[:, None]
+    # The outer halves of the rays hold every shift.
+    aside = (shifts[:, None, None] * ray[:, 0] + shifts[None, :, None] * ray[:, 1]).reshape(-1, len(ray))
+    first = slopes.offsets[0] - 0.25  # half a place before it: whole numbers are rounded by cutting
     best, found = -1.0, parameters
     for k, more in enumerate(wider):
-        aside = more + shifts[:, None, None] * ray[:, 0] + shifts[None, :, None] * ray[:, 1]
-        places = np.rint((aside.reshape(-1, len(ray)).T - slopes.offsets[0]) / 0.5).astype(int)
-        score = level[rows, np.clip(places, 0, len(slopes.offsets) - 1)].mean(axis=0) * (1.0 - 0.03 * abs(k - 2))
+        places = (2.0 * (aside + (more - first))).astype(np.intp) + level.shape[1] * np.arange(len(ray))
+        score = level.ravel()[places].mean(axis=1) * (1.0 - 0.03 * abs(k - 2))
         place = int(np.argmax(score))
         if score[place] > best:
             i, j = divmod(place, len(shifts))
@@ -198,9 +212,21 @@ def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> A
     About each edge the slope is ``A G(t - e) + a + b Phi(t)``: the blurred step and the light's slope on both sides;
     linear in A, A e, a and b. Its spread follows from the mean profile of all edges.
     """
-    found = np.isfinite(edge)
-    if found.sum() < 12:
+    if np.isfinite(edge).sum() < 12:
         return edge
+    t, around, sigma = _spread(slopes, edge, settings)
+    bell = np.exp(-0.5 * (t / sigma) ** 2)
+    design = np.column_stack([bell, t * bell / sigma**2, np.ones_like(t), ndtr(t / sigma)])
+    solved = around @ np.linalg.pinv(design).T
+    step = solved[:, 0]
+    good = np.isfinite(edge) & (step > 0.3 * np.abs(around).max(axis=1))
+    shift = np.where(good, solved[:, 1] / np.where(good, step, 1.0), 0.0)
+    return np.asarray(edge + np.clip(shift, -sigma, sigma))
+
+
+def _spread(slopes: _Slopes, edge: Array, settings: BearingSettings) -> tuple[Array, Array, float]:
+    """Offsets (m,) about the edges, slopes ``(n, m)`` there, and the spread (px) of their median over all edges."""
+    found = np.isfinite(edge)
     t = np.arange(-settings.light_reach_px, settings.light_reach_px + 0.25, 0.5)
     places = (np.where(found, edge, 0.0)[:, None] + t - slopes.offsets[0]) / 0.5
     low = np.clip(np.floor(places).astype(int), 0, len(slopes.offsets) - 2)
@@ -210,14 +236,7 @@ def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> A
     mass = np.clip(mean - np.min(mean), 0.0, None)
     inside = mass > 0.3 * mass.max()
     # Of a Gaussian cut at 0.3 of its height the variance is 0.58 of the whole one's.
-    sigma = float(np.sqrt((mass[inside] @ t[inside] ** 2) / mass[inside].sum() / 0.58))
-    bell = np.exp(-0.5 * (t / sigma) ** 2)
-    design = np.column_stack([bell, t * bell / sigma**2, np.ones_like(t), ndtr(t / sigma)])
-    solved = around @ np.linalg.pinv(design).T
-    step = solved[:, 0]
-    good = found & (step > 0.3 * np.abs(around).max(axis=1))
-    shift = np.where(good, solved[:, 1] / np.where(good, step, 1.0), 0.0)
-    return np.asarray(edge + np.clip(shift, -sigma, sigma))
+    return t, around, float(np.sqrt((mass[inside] @ t[inside] ** 2) / mass[inside].sum() / 0.58))
 
 
 def _robust_circle(

@@ -97,7 +97,9 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     if calibration is None:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, "none: no photo could be measured"))
-    named, side_findings = _name_sides(specimen, shots, found, calibration, settings)
+    named, side_findings = _name_sides(
+        specimen, _as_sure_as_steady(shots, calibration, settings.series), found, calibration, settings
+    )
     lines = tuple(_line(shot, calibration.plane, specimen.diameter_m, settings) for shot in named)
     if specimen.camera.scale_px_per_m is not None or specimen.camera.calibration is not None:
         pairs = zip(named, lines, strict=True)
@@ -289,6 +291,26 @@ def _name_sides(
         )
         findings.append(Finding("rig/moving-bearing", "warning", text))
     return shots, (*findings, *_fixed_moved(steps, moving, calibration, settings.series))
+
+
+def _as_sure_as_steady(shots: list[_Shot], calibration: Calibration, settings: SeriesSettings) -> list[_Shot]:
+    """Axes no surer than the fixed one stands still: what it wanders beyond its play is what finding axes errs here."""
+    found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
+    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
+    if len(found) < 2 or any(cable.left.kind == "given" for cable in found):
+        return shots
+    steps = np.hypot(*np.ptp(axes, axis=0).T)
+    if float(steps.min()) <= settings.max_fixed_shift_m * calibration.scale.px_per_m:
+        return shots
+    wandering = float(np.sqrt(np.mean(np.var(axes[:, int(np.argmin(steps))], axis=0))))
+
+    def wider(cable: RoughCable | Rejected) -> RoughCable | Rejected:
+        if isinstance(cable, Rejected):
+            return cable
+        left, right = (replace(axis, std_px=max(axis.std_px, wandering)) for axis in (cable.left, cable.right))
+        return replace(cable, left=left, right=right)
+
+    return [replace(shot, found=wider(shot.found)) for shot in shots]
 
 
 def _fixed_moved(steps: Array, moving: str, calibration: Calibration, settings: SeriesSettings) -> tuple[Finding, ...]:

@@ -78,6 +78,10 @@ LOOKS = {
     "wood": {"ground": Ground("wood", GREY, 0.05)},
     "squared paper": {"ground": Ground("squared", GREY, 0.2)},
     "shadow on one side": {"light": Light(elevation_rad=0.95, ambient=0.45, shadow=0.35)},
+    "bevel in a hard shadow": {
+        "light": Light(0.8, 0.6, ambient=0.35, shadow=0.7, softness=0.1),
+        "covers": (Cover(rim=0.3, colour=(0.7,) * 3),) * 2,
+    },
     "noise of 5 %": {"sensor": Sensor(noise=0.05)},
     "colour, same luminance": {
         "covers": (Cover(colour=(0.95, 0.66, 0.75)),) * 2,

@@ -1,0 +1,108 @@
+"""Circles turned on the axis of a bearing cover: dot, groove and bevel tell its centre as well as the rim does.
+
+``photo, circle of the rim -> place about which the cover is most round -> rings there -> one centre of all``
+
+A shadow, an arm or the cable beside the rim leads a fit of the rim astray; what lies on the cover they do not touch.
+About the true centre the mean grey value on circles falls and rises in sharp steps; about any other place the steps
+are smeared. The sum of the squared slopes of that mean is the measure of roundness.
+Units: px of the photo as displayed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.photo import Photo
+from pipeline.vision.rim import Circle, Radius, fit_circle
+
+
+def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSettings) -> Circle:
+    """The circle of a cover, its centre by rim and rings together.
+
+    Parameters
+    ----------
+    photo : Photo
+    rim : Circle
+        Fitted to the rim.
+    expected : Radius
+    settings : BearingSettings
+
+    Returns
+    -------
+    Circle
+        As it was where no ring is seen. A rim that is not seen all round, or lies elsewhere, yields to the rings; else
+        all are averaged by their variances, which are widened to what they differ.
+    """
+    whole, center = rim.rim >= settings.sure_rim, np.array(rim.center)
+    if not (whole and rim.std < settings.sure_center_radii * expected.px):
+        center = _roundest(photo, center, expected.px, settings)
+    rings = _rings(photo, center, expected.px, settings)
+    if not rings:
+        return rim
+    apart = max(np.hypot(*np.subtract(ring.center, rim.center)) for ring in rings)
+    sure = whole and apart < settings.same_axis_radii * expected.px
+    circles = [rim, *rings] if sure else rings
+    weight = np.array([circle.std**-2.0 for circle in circles])
+    centers = np.array([circle.center for circle in circles])
+    middle = weight @ centers / weight.sum()
+    # Their own variances count as much as two differences: an inverse gamma prior of two degrees of freedom.
+    misfit = float((weight @ (centers - middle) ** 2).sum())
+    std = float(np.sqrt((2.0 + misfit) / (2 * len(circles)) / weight.sum()))
+    std = max(std, settings.center_std_floor_px)  # common to all circles of a cover
+    if sure:
+        return replace(rim, center=(float(middle[0]), float(middle[1])), std=std)
+    # What was taken for the rim is none, or part of one: the radius is the expected one.
+    doubt = float(np.hypot(rim.radius_std, abs(rim.radius - expected.px)))
+    return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim)
+
+
+def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Array:
+    """Place within reach of ``center`` about which the cover is most round, to a hundredth of its radius."""
+    reach = settings.astray_radii * radius
+    for finer in range(3):
+        step = reach / 4.0 / 4.0**finer
+        grid = np.arange(-4 if finer == 0 else -3, 5 if finer == 0 else 4) * step
+        places = center + np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+        slopes = [_slope(photo, place, radius, radius / 40.0) for place in places]
+        center = places[int(np.argmax([float((slope**2).sum()) for slope in slopes]))]
+    return np.asarray(center)
+
+
+def _slope(photo: Photo, center: Array, radius: float, step: float) -> Array:
+    """Slope ``(m, c)`` of the mean grey value on circles about a centre, on radii ``step`` px apart."""
+    angle = np.arange(64) * (np.pi / 32.0)
+    distance = np.arange(0.06 * radius, 1.06 * radius, step)
+    places = center + distance[None, :, None] * np.column_stack([np.cos(angle), np.sin(angle)])[:, None, :]
+    low = np.maximum(np.floor(center - 1.1 * radius).astype(int) - 1, 0)
+    high = np.minimum(np.ceil(center + 1.1 * radius).astype(int) + 2, photo.size)
+    part = photo.pixels[low[1] : high[1], low[0] : high[0]]
+    u, v = (places[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
+    values = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    mean = values.reshape(*u.shape, -1).mean(axis=0) / photo.full_scale
+    return np.asarray(np.diff(mean, axis=0) / step)
+
+
+def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> list[Circle]:
+    """Circles seen nearly all round about ``center``, the rim itself not among them."""
+    slope = np.hypot.reduce(_slope(photo, center, radius, 1.0), axis=1)
+    distance = 0.06 * radius + 0.5 + np.arange(len(slope))
+    slope[(distance < settings.ring_range[0] * radius) | (distance > settings.ring_range[1] * radius)] = 0.0
+    least = settings.rim_over_texture * float(np.median(slope[slope > 0.0])) if slope.any() else np.inf
+    found: list[Circle] = []
+    for _ in range(settings.rings):
+        at = int(np.argmax(slope))
+        if slope[at] <= least:
+            break
+        expected = Radius(float(distance[at]), 1.0 / float(distance[at]))  # to a pixel, by the mean of all rays
+        ring = fit_circle(photo, center, expected, settings, on_cover=True)
+        slope[np.abs(distance - distance[at]) < max(4.0, 2.0 * settings.near_radii * radius)] = 0.0
+        if ring is None or ring.rim < settings.sure_rim or ring.radius > settings.ring_range[1] * radius:
+            continue
+        if np.hypot(*(np.array(ring.center) - center)) < settings.same_axis_radii * radius:
+            found.append(ring)
+    return found
