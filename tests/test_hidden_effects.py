@@ -13,6 +13,7 @@ from fixtures.effects import HIDE, LARGEST, PLAIN, PROTOCOLS, SPOT, Form, profil
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.make import hidden_specimen
 from fixtures.scores import FAR, answers, expected_scores, outlook
+from fixtures.study_table import correct
 from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
@@ -95,6 +96,12 @@ def test_twins_of_three_loading_steps_are_one_class(name):
     assert set(found["set"]) >= {"bearing_friction", "displacement_offset"} and not found["alien"]
 
 
+def test_friction_between_the_wires_is_in_the_class_of_three_loading_steps():
+    """On loading alone it is a shift of K0 and a change of the law, as those twins are: no other name for certain."""
+    found = record(Trial("hidden", "three", 31, ("hysteresis",), 2.0))
+    assert "hysteresis" in found["set"] and not found["alien"]
+
+
 @pytest.mark.parametrize("protocol", ["three", "six", "loop"])
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_nothing_is_named_where_nothing_is_hidden(protocol, seed):
@@ -128,6 +135,12 @@ def test_two_causes_are_both_found():
     assert part.verdict == "two_causes"
     assert {cause.name for cause in part.causes} == {"bearing_friction", "displacement_offset"}
     assert f_error(part.extended, cable)[0] < 0.02
+
+
+def test_two_causes_that_hide_each_other_are_found_with_their_twins():
+    """Ten sigma each, yet every single score is below its threshold: only the pair stands out."""
+    found = record(Trial("pair", "loop", 2029, ("pre_curvature_varying", "stiffness_varying"), 10.0))
+    assert found["set"] == [] and correct(found) and not found["alien"], found["classes"]
 
 
 @pytest.mark.parametrize("alien", ["waves", "sticking"])
