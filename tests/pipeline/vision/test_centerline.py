@@ -39,7 +39,7 @@ def lit(rng, **options):
 
 
 # Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. At 5 % noise 0.15 inside is missed:
-# 0.164 on these scenes, 0.158 on 16 others. Edges at the limit of Cramer and Rao, one row sqrt(2 sqrt(pi) w) n/A, through
+# 0.164 on these scenes, 0.158 on 16 others. Edges at the limit of Cramer and Rao, a row's sqrt(2 sqrt(pi) w) n/A, by
 # this spline give 0.150 over 29 such bows if the grey values of sheath and ground were known exactly, and 0.175 if they
 # are found with the place; 0.13 with the penalty's weight chosen by the truth. A stiffer penalty (order 4) gained a
 # tenth inside and lost a fifth at the ends; to hold the grey values to their neighbours gained 4 % and lost 17 % in
