@@ -27,12 +27,11 @@ def sentence(code: str) -> str:
     return (BROKEN / code / "sentence.txt").read_text(encoding="utf-8").rstrip("\n")
 
 
-def start(*arguments) -> subprocess.Popen:
+def start(*arguments, **environment) -> subprocess.Popen:
     """A batch as a program of its own, in a group of its own so that it can be interrupted as a terminal does."""
     command = [sys.executable, "-m", "tests.pipeline.cheap_batch", *map(str, arguments)]
-    return subprocess.Popen(
-        command, cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=ROOT, start_new_session=True, env=os.environ | environment, **silent)
 
 
 def wait_for(condition, process: subprocess.Popen, seconds: float = PATIENCE_S) -> None:
@@ -122,7 +121,7 @@ def test_other_settings_are_another_measurement_but_limits_are_not(tmp_path):
 def test_interrupted_or_killed_and_resumed_equals_undisturbed(how, undisturbed, tmp_path):
     shutil.copytree(undisturbed / "batch", tmp_path / "batch")
     out = tmp_path / "out"
-    process = start(tmp_path / "batch", out)
+    process = start(tmp_path / "batch", out, HELD_BEYOND_FIVE_IN=str(out))
     wait_for(lambda: len(list(out.glob("*/entry.json"))) >= 3, process)
     if how == signal.SIGINT:
         os.killpg(process.pid, how)  # as Ctrl-C in a terminal: the workers get it too
