@@ -52,11 +52,15 @@ def find_cover(
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius.px)) ** 2 - 0.5 * fall**2)
     # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
-    # A rim that is not seen as a sharp edge is sought as a soft one: out of focus, or faint in the noise.
-    for softness, least in ((1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)):
+    # A dome lit from one side is brighter than the ground there and darker on the other: quarters of its rim add up.
+    # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
+    # a sharp rim, what is soft and round is the shadow.
+    sharp, soft = (1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)
+    for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
-            found = _best_circle(photo, window, radius, on_cable, prior, softness, settings)
+            votes = _votes(window, radius.px / window.reduction, on_cable, settings, sectors=sectors) * prior
+            found = _best_circle(photo, window, radius, votes, softness, settings)
             if found is not None and found.rim >= least:
                 return with_rings(photo, found, radius, settings)
     return _by_dot(photo, window, radius.px, along, aside, settings)
@@ -71,7 +75,12 @@ def _by_dot(
     nowhere = np.zeros(prior.shape, bool)
     # the sizes tried are a third apart
     sizes = [Radius(share * radius_px, 0.08) for share in settings.dot_radii]
-    dots = [_best_circle(photo, window, size, nowhere, prior, 1.0, settings) for size in sizes]
+    dots = [
+        _best_circle(
+            photo, window, size, _votes(window, size.px / window.reduction, nowhere, settings) * prior, 1.0, settings
+        )
+        for size in sizes
+    ]
     seen = [dot for dot in dots if dot is not None and dot.rim >= settings.sure_rim]
     if not seen:
         return None
@@ -83,13 +92,12 @@ def _best_circle(
     photo: Photo,
     window: _Window,
     radius: Radius,
-    blind: NDArray[np.bool_],
-    prior: Array,
+    votes: Array,
     softness: float,
     settings: BearingSettings,
 ) -> Circle | None:
-    """The circle with the most of its rim seen among the best centres of the window."""
-    votes = _votes(window, radius.px / window.reduction, blind, settings) * prior
+    """The circle with the most of its rim seen among the centres of the window with the most votes."""
+    votes = votes.copy()
     best: Circle | None = None
     for _ in range(settings.candidates):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
@@ -136,8 +144,10 @@ def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
     return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
 
 
-def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: BearingSettings) -> NDArray[np.float32]:
-    """Change of the mean grey value across a circle around each cell, colours together.
+def _votes(
+    window: _Window, radius: float, blind: NDArray[np.bool_], settings: BearingSettings, *, sectors: int = 1
+) -> NDArray[np.float32]:
+    """Change of the mean grey value across a circle around each cell, colours together, sector by sector of it.
 
     That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all
     round where texture cancels. Strong edges are clipped, and the cable's own, which are straight and would heap up
@@ -154,9 +164,12 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], settings: B
     distance = np.hypot(x, y) + np.float32(1e-6)
     ring = np.exp(-0.5 * ((distance - radius) / max(0.7, settings.ring_width * radius)) ** 2)
     ring /= distance * ring.sum()
+    which = np.floor((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * sectors).clip(0, sectors - 1)
     votes = np.zeros(strength.shape, np.float32)
-    for channel in range(gu.shape[2]):
-        across = cv2.filter2D(gu[..., channel] * gain, -1, ring * x, borderType=cv2.BORDER_CONSTANT)
-        across += cv2.filter2D(gv[..., channel] * gain, -1, ring * y, borderType=cv2.BORDER_CONSTANT)
-        votes += np.abs(across)
+    for sector in range(sectors):
+        part = np.where(which == sector, ring, np.float32(0.0))
+        for channel in range(gu.shape[2]):
+            across = cv2.filter2D(gu[..., channel] * gain, -1, part * x, borderType=cv2.BORDER_CONSTANT)
+            across += cv2.filter2D(gv[..., channel] * gain, -1, part * y, borderType=cv2.BORDER_CONSTANT)
+            votes += np.abs(across)
     return votes

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import erfc
 
 from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.bearings import BearingHints, find_bearings, left_first
@@ -131,6 +132,29 @@ def test_cover_of_the_grounds_own_look_is_found_by_its_dot() -> None:
         assert circle is not None
         assert np.hypot(*np.subtract(circle.center, true)) < 5.0 * circle.std
         assert circle.radius == radius
+
+
+def test_dome_brighter_than_the_ground_on_one_side_and_darker_on_the_other_is_not_taken_for_its_shadow() -> None:
+    """Painted here, not by the renderer: a step of both signs round the rim, and a soft shadow of the same size."""
+    picture = render(scene(covers=(None, None), ground=Ground(colour=GREY)))
+    radius = 0.006 * SCALE
+    grey = photo_of(picture).pixels.astype(float)
+    v, u = np.mgrid[: grey.shape[0], : grey.shape[1]]
+    ground = float(np.median(grey))
+    for center in (picture.left_px, picture.right_px):
+        du, dv = u - center[0], v - center[1]
+        lit = ground * (0.94 + 0.3 * (0.6 * du + 0.8 * dv) / radius)
+        shade = 0.5 * erfc((np.hypot(du + 0.3 * radius, dv - 0.25 * radius) - radius) / (np.sqrt(2.0) * 4.0))
+        disc = 0.5 * erfc((np.hypot(du, dv) - radius) / np.sqrt(2.0))
+        grey = disc * lit + (1.0 - disc) * grey * (1.0 - 0.3 * shade)
+    grey += np.random.default_rng(1).normal(0.0, 1.5, grey.shape)
+    photo = Photo("dome", grey.clip(0, 255).astype(np.uint8), 8)
+    for side, true in enumerate((picture.left_px, picture.right_px)):
+        circle = find_cover(photo, rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE, STAGE)
+        assert circle is not None
+        # the shadow's centre lies 0.39 radii away; 3.5 standard deviations as for every other look
+        assert np.all(np.abs(np.subtract(circle.center, true)) < 3.5 * circle.std)
+        assert circle.std < 1.0
 
 
 def test_no_cover_is_no_circle() -> None:
