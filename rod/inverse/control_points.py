@@ -31,6 +31,12 @@ MISFIT = 4.0
 SETTLING = 6
 """Fits with many control points at most; the visited range and the blur settle in two or three."""
 
+FINAL_PRECISION = 1e-9
+"""Of chi2, where a fit ends: a thousandth of a standard deviation for a thousand data."""
+
+START_PRECISION = 1e-6
+"""Of chi2, for fits from which others start: three hundredths of a standard deviation for a thousand data."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -56,10 +62,18 @@ class Fit:
         return averaged(self.model, self.evaluation, taus=taus)
 
 
-def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), evaluations: int = 60) -> Fit:
+def fit(
+    model: FitModel,
+    start: Array,
+    *,
+    starts: tuple[Equilibrium, ...] = (),
+    evaluations: int = 60,
+    precision: float = FINAL_PRECISION,
+) -> Fit:
     """Least squares from the unknowns `start` (q,), scipy's trust-region reflective method with the exact jacobian.
 
-    Where a trial has no equilibrium its residuals are infinite, and the method shortens its step.
+    Where a trial has no equilibrium its residuals are infinite, and the method shortens its step. It ends where a step
+    gains less than `precision` of chi2.
     """
     last = evaluate(model, start, starts=starts)
     if last.failure is not None:
@@ -78,7 +92,6 @@ def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), 
             last = found
         return last
 
-    # 1e-9 of chi2 is a thousandth of a standard deviation for a thousand data.
     def value(u: Array) -> Array:
         return at(u).value
 
@@ -90,15 +103,23 @@ def fit(model: FitModel, start: Array, *, starts: tuple[Equilibrium, ...] = (), 
         start,
         jacobian,
         x_scale="jac",
-        ftol=1e-9,
-        xtol=1e-9,
-        gtol=1e-10,
+        ftol=precision,
+        xtol=precision,
+        gtol=0.1 * precision,
         max_nfev=evaluations,
     )
     return Fit(model, best, count, result.status > 0)
 
 
-def refit(known: Fit, knots: Array, prior: LawPrior, *, blur: tuple[float, float], evaluations: int) -> Fit:
+def refit(
+    known: Fit,
+    knots: Array,
+    prior: LawPrior,
+    *,
+    blur: tuple[float, float],
+    evaluations: int,
+    precision: float = FINAL_PRECISION,
+) -> Fit:
     """The same data with other control points and another blur, started from a fit that is known."""
     model = replace(known.model, knots=knots, prior=prior, blur=blur)
     u = known.evaluation.unknowns
@@ -106,7 +127,7 @@ def refit(known: Fit, knots: Array, prior: LawPrior, *, blur: tuple[float, float
     # Outside its knots the old law is a straight line, which must not start a control point below zero.
     ordinates = np.maximum(law.f(knots), 0.05 * law.ordinates.min())
     start = np.concatenate([np.log(ordinates / model.unit), u[known.model.knots.size :]])
-    return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations)
+    return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations, precision=precision)
 
 
 def blur_needed(found: Fit) -> tuple[float, float]:
@@ -124,7 +145,9 @@ def rich_fit(first: Fit, options: InverseOptions) -> tuple[Fit, int]:
     rich, used = first, 0
     for _ in range(SETTLING):
         knots, blur = place_knots(*rich.visited(), options.knots[1]), blur_needed(rich)
-        found = refit(rich, knots, first_prior(knots), blur=blur, evaluations=options.evaluations)
+        found = refit(
+            rich, knots, first_prior(knots), blur=blur, evaluations=options.evaluations, precision=START_PRECISION
+        )
         used += found.evaluations
         if found.evaluation.failure is not None:
             break

@@ -235,7 +235,7 @@ def _whitened(model: FitModel, u: Array, fits: tuple[StepFit, ...], equilibria: 
     prior = np.zeros((len(model.nuisances), model.size))
     prior[:, model.laws :] = np.eye(len(model.nuisances))
     add("prior", u[model.laws :], prior)
-    root = model.prior.rows()
+    root = model.prior.rows
     smooth = np.zeros((root.shape[0], model.size))
     smooth[:, : model.knots.size] = root
     add("smoothness", root @ u[: model.knots.size], smooth)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -31,24 +30,28 @@ def place_knots(low: float, high: float, count: int) -> Array:
 
 
 def roughness(places: Array) -> Array:
-    """Matrix S with ``z @ S @ z = int (d^2 z / dt^2)^2 dt`` of the natural spline through z at the places, (k, k)."""
-    t = _from_0_to_1(places)
-    bend = CubicSpline(t, np.eye(t.size), bc_type="natural")(t, 2)
-    # Second derivatives are linear between knots: Simpson integrates their products exactly.
-    h = np.diff(t)[:, None, None]
-    left, right = bend[:-1], bend[1:]
-    middle = 0.5 * (left + right)
+    """Matrix S with ``z @ S @ z = int (d^2 z / dt^2)^2 dt`` of the natural spline through z at the places, (k, k).
 
-    def square(rows: Array) -> Array:
-        return np.asarray(rows[:, :, None] * rows[:, None, :])
-
-    return np.asarray(np.sum(h / 6.0 * (square(left) + 4.0 * square(middle) + square(right)), axis=0))
+    S = Q R^-1 Q^T (Green and Silverman, Nonparametric Regression and Generalized Linear Models, 1994, Sec. 2.1.2).
+    """
+    differences, inner = _bending(_from_0_to_1(places))
+    return np.asarray(differences.T @ np.linalg.solve(inner, differences))
 
 
 def first_slope(places: Array) -> Array:
     """Row g with ``g @ z = dz/dt`` of the natural spline through z at the first place, (k,)."""
     t = _from_0_to_1(places)
-    return np.asarray(CubicSpline(t, np.eye(t.size), bc_type="natural")(0.0, 1))
+    width = t[1] - t[0]
+    slope = -width / 6.0 * np.linalg.solve(*_bending(t)[::-1])[0]
+    slope[:2] += np.array([-1.0, 1.0]) / width
+    return np.asarray(slope)
+
+
+def _bending(t: Array) -> tuple[Array, Array]:
+    """Q^T (k - 2, k) and R (k - 2, k - 2): ``R @ d^2 z / dt^2 = Q^T @ z`` at the inner knots of a natural spline."""
+    h = np.diff(t)
+    inner = np.diag((h[:-1] + h[1:]) / 3.0) + np.diag(h[1:-1] / 6.0, 1) + np.diag(h[1:-1] / 6.0, -1)
+    return np.diff(np.diff(np.eye(t.size), axis=0) / h[:, None], axis=0), inner
 
 
 def _from_0_to_1(places: Array) -> Array:

@@ -17,6 +17,7 @@ Units: knots in 1/m; z, t and the sizes are pure numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,7 @@ class LawPrior:
     tau: float
     slope: float
 
+    @cached_property
     def rows(self) -> Array:
         """Matrix R with ``(R @ z)^2 / 2`` minus the log density of z, (k - 1, k): all but the level has a prior."""
         g = first_slope(self.places)

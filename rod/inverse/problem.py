@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.equilibrium import Outcome
-from rod.inverse.control_points import FIRST_BLUR, Fit, chosen_knots, fit
+from rod.inverse.control_points import FIRST_BLUR, START_PRECISION, Fit, chosen_knots, fit
 from rod.inverse.estimate import Estimate, InverseOutcome, read_off
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel, StepData, fit_model, step_data
@@ -128,7 +128,7 @@ def first_fit(
     trial = evaluate(model, u)
     if trial.failure is None:
         u = rescaled(model, trial)
-    return fit(model, u, starts=trial.equilibria, evaluations=options.evaluations)
+    return fit(model, u, starts=trial.equilibria, evaluations=options.evaluations, precision=START_PRECISION)
 
 
 def rescaled(model: FitModel, trial: Evaluation) -> Array:

@@ -159,8 +159,10 @@ def _typical_covariance(priors: list[LawPrior], share: Array, places: tuple[Arra
     covariance = np.zeros((k, k))
     logs = np.log([(prior.tau, prior.slope) for prior in priors]).reshape(len(places), -1, 2)
     for at, weights, sizes in zip(places, share.reshape(len(places), -1), logs, strict=True):
+        if not weights.any():
+            continue  # the data leave no evidence at all to laws that are smooth along these places
         tau, slope = np.exp(weights @ sizes / weights.sum())
-        rows = LawPrior(at, float(tau), float(slope)).rows()[:, 1:]
+        rows = LawPrior(at, float(tau), float(slope)).rows[:, 1:]
         covariance[1:, 1:] += weights.sum() * np.linalg.inv(rows.T @ rows)
     return covariance
 
