@@ -10,13 +10,16 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
+import queue
+import signal
+import threading
 import time
 import uuid
 from collections.abc import Generator, Iterator, Sequence
 
 import dask
 from dask.system import CPU_COUNT
-from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+from distributed import Client, Future, KilledWorker, LocalCluster
 
 from pipeline.batch.orders import Order
 from pipeline.batch.specimen import ONE_THREAD, Outcome, Stages, measure_order, store_failure
@@ -39,6 +42,7 @@ LOCAL = {
     "distributed.admin.low-level-log-length": 0,
     "distributed.deploy.lost-worker-timeout": "7 days",
 }
+LOOK_S = 0.2  # between two looks whether Ctrl-C was pressed while nothing ended
 CONNECT_S = 5.0  # to a scheduler given by its address; those that answer do so within a second
 
 
@@ -64,8 +68,8 @@ def measure_all(
         for order in orders:
             yield measure_order(order, stages, guarded=False)
         return
-    with _client(len(orders), settings, scheduler) as client:
-        yield from _stream(client, orders, settings, stages)
+    with _client(len(orders), settings, scheduler) as client, _interrupts() as interrupted:
+        yield from _stream(client, orders, settings, stages, interrupted)
 
 
 @contextlib.contextmanager
@@ -100,32 +104,70 @@ def _client(count: int, settings: BatchSettings, scheduler: str | None) -> Itera
         yield client
 
 
-def _stream(client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages) -> Iterator[Outcome]:
+@contextlib.contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Ctrl-C as an event, a second one as ever.
+
+    Raised wherever this thread happens to be, KeyboardInterrupt is lost where that is a finalizer of a library, and the
+    batch would run on; so it is noted, and raised between two outcomes.
+    """
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked  # signals reach the main thread alone
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(*_: object) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _next(ended: queue.SimpleQueue[Future[Outcome]], interrupted: threading.Event) -> Future[Outcome]:
+    """The next future that ended, or KeyboardInterrupt."""
+    while True:
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        with contextlib.suppress(queue.Empty):
+            return ended.get(timeout=LOOK_S)
+
+
+def _stream(
+    client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+) -> Iterator[Outcome]:
     """Keep a few orders per worker under way.
 
     Where the scheduler blames an order for workers that died around it, it is handed out again: whether it is to blame
     the order itself knows, by the notes of its attempts.
     """
-    doing: dict[str, tuple[Order, float, int]] = {}
+    # The futures are kept: dask drops the work of those that nobody holds.
+    doing: dict[str, tuple[Future[Outcome], Order, float, int]] = {}
+    ended: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
 
-    def hand_out(order: Order, again: int = 0) -> Future[Outcome]:
+    def hand_out(order: Order, again: int = 0) -> None:
         future = client.submit(measure_order, order, stages, key=f"specimen-{uuid.uuid4().hex}", pure=False)
-        doing[str(future.key)] = order, time.monotonic(), again
-        return future
+        doing[str(future.key)] = future, order, time.monotonic(), again
+        future.add_done_callback(ended.put)
 
     workers = max(1, sum(client.ncores().values()))
     waiting = iter(orders)
-    first = itertools.islice(waiting, workers * settings.waiting_per_worker)
-    finished = as_completed([hand_out(order) for order in first], loop=client.loop)
-    for future in finished:
-        order, started, again = doing.pop(str(future.key))
+    for order in itertools.islice(waiting, workers * settings.waiting_per_worker):
+        hand_out(order)
+    while doing:
+        future = _next(ended, interrupted)
+        _, order, started, again = doing.pop(str(future.key))
         trouble = None if future.status == "finished" else future.exception()
         if isinstance(trouble, KilledWorker) and again < settings.attempts:
-            finished.add(hand_out(order, again + 1))
+            hand_out(order, again + 1)
             continue
         following = next(waiting, None)
         if following is not None:
-            finished.add(hand_out(following))
+            hand_out(following)
         if trouble is None:
             yield future.result()
         else:
