@@ -66,9 +66,10 @@ def _diagnosed(identification: Identification, settings: Settings) -> tuple[Diag
 
 
 def write(result: Result, folder: Path, settings: Settings | None = None) -> None:
-    """Write ``result.json``, the tables and the report of one specimen into an existing folder."""
+    """Write ``result.json``, the tables and, unless ``batch.reports`` is off, the reports into an existing folder."""
     settings = settings or Settings()
     write_result(result, folder)
     write_tables(result, folder, settings.report)
-    write_report(result, folder, settings.report)
-    write_pdf(result, folder, settings.report)
+    if settings.batch.reports:
+        write_report(result, folder, settings.report)
+        write_pdf(result, folder, settings.report)

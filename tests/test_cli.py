@@ -205,6 +205,26 @@ def test_report_draws_again_without_measuring(cheap, monkeypatch):
     assert "(3 kept" in call("run", "batch", "-o", "out", *IN_PROCESS).stdout
 
 
+def test_reports_can_wait_until_they_are_asked_for(cheap, monkeypatch):
+    drawn = []
+    stages = cheap_stages()
+
+    def write(result, folder, settings):
+        stages.write(result, folder, settings)
+        if settings.batch.reports:
+            drawn.append(result.specimen.id)
+
+    drawing = Stages(stages.measure, write, stages.write_index)
+    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: drawing))
+    assert call("run", "batch", "-o", "out", "--no-reports", *IN_PROCESS).exit_code == 0
+    assert drawn == []
+    (cheap / "out/b/result.json").write_text("{")
+    assert "(2 kept" in call("run", "batch", "-o", "out", *IN_PROCESS).stdout  # the broken one is measured again
+    assert drawn == ["a", "b", "c"]
+    assert "(3 kept" in call("run", "batch", "-o", "out", *IN_PROCESS).stdout
+    assert drawn == ["a", "b", "c"]
+
+
 def test_check_measures_nothing_and_says_what_is_wrong(cheap):
     done = call("check", "batch")
     assert done.exit_code == 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -11,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.batch.orders import make_orders
-from pipeline.batch.specimen import Outcome, Stages
-from pipeline.batch.store import ENTRY, Store
-from pipeline.result import from_json
+from pipeline.batch.specimen import Outcome, Stages, draw_again, stored_result
+from pipeline.batch.store import Store
 from pipeline.settings import Settings
 
 LOG_NAME = "cablebend.log"
@@ -127,14 +125,11 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
     with store.locked():
         for name in store.names():
             try:
-                result = from_json((store.out / name / "result.json").read_text(encoding="utf-8"))
+                result = stored_result(store, name)
             except (OSError, ValueError) as error:
                 yield name, f"result.json cannot be read ({type(error).__name__}); run the specimen again"
                 continue
-            with store.staging() as staged:
-                stages.write(result, staged, settings)
-                shutil.copy(store.out / name / ENTRY, staged / ENTRY)
-                store.install(staged, name)
+            draw_again(store, name, result, stages, settings)
             yield name, None
         stages.write_index(store.out, settings)
 

@@ -30,6 +30,8 @@ from pipeline.settings.batch import BatchSettings
 # One specimen at a time in a worker, the next one waits in the scheduler and not in a process that may die with it;
 # spilling and pausing are for data in workers, and there is none. A worker that died is started again by its nanny,
 # however long that takes on a busy machine: dask gives it up after 15 s, and a batch without workers waits forever.
+# dask looks after itself 50 times a second in every process, which cost this one 7 % of a core: a few times do, for
+# what is done here lasts seconds. A worker's memory is looked at twice a second.
 LOCAL = {
     "distributed.nanny.pre-spawn-environ": ONE_THREAD,
     "distributed.scheduler.worker-saturation": 1.0,
@@ -40,6 +42,9 @@ LOCAL = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.preload": ["pipeline.batch.worker"],
     "distributed.admin.low-level-log-length": 0,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "500ms",
     "distributed.deploy.lost-worker-timeout": "7 days",
 }
 LOOK_S = 0.2  # between two looks whether Ctrl-C was pressed while nothing ended

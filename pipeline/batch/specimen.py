@@ -22,7 +22,7 @@ from pipeline.batch.orders import Order, fingerprint
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.result import FindingPart, Result, SpecimenPart, schema, to_json
+from pipeline.result import FindingPart, Result, SpecimenPart, from_json, schema, to_json
 from pipeline.settings import Settings
 
 Measure = Callable[..., Result]
@@ -164,7 +164,11 @@ def _measured(store: Store, order: Order, stages: Stages, started: float) -> Out
     mark = fingerprint(specimen, order)
     stored = store.entry(order.name)
     if stored is not None and stored.get("fingerprint") == mark:
-        return Outcome(order.name, stored["status"], str(stored.get("headline", "")), True, time.monotonic() - started)
+        with contextlib.suppress(OSError, ValueError):  # a stored result that cannot be read is measured anew
+            if order.settings.batch.reports and not stored.get("reports", True):
+                draw_again(store, order.name, stored_result(store, order.name), stages, order.settings)
+            told = str(stored.get("headline", ""))
+            return Outcome(order.name, stored["status"], told, True, time.monotonic() - started)
     result = stages.measure(order.folder, order.settings, command=order.command)
     entry = _entry(order, result, mark)
     with store.staging() as staged:
@@ -172,6 +176,19 @@ def _measured(store: Store, order: Order, stages: Stages, started: float) -> Out
         write_entry(entry, staged)
         store.install(staged, order.name)
     return Outcome(order.name, result.status, entry["headline"], False, time.monotonic() - started)
+
+
+def stored_result(store: Store, name: str) -> Result:
+    """A stored result; raises OSError or ValueError if its ``result.json`` cannot be read."""
+    return from_json((store.out / name / "result.json").read_text(encoding="utf-8"))
+
+
+def draw_again(store: Store, name: str, result: Result, stages: Stages, settings: Settings) -> None:
+    """Write tables and reports of a stored result again, without measuring."""
+    with store.staging() as staged:
+        stages.write(result, staged, settings)
+        write_entry((store.entry(name) or {}) | {"reports": settings.batch.reports}, staged)
+        store.install(staged, name)
 
 
 def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
@@ -184,6 +201,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "status": result.status,
         "headline": result.headline or (reasons[0].message if reasons else ""),
         "code": reasons[0].code if reasons else None,
+        "reports": order.settings.batch.reports,
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
 @click.option("--timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Limit per specimen.")
+@click.option("--no-reports", is_flag=True, help="Leave report.html and report.pdf to `cablebend report`.")
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON on stdout.")
 @language_option
 @settings_options
@@ -35,6 +36,7 @@ def run(
     workers: int | None,
     scheduler: str | None,
     timeout: float | None,
+    no_reports: bool,
     as_json: bool,
     language: str | None,
     settings_file: Path | None,
@@ -49,7 +51,7 @@ def run(
     from pipeline.cli.configuration import as_options, read_settings
     from pipeline.cli.progress import progress
 
-    given = {"batch.workers": workers, "batch.timeout_s": timeout}
+    given = {"batch.workers": workers, "batch.timeout_s": timeout, "batch.reports": "false" if no_reports else None}
     limits = [f"{name}={value}" for name, value in given.items() if value is not None]
     options = as_options(settings_file, assignments)
     settings = read_settings(settings_file, (*assignments, *limits, *chosen_language(language)))

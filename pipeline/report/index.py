@@ -158,14 +158,14 @@ def write_index(
 
 
 def _report(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
-    """Path of a report relative to the index, empty if there is none.
+    """Path of a report relative to the index, empty if there is none (yet).
 
     A specimen that failed may have left none (its process died, its description could not be read): it is drawn here.
     """
     path = out / folder / "report.html"
     if result.status == "failed" and path.parent.is_dir() and not path.exists():
         write_report(result, path.parent, settings)
-    return f"{folder}/report.html" if result.status != "failed" or path.exists() else ""
+    return f"{folder}/report.html" if path.exists() else ""
 
 
 def summary_frame(rows: list[IndexRow]) -> pd.DataFrame:

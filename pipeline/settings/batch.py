@@ -30,6 +30,11 @@ class BatchSettings(BaseModel):
         ge=1,
         description="specimens handed out a worker; one is measured, the next waits, memory stays flat",
     )
+    reports: bool = Field(
+        True,
+        description="draw report.html and report.pdf of every specimen, over half of its time on three photos; "
+        "without, `cablebend report` draws them later",
+    )
     memory_per_worker_gb: float = Field(
         0.0, ge=0, description="GB after which a worker is stopped and its specimen reported; 0: memory / workers"
     )

@@ -16,12 +16,20 @@ def named(result, name, kind="HV 35"):
     return result.model_copy(update={"specimen": specimen})
 
 
+def reported(out, *names):
+    """Folders with a report for the index to link."""
+    for name in names:
+        (out / name).mkdir(parents=True, exist_ok=True)
+        (out / name / "report.html").touch()
+
+
 @pytest.fixture(scope="module")
 def batch(full_result, diagnosed, partial_result, failed_result):
     return [named(full_result, "a"), named(diagnosed("class"), "b"), partial_result, failed_result]
 
 
 def test_summary_has_a_row_a_specimen(batch, tmp_path):
+    reported(tmp_path, "a")
     _, summary = write_index(batch, tmp_path)
     table = pd.read_csv(summary)
     assert list(table.status) == ["measured", "measured", "partial", "failed"]
@@ -34,9 +42,11 @@ def test_summary_has_a_row_a_specimen(batch, tmp_path):
 
 
 def test_page_links_every_report_and_escapes_names(batch, tmp_path):
+    reported(tmp_path, "a")
     page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
     assert page.count("<tr class=") == 4
     assert 'href="a/report.html"' in page
+    assert 'href="b/report.html"' not in page
     assert "<img" not in page
     assert page.count("<script") == 2
     assert "the log is empty" in page
@@ -45,6 +55,7 @@ def test_page_links_every_report_and_escapes_names(batch, tmp_path):
 def test_folder_of_half_a_run_is_enough(batch, tmp_path):
     for result in batch[:2]:
         write_result(result, tmp_path / "deep" / result.specimen.id)
+    reported(tmp_path, "deep/a")
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "result.json").write_text('{"schema": "cablebend/res', encoding="utf-8")
     page, summary = write_index(tmp_path, tmp_path)
