@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
 @click.option("--timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Limit per specimen.")
-@click.option("--no-reports", is_flag=True, help="Leave report.html and report.pdf to `cablebend report`.")
+@click.option(
+    "--no-reports", is_flag=True, help="Leave report.html and report.pdf out; the same command without this draws them."
+)
 @click.option("--json", "as_json", is_flag=True, help="Results as JSON on stdout.")
 @language_option
 @settings_options

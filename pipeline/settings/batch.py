@@ -33,7 +33,7 @@ class BatchSettings(BaseModel):
     reports: bool = Field(
         True,
         description="draw report.html and report.pdf of every specimen, over half of its time on three photos; "
-        "without, `cablebend report` draws them later",
+        "without, the same run with them draws what is missing and measures nothing again",
     )
     memory_per_worker_gb: float = Field(
         0.0, ge=0, description="GB after which a worker is stopped and its specimen reported; 0: memory / workers"
