@@ -189,7 +189,7 @@ class SegmentationSettings(StageSettings):
         0.4, gt=0, lt=1, description="share of the median contrast from which a section counts as seen"
     )
     corridor_widths: float = Field(
-        3.0, gt=2, description="widths; half corridor kept at full resolution: flanks and ramps"
+        2.25, gt=2, description="widths; half corridor kept at full resolution: noise is read up to 1.6 widths away"
     )
     max_blur_widths: float = Field(
         0.2, gt=0, description="widths; beyond it the spreads of both edges overlap in the middle"
@@ -261,6 +261,12 @@ class BearingSettings(StageSettings):
         0.004,
         gt=0,
         description="radii; a centre with a wider std is not sure: shadow or bevel took part of the rim",
+    )
+    certain_center_px: float = Field(
+        0.05,
+        gt=0,
+        description="px; a rim seen all round that tells its centre so well needs no rings: 0.01 mm at 5 px/mm, less"
+        " than the play of a bearing",
     )
     ring_range: tuple[float, float] = Field(
         (0.1, 0.96), description="radii; where dots, grooves and bevels lie: below is a punch mark, above the rim"

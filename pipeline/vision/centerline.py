@@ -22,7 +22,7 @@ from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_curve import CurveSettings
 from pipeline.vision.chord import ChordFrame, chord_frame
-from pipeline.vision.curvature import CurveFit
+from pipeline.vision.curve_fit import CurveFit
 from pipeline.vision.midline import Sections
 from pipeline.vision.path import fit_along, follow
 from pipeline.vision.plane import PlaneMap
@@ -162,12 +162,12 @@ def _assemble(
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, light_std, light_length)
     covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
-    length_std = _length_std(fit, s, covariance)
+    where, theta = fit.curve.at(s)
+    normal, turn, bend = fit.curve.bases(s)
+    length_std = _length_std(fit, s, normal, covariance)
     # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
     covariance[0, 0] += chord.axis_std**2
     covariance[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
-    where, theta = fit.curve.at(s)
-    normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
     gap = float(np.median(np.diff(fit.s)))
     shape = MeasuredShape(
@@ -292,12 +292,12 @@ def _width_excess(fit: CurveFit, off_width: Array, covariance: Array, options: C
     """
     used = fit.weight > 0.0
     half, s = 0.5 * off_width[used], fit.s[used]
-    bend = fit.curve.bases(s)[2]
+    bend = fit.curve.curvature_basis(s)
     ratio = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half) / _std(bend, covariance)) ** 2)))
     return ratio if ratio > options.width_excess else 1.0
 
 
-def _length_std(fit: CurveFit, s: Array, covariance: Array) -> float:
+def _length_std(fit: CurveFit, s: Array, normal: Array, covariance: Array) -> float:
     """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
-    row = np.trapezoid(fit.curve.curvature(s)[:, None] * fit.curve.normal_basis(s), s, axis=0)
+    row = np.trapezoid(fit.curve.curvature(s)[:, None] * normal, s, axis=0)
     return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

@@ -61,7 +61,10 @@ def take_closeup(
     for left, top in _tiles(path_px - low, margin, (grey.shape[1], grey.shape[0])):
         rows, columns = slice(top, top + _TILE), slice(left, left + _TILE)
         part = window[rows, columns]
-        grey[rows, columns] = part * scaled[0] if part.ndim == 2 else part.astype(np.float32) @ scaled
+        if part.ndim == 2:
+            np.multiply(part, scaled[0], out=grey[rows, columns])
+        else:
+            grey[rows, columns] = part.astype(np.float32) @ scaled
     local = path_px - low
     spreads, angles = _edge_spreads(grey, local, width_px)
     seen = spreads[np.isfinite(spreads)]
@@ -88,14 +91,13 @@ def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
     _, normal = path_normals(path)
     step = max(1, len(path) // 500)  # eight thousand pixels tell a standard deviation to one percent
     path, normal = path[::step], normal[::step]
-    values = []
-    for offset in np.linspace(0.9, 1.6, 8) * width:
-        for side in (-offset, offset):
-            spot = np.rint(path + side * normal).astype(int)
-            inside = (spot >= 1).all(axis=1) & (spot < np.array(grey.shape[::-1]) - 1).all(axis=1)
-            u, v = spot[inside].T
-            values.append(grey[v, u - 1] - 2.0 * grey[v, u] + grey[v, u + 1])
-    differences = np.concatenate(values)
+    beside = np.linspace(0.9, 1.6, 8) * width
+    offsets = np.concatenate([-beside, beside])[:, None, None]
+    u, v = np.rint(path + offsets * normal).astype(int).reshape(-1, 2).T
+    inside = (u >= 1) & (v >= 1) & (u < grey.shape[1] - 1) & (v < grey.shape[0] - 1)
+    at = v[inside] * grey.shape[1] + u[inside]
+    before, here, after = (grey.ravel()[at + k] for k in (-1, 0, 1))
+    differences = before - 2.0 * here + after
     # 1 + 4 + 1 = 6 pixel variances in each difference
     return _MAD_TO_STD * float(np.median(np.abs(differences))) / np.sqrt(6.0) if len(differences) else 0.0
 
@@ -139,19 +141,23 @@ def _motion(spreads: Array, angles: Array) -> float:
     return float(np.sqrt(24.0 * np.hypot(fitted[1], fitted[2]))) if smooth.min() < 0.5 * smooth.max() else 0.0
 
 
-def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> list[float]:
+def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> Array:
     """Spread of one edge on each group of sections; NaN where the profile is flat."""
     spacing = float(offsets[1] - offsets[0])
     plateau = max(2, len(offsets) // 6)
     step = profile[:, -plateau:].mean(axis=1) - profile[:, :plateau].mean(axis=1)
     level = 0.5 * (profile[:, -plateau:].mean(axis=1) + profile[:, :plateau].mean(axis=1))
     above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
-    crossing = offsets[np.argmax(above, axis=1)]
-    spreads = []
-    for group in np.array_split(np.arange(len(profile)), _GROUPS):
-        # Lined up at their own crossings, so a path half a pixel off does not count as blur.
-        lined = np.mean([np.interp(offsets + crossing[i], offsets, profile[i]) for i in group], axis=0)
-        slope = np.abs(np.gradient(lined, spacing)[plateau:-plateau]).max(initial=0.0)
-        height = float(abs(np.mean(step[group])))
-        spreads.append(height / (np.sqrt(2.0 * np.pi) * slope) if slope > 0.0 else np.nan)
-    return spreads
+    crossing = np.argmax(above, axis=1)
+    # Lined up at their own crossings, so a path half a pixel off does not count as blur: each is moved by whole columns
+    # and all by the same fraction of one.
+    columns = np.arange(len(offsets)) + crossing[:, None] + float(offsets[0]) / spacing
+    low = np.floor(columns).astype(int)
+    share = (columns - low).astype(np.float32)
+    last = len(offsets) - 1
+    first, second = (np.take_along_axis(profile, np.clip(low + k, 0, last), axis=1) for k in (0, 1))
+    lined = (first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)).mean(axis=1)
+    rise = np.abs(lined[:, 2:] - lined[:, :-2])[:, plateau - 1 : 1 - plateau]
+    slope = rise.max(axis=1, initial=0.0) / (2.0 * spacing)
+    height = np.abs(step.reshape(_GROUPS, -1).mean(axis=1))
+    return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), np.nan))

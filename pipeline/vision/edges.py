@@ -44,23 +44,13 @@ def normals(angle: Array) -> Array:
     return np.column_stack([-np.sin(angle), np.cos(angle)])
 
 
-def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Array:
+def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Float32:
     """Grey values ``(n, m)`` at sections ``s`` and offsets ``t``, bilinear; NaN outside the picture."""
     where, angle = curve.at(s)
     across = normals(angle)
-    u = where[:, :1] - ground.origin_px[0] + across[:, :1] * t
-    v = where[:, 1:] - ground.origin_px[1] + across[:, 1:] * t
-    return np.asarray(
-        cv2.remap(
-            ground.grey,
-            u.astype(np.float32),
-            v.astype(np.float32),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=float("nan"),
-        ),
-        dtype=np.float64,
-    )
+    from_corner = (where - ground.origin_px).astype(np.float32)
+    u, v = (from_corner[:, k, None] + np.outer(across[:, k], t).astype(np.float32) for k in (0, 1))
+    return cv2.remap(ground.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"))
 
 
 def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:

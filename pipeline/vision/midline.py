@@ -113,9 +113,9 @@ def measure_sections(
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(np.median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings)
     thin = half_width < settings.small_radius_px
-    profiles = plain if thin and _serves(plain, shaded, half_width, diameter, settings) else shaded
+    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings, thin=thin)
+    profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter, settings) else shaded
     edges = fit_edges(pixels, s, profiles, settings=settings)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)

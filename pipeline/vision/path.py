@@ -6,7 +6,8 @@ import numpy as np
 
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import CurveFit, PlaneCurve, fit_curve, follow_points, initial_curve, make_frame
+from pipeline.vision.curvature import PlaneCurve, make_frame
+from pipeline.vision.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.edges import Ground, in_picture, search_edges
 from pipeline.vision.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.rough import Bearing, RoughCable
@@ -56,7 +57,7 @@ def fit_along(
         )
 
     while intervals < most:  # long cables only
-        quick = fit(float(np.median(np.diff(s))), 1)
+        quick = fit(float(np.median(np.diff(s))), 2)
         if quick.smooth.freedom < settings.crowded_share * quick.curve.frame.size:
             break
         intervals = min(2 * intervals, most)
@@ -87,7 +88,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
     intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
-    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order)
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
     span = _span(path, (float(along[first]), float(along[last])), covers, half_width, settings)
     if span is None:

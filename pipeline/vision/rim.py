@@ -80,7 +80,7 @@ def fit_circle(
         parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
     reach = max(3.0, settings.near_radii * radius)
     for beside in (False, True):
-        slopes = _radial_slopes(photo, parameters, ray, reach, softness, settings.pooled_rays)
+        slopes = _radial_slopes(photo, parameters, ray, reach, softness, settings.pooled_rays, one_sign=on_cover)
         edge, trust = _radial_edges(slopes, reach, softness, settings)
         if beside and not on_cover:
             edge = _without_light(slopes, edge, settings)
@@ -116,43 +116,79 @@ def fit_circle(
 
 @dataclass(frozen=True)
 class _Slopes:
-    """Slope along rays: ``along`` (rays, places) with the sign of the edge positive, ``strength`` without a sign.
+    """Slope along rays: ``along`` (rays, places) with the sign of the edge positive, ``strength`` of what is sought.
 
-    ``offsets`` (places,) px from the circle the rays started at; ``seen`` False where a ray leaves the picture.
+    ``offsets`` (places,) px from the circle the rays started at; ``texture`` is the usual slope where no edge is
+    sought; ``seen`` False where a ray leaves the picture.
     """
 
     offsets: Array
-    along: Array
-    strength: Array
+    along: NDArray[np.float32]
+    strength: NDArray[np.float32]
+    texture: float
     seen: NDArray[np.bool_]
 
 
 def _radial_slopes(
-    photo: Photo, parameters: Array, ray: Array, span: float, softness: float, pooled_rays: float
+    photo: Photo,
+    parameters: Array,
+    ray: Array,
+    span: float,
+    softness: float,
+    pooled_rays: float,
+    *,
+    one_sign: bool = False,
 ) -> _Slopes:
+    """Slopes about a circle; with ``one_sign`` only edges of the sign that prevails on the circle are sought.
+
+    A thin line turned on a cover has two edges, of opposite signs: without the sign each ray would take either.
+    """
     # The outer halves of the rays tell what is no edge: sheen, texture and noise.
     calm = span + 4.0 * (softness - 1.0)  # a soft edge reaches beyond the range in which it is sought
     offsets = np.arange(-calm - span, calm + span + 0.25, 0.5)
-    points = parameters[:2] + (parameters[2] + offsets)[None, :, None] * ray[:, None, :]
-    low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 2, 0)
-    high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 3, photo.size)
+    distance = parameters[2] + offsets
+    reach = float(np.abs(distance[[0, -1]]).max())
+    low = np.maximum(np.floor(parameters[:2] - reach).astype(int) - 2, 0)
+    high = np.minimum(np.ceil(parameters[:2] + reach).astype(int) + 3, photo.size)
     if (high - low < 4).any():
-        nothing = np.zeros((len(ray), len(offsets)))
-        return _Slopes(offsets, nothing, nothing, np.zeros(len(ray), bool))
-    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
-    u, v = (points[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
+        nothing = np.zeros((len(ray), len(offsets)), np.float32)
+        return _Slopes(offsets, nothing, nothing, 0.0, np.zeros(len(ray), bool))
+    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32)
+    part *= np.float32(1.0 / photo.full_scale)
+    u, v = (np.outer(ray[:, k], distance).astype(np.float32) + np.float32(parameters[k] - low[k]) for k in (0, 1))
     profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
-    # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
-    pooled = gaussian_filter1d(profile, pooled_rays * softness, axis=0, mode="wrap")
-    slope = gaussian_filter1d(np.gradient(pooled, 0.5, axis=1), 2.0 * softness, axis=1)
-    strength = np.sqrt((slope**2).sum(axis=2))
+    slope = _smoothed_slope(profile, pooled_rays * softness, 2.0 * softness)
+    norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
     outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
-    steepest = np.argmax(np.where(inner, strength, 0.0), axis=1)
-    colour = slope[np.arange(len(ray)), steepest]
-    colour /= np.hypot.reduce(colour, axis=1)[:, None] + 1e-12
-    along = np.einsum("ijc,ic->ij", slope, colour)
-    return _Slopes(offsets, along, strength, ~(outside & inner).any(axis=1))
+    if one_sign:
+        colour = np.broadcast_to(slope[:, np.abs(offsets) < 0.75].mean(axis=(0, 1)), (len(ray), slope.shape[2]))
+    else:
+        colour = slope[np.arange(len(ray)), np.argmax(np.where(inner, norm, np.float32(0.0)), axis=1)]
+    colour = colour / (np.sqrt((colour**2).sum(axis=1, keepdims=True)) + np.float32(1e-12))
+    along = (slope * colour[:, None, :]).sum(axis=2)
+    return _Slopes(
+        offsets=offsets,
+        along=along,
+        strength=np.maximum(along, 0.0) if one_sign else norm,
+        texture=float(np.median(norm[:, np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span])),
+        seen=~(outside & inner).any(axis=1),
+    )
+
+
+def _smoothed_slope(profile: NDArray[np.float32], across: float, along: float) -> NDArray[np.float32]:
+    """Slope per px along rays ``(rays, places, colours)`` half a px apart, smoothed over rays and places.
+
+    Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is. ``across`` and
+    ``along`` are standard deviations in rays and places.
+    """
+    slope = np.empty_like(profile)
+    slope[:, 1:-1] = profile[:, 2:] - profile[:, :-2]
+    slope[:, 0], slope[:, -1] = 2.0 * (profile[:, 1] - profile[:, 0]), 2.0 * (profile[:, -1] - profile[:, -2])
+    over, beside = (cv2.getGaussianKernel(2 * int(4.0 * std + 0.5) + 1, std, cv2.CV_32F) for std in (across, along))
+    wrap = len(over) // 2
+    around = np.concatenate([slope[-wrap:], slope, slope[:wrap]])
+    return cv2.sepFilter2D(around, -1, beside, over, borderType=cv2.BORDER_REFLECT)[wrap:-wrap].reshape(profile.shape)
 
 
 def _best_shift(
@@ -171,15 +207,15 @@ def _best_shift(
     usual = float(peak[len(peak) // 2]) + 1e-12
     # Blurred to the step of the search; no direction counts more than the median one.
     level = gaussian_filter1d(np.minimum(slopes.strength / usual, 1.0), step, axis=1) * slopes.seen[:, None]
+    level, ray = level[::2], ray[::2]  # pooled with its neighbours, every second ray tells what all do
     shifts = np.arange(-12, 13) * step
     wider = np.clip(np.arange(-2, 3) * expected.std * expected.px, -0.5 * span, 0.5 * span)
     # The outer halves of the rays hold every shift.
     aside = (shifts[:, None, None] * ray[:, 0] + shifts[None, :, None] * ray[:, 1]).reshape(-1, len(ray))
-    first = slopes.offsets[0] - 0.25  # half a place before it: whole numbers are rounded by cutting
+    places = np.rint(2.0 * (aside - slopes.offsets[0])).astype(np.intp) + level.shape[1] * np.arange(len(ray))
     best, found = -1.0, parameters
     for k, more in enumerate(wider):
-        places = (2.0 * (aside + (more - first))).astype(np.intp) + level.shape[1] * np.arange(len(ray))
-        score = level.ravel()[places].mean(axis=1) * (1.0 - 0.03 * abs(k - 2))
+        score = level.ravel()[places + round(2.0 * float(more))].mean(axis=1) * (1.0 - 0.03 * abs(k - 2))
         place = int(np.argmax(score))
         if score[place] > best:
             i, j = divmod(place, len(shifts))
@@ -200,8 +236,7 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: Beari
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(strength)), place]
-    calm = np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span
-    found = slopes.seen & (peak > settings.rim_over_texture * float(np.median(strength[:, calm])))
+    found = slopes.seen & (peak > settings.rim_over_texture * slopes.texture)
     usual = float(np.percentile(peak[found], 75)) if found.any() else 1.0
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
@@ -245,19 +280,23 @@ def _robust_circle(
     found = np.isfinite(edge)
     if found.sum() < 12:
         return None
-    points = parameters[:2] + (parameters[2] + edge[found])[:, None] * ray[found]
-    fit, scale = parameters.copy(), 0.5 * span
+    u, v = (parameters[:2] + (parameters[2] + edge[found])[:, None] * ray[found]).T
+    fit, scale, sure = parameters.copy(), 0.5 * span, trust[found]
+    design = np.ones((3, len(u)))
+    middle = ((len(u) - 1) // 2, len(u) // 2)
     for step in range(25):
-        arm = points - fit[:2]
-        distance = np.hypot(*arm.T)
+        du, dv = u - fit[0], v - fit[1]
+        distance = np.sqrt(du * du + dv * dv)
         residual = distance - fit[2]
-        tukey = trust[found] * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
-        design = np.column_stack([arm / distance[:, None], np.ones(len(points))])
-        normal = design.T @ (tukey[:, None] * design)
+        tukey = sure * np.maximum(1.0 - (residual / (4.685 * scale)) ** 2, 0.0) ** 2
+        design[0], design[1] = du / distance, dv / distance
+        weighted = design * tukey
+        normal = weighted @ design.T
+        total = float(normal[2, 2])
         # A whole rim has the determinant W^3 / 4 (W the sum of weights), an eighth of it a thousandth of that.
-        if np.linalg.det(normal) < 2.5e-4 * tukey.sum() ** 3 or not tukey.any():
+        if total <= 0.0 or _determinant(normal) < 2.5e-4 * total**3:
             return None
-        gradient = design.T @ (tukey * residual)
+        gradient = weighted @ residual
         prior = (scale / (expected.std * expected.px)) ** 2
         normal[2, 2] += prior
         gradient[2] += prior * (expected.px - fit[2])
@@ -266,7 +305,9 @@ def _robust_circle(
         # The scale may fall by a third a step: a robust fit that trusts its first guess too early keeps its error.
         floor = 0.67 * scale if step < 6 else 0.03
         settled = np.abs(change).max() < 1e-3 and step >= 6
-        scale = max(_MAD_TO_STD * float(np.median(np.abs(residual))), floor)
+        # half of few numbers: sorting them is quicker than any function that looks for a median
+        ordered = np.sort(np.abs(residual))
+        scale = max(_MAD_TO_STD * 0.5 * float(ordered[middle[0]] + ordered[middle[1]]), floor)
         if settled:
             break
     spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))
@@ -274,8 +315,14 @@ def _robust_circle(
     # Neighbouring directions share noise and texture: an autoregression of lag one inflates the variance so much.
     inflation = (1.0 + np.clip(lag, 0.0, 0.95)) / (1.0 - np.clip(lag, 0.0, 0.95))
     covariance = np.linalg.inv(normal) * spread**2 * inflation
-    covariance += _unevenness(arm / distance[:, None], residual, tukey) * np.eye(3)
+    covariance += _unevenness(design[:2], residual, tukey) * np.eye(3)
     return fit, covariance
+
+
+def _determinant(m: Array) -> float:
+    """Determinant of a symmetric 3 x 3 matrix; a library's takes as long as all else of a step."""
+    (a, b, c), (_, d, e), (_, _, f) = m.tolist()
+    return float(a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))
 
 
 def _unevenness(direction: Array, residual: Array, weight: Array) -> float:
@@ -284,7 +331,7 @@ def _unevenness(direction: Array, residual: Array, weight: Array) -> float:
     They move edges by smooth functions of the direction. The part once around passes for a shift of the centre; those
     two and three times around are seen, and are about as large.
     """
-    angle = np.arctan2(direction[:, 1], direction[:, 0])
+    angle = np.arctan2(direction[1], direction[0])
     waves = np.column_stack([wave(n * angle) for n in (2, 3) for wave in (np.cos, np.sin)])
     normal = waves.T @ (weight[:, None] * waves) + 0.05 * weight.sum() * np.eye(4)
     return float(np.mean(np.linalg.solve(normal, waves.T @ (weight * residual)) ** 2))

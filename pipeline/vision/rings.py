@@ -35,10 +35,12 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     Returns
     -------
     Circle
-        As it was where no ring is seen. A rim that is not seen all round, or lies elsewhere, yields to the rings; else
-        all are averaged by their variances, which are widened to what they differ.
+        As it was where no ring is seen, or the rim leaves no doubt. A rim that is not seen all round, or lies
+        elsewhere, yields to the rings; else all are averaged by their variances, which are widened to what they differ.
     """
     whole, center = rim.rim >= settings.sure_rim, np.array(rim.center)
+    if whole and rim.std < settings.certain_center_px:
+        return rim
     if not (whole and rim.std < settings.sure_center_radii * expected.px):
         center = _roundest(photo, center, expected.px, settings)
     rings = _rings(photo, center, expected.px, settings)
@@ -68,28 +70,31 @@ def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSetti
         step = reach / 4.0 / 4.0**finer
         grid = np.arange(-4 if finer == 0 else -3, 5 if finer == 0 else 4) * step
         places = center + np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-        slopes = [_slope(photo, place, radius, radius / 40.0) for place in places]
-        center = places[int(np.argmax([float((slope**2).sum()) for slope in slopes]))]
+        slopes = _slopes(photo, places, radius, radius / 40.0)
+        center = places[int(np.argmax((slopes**2).sum(axis=(1, 2))))]
     return np.asarray(center)
 
 
-def _slope(photo: Photo, center: Array, radius: float, step: float) -> Array:
-    """Slope ``(m, c)`` of the mean grey value on circles about a centre, on radii ``step`` px apart."""
+def _slopes(photo: Photo, centers: Array, radius: float, step: float) -> Array:
+    """Slope ``(k, m, c)`` of the mean grey value on circles about each of ``centers``, on radii ``step`` px apart."""
     angle = np.arange(64) * (np.pi / 32.0)
     distance = np.arange(0.06 * radius, 1.06 * radius, step)
-    places = center + distance[None, :, None] * np.column_stack([np.cos(angle), np.sin(angle)])[:, None, :]
-    low = np.maximum(np.floor(center - 1.1 * radius).astype(int) - 1, 0)
-    high = np.minimum(np.ceil(center + 1.1 * radius).astype(int) + 2, photo.size)
+    low = np.maximum(np.floor(centers.min(axis=0) - 1.1 * radius).astype(int) - 1, 0)
+    high = np.minimum(np.ceil(centers.max(axis=0) + 1.1 * radius).astype(int) + 2, photo.size)
     part = photo.pixels[low[1] : high[1], low[0] : high[0]]
-    u, v = (places[..., axis].astype(np.float32) - np.float32(low[axis]) for axis in (0, 1))
+    # all centres in one picture: a row for each ray of each
+    u, v = (
+        (np.outer(turn, distance) + (centers[:, k, None, None] - low[k])).astype(np.float32).reshape(-1, len(distance))
+        for k, turn in enumerate((np.cos(angle), np.sin(angle)))
+    )
     values = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    mean = values.reshape(*u.shape, -1).mean(axis=0) / photo.full_scale
-    return np.asarray(np.diff(mean, axis=0) / step)
+    mean = values.reshape(len(centers), len(angle), len(distance), -1).mean(axis=1) / photo.full_scale
+    return np.asarray(np.diff(mean, axis=1) / step)
 
 
 def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> list[Circle]:
     """Circles seen nearly all round about ``center``, the rim itself not among them."""
-    slope = np.hypot.reduce(_slope(photo, center, radius, 1.0), axis=1)
+    slope = np.hypot.reduce(_slopes(photo, center[None], radius, 1.0)[0], axis=1)
     distance = 0.06 * radius + 0.5 + np.arange(len(slope))
     slope[(distance < settings.ring_range[0] * radius) | (distance > settings.ring_range[1] * radius)] = 0.0
     least = settings.rim_over_texture * float(np.median(slope[slope > 0.0])) if slope.any() else np.inf

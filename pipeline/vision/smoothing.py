@@ -4,9 +4,10 @@ Model: ``y = J q + e``, ``e`` Gaussian with standard deviations ``sigma std_i`` 
 ``D q ~ N(0, sigma^2 / mu)``. Unknown: q, sigma, mu, l. The exponential correlation is that of a Markov process, so
 errors are whitened exactly by differences of neighbours, in O(n).
 
-For one ``l`` the whitened problem is brought to diagonal form once (QR of the stacked ``[R; sqrt(mu_0) D]``, SVD of
-its upper block: the generalised singular values of the pair), after which every ``mu`` costs O(p). Squared normal
-equations, which lose half the digits, are never formed.
+For one ``l`` the whitened problem is brought to diagonal form once (QR of the stacked ``[R; sqrt(mu_0) D]``, the
+singular vectors of its upper block Q1: the generalised singular values of the pair), after which every ``mu`` costs
+O(p). Squared normal equations, which lose half the digits, are never formed; ``Q1' Q1`` is, for the columns of the
+whole are orthonormal, so that its eigenvalues keep an absolute error of one rounding.
 
 The restricted likelihood over ``log mu`` is kept whole: estimate and covariance are averaged over it, so that a weight
 that the data leave open widens the bands.
@@ -82,9 +83,10 @@ class _Diagonal:
     gamma2 : (p,)
         Share of the data in each coordinate; 1 - gamma2 is that of the penalty.
     projected : (p,)
-        Data in these coordinates.
-    back : (p, p)
-        Coordinates to q.
+        Data in these coordinates, times the root of their share.
+    triangle, turned : (p, p)
+        Coordinates to q; see `back`.
+    scale : (p,)
     total : float
         Squared length of the data.
     count, null : int
@@ -97,12 +99,19 @@ class _Diagonal:
 
     gamma2: Array
     projected: Array
-    back: Array
+    triangle: Array
+    turned: Array
+    scale: Array
     total: float
     count: int
     null: int
     noise_log_det: float
     least: float
+
+    @cached_property
+    def back(self) -> Array:
+        """Coordinates to q, ``(p, p)``."""
+        return np.asarray(solve_triangular(self.triangle, self.turned, check_finite=False) / self.scale[:, None])
 
     def shrinkage(self, weight: Array) -> Array:
         """Diagonal of the normal matrix at every weight, ``(w, p)``."""
@@ -118,7 +127,7 @@ class _Diagonal:
         share = self.shrinkage(weights)
         freedom = self.count - self.null
         # Without noise nothing is left but rounding, which must not become the logarithm of zero.
-        left = self.total - (self.gamma2 * self.projected**2 / share).sum(axis=1)
+        left = self.total - (self.projected**2 / share).sum(axis=1)
         sigma2 = np.maximum(left, 1e-20 * self.total) / freedom
         rank = len(self.gamma2) - self.null
         value = freedom * np.log(sigma2) + np.log(share).sum(axis=1) - rank * np.log(weights)
@@ -139,11 +148,14 @@ def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, 
     stacked[size:, size - penalty.shape[1] :] = penalty * gain
     length = np.linalg.norm(stacked, axis=0)
     q0, r0 = np.linalg.qr(stacked / length)
-    u, gamma, vt = np.linalg.svd(q0[:size])
+    upper = q0[:size]
+    gamma2, turned = np.linalg.eigh(upper.T @ upper)
     return _Diagonal(
-        gamma2=np.minimum(gamma, 1.0) ** 2,
-        projected=u.T @ data[:size],
-        back=solve_triangular(r0, vt.T, check_finite=False) / length[:, None],
+        gamma2=np.clip(gamma2, 0.0, 1.0),
+        projected=turned.T @ (upper.T @ data[:size]),
+        triangle=r0,
+        turned=turned,
+        scale=length,
         total=float(data @ data),
         count=len(whitened),
         null=null,
@@ -181,6 +193,11 @@ class Problem:
     least: float = 0.0
 
     @cached_property
+    def _known(self) -> dict[float, _Diagonal]:
+        """Diagonal forms by correlation length: the likeliest one is asked for again."""
+        return {}
+
+    @cached_property
     def gaps(self) -> Array:
         """Distances of neighbours, ``(n - 1,)``."""
         return np.diff(self.position)
@@ -201,7 +218,7 @@ class Problem:
         diagonal = self._diagonal(correlation_length)
         weights = diagonal.weights()
         best = weights[[int(np.argmin(diagonal.criterion(weights)[0]))]]
-        return np.asarray(diagonal.back @ (np.sqrt(diagonal.gamma2) * diagonal.projected / diagonal.shrinkage(best)[0]))
+        return np.asarray(diagonal.back @ (diagonal.projected / diagonal.shrinkage(best)[0]))
 
     def smooth(self, correlation_length: float, *, bias_share: float = 1.0) -> Smooth:
         """Estimate, covariance and gain, averaged over the likelihood of the weight.
@@ -215,7 +232,7 @@ class Problem:
         odds = np.exp(-0.5 * (value - value.min()))
         odds /= odds.sum()
         share = diagonal.shrinkage(weights)
-        each = np.sqrt(diagonal.gamma2) * diagonal.projected / share
+        each = diagonal.projected / share
         mean = odds @ each
         spread = np.sqrt(odds)[:, None] * (each - mean)
         noise = diagonal.gamma2 / share**2
@@ -234,9 +251,12 @@ class Problem:
         )
 
     def _diagonal(self, length: float) -> _Diagonal:
-        rho = _correlations(self.gaps, length)
-        columns = whiten(np.column_stack([self.design, self.data]), self.std, self.gaps, length)
-        return _diagonal(columns, self.penalty, self.null, float(np.log1p(-(rho**2)).sum()), self.least)
+        if length not in self._known:
+            rho = _correlations(self.gaps, length)
+            columns = whiten(np.column_stack([self.design, self.data]), self.std, self.gaps, length)
+            determinant = float(np.log1p(-(rho**2)).sum())
+            self._known[length] = _diagonal(columns, self.penalty, self.null, determinant, self.least)
+        return self._known[length]
 
 
 def _unwhiten(gain: Array, std: Array, gaps: Array, length: float) -> Array:

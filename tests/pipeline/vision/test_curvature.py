@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.special import fresnel
 
-from pipeline.vision.curvature import CurveFit, PlaneCurve, fit_curve, initial_curve, make_frame
+from pipeline.vision.curvature import PlaneCurve, make_frame
+from pipeline.vision.curve_fit import CurveFit, fit_curve, initial_curve
 
 LENGTH = 0.2
 

@@ -1,0 +1,222 @@
+"""Curve through points along a cable: a penalised spline of the curvature, with joint covariance.
+
+The spline covers the whole range, the parts without points included: there the curve is continued by the penalty, with
+the uncertainty that follows from it. Gauss-Newton on the distances along the normal; each linear step is a penalised
+least-squares problem, whitened for errors with correlation ``exp(-ds/l)`` and solved by QR of the stacked
+``[R; sqrt(mu) D]`` (`pipeline.vision.smoothing`). The penalty ``int (d^k kappa / ds^k)^2 ds`` has its weight, and the
+noise its correlation length, by restricted maximum likelihood; what is left open about the weight goes into the
+covariance.
+
+Never is ``kappa`` or its slope forced at the ends: moment-free ends carry ``kappa = K0`` with a finite slope.
+``s`` along the curve, lengths in any one unit, axes those of the points.
+
+Source: O'Sullivan (1986) for the penalty; Patterson and Thompson (1971) and Wahba (1983) for REML and the posterior
+covariance; the reasons for a spline of the curvature are measured in the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.vision.curvature import Frame, PlaneCurve
+from pipeline.vision.smoothing import Problem, Smooth
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A curve fitted to points, with what is known of its errors.
+
+    Attributes
+    ----------
+    curve : PlaneCurve
+    smooth : Smooth
+        Covariance of q and gain on the points' normal displacements.
+    points : (n, 2)
+    std : (n,)
+        As given; the errors are ``smooth.sigma`` times that.
+    s : (n,)
+        Feet of the points.
+    residual : (n,)
+        Distances of the points along the normal, positive to the left of the curve.
+    weight : (n,)
+        Robust weight of each point; 1 for all that agree with their neighbours.
+    """
+
+    curve: PlaneCurve
+    smooth: Smooth
+    points: Array
+    std: Array
+    s: Array
+    residual: Array
+    weight: Array
+
+
+def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
+    """Curve whose angle follows that of a polyline ``points`` ``(n, 2)`` at ``s``, smoothed firmly; a start only."""
+    step = np.diff(points, axis=0)
+    theta, middle = np.unwrap(np.arctan2(step[:, 1], step[:, 0])), 0.5 * (s[1:] + s[:-1])
+    # The nearest of the frame's own places: they lie closer than the points of any polyline that is a start.
+    nearest = np.rint(np.interp(middle, frame.grid, np.arange(len(frame.grid)))).astype(int)
+    turns = np.column_stack([np.ones(len(middle)), frame.integrals[nearest]])
+    weight = np.sqrt(np.hypot(*step.T))
+    penalty = np.column_stack([np.zeros(len(frame.penalty)), frame.penalty])
+    # A share of 1e-6 leaves wiggles longer than about a fifth of the range: the shape, not the noise of the polyline.
+    penalty *= 1e-3 * np.linalg.norm(turns * weight[:, None]) / np.linalg.norm(penalty)
+    weighted = turns * weight[:, None]
+    # Normal equations lose half the digits, which a start can spare.
+    solution = np.linalg.solve(weighted.T @ weighted + penalty.T @ penalty, weighted.T @ (theta * weight))
+    curve = PlaneCurve(frame, solution[1:], np.zeros(2), float(solution[0]))
+    return PlaneCurve(frame, solution[1:], np.mean(points - curve.at(s)[0], axis=0), float(solution[0]))
+
+
+def fit_curve(
+    points: Array,
+    std: Array,
+    *,
+    start: PlaneCurve,
+    s: Array,
+    order: int,
+    longest: float,
+    correlation_length: float | None = None,
+    iterations: int = 8,
+    bias_share: float = 0.5,
+) -> CurveFit:
+    """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
+
+    Parameters
+    ----------
+    start : PlaneCurve
+        First guess, as `initial_curve` gives; carries the knots.
+    s : (n,)
+        Guess of the points' arc lengths, ascending.
+    order : int
+        Order of the penalised derivative of the curvature, as in `make_frame`.
+    longest : length
+        Bound of the correlation length: longer errors cannot be told from the curve.
+    correlation_length : length, optional
+        Of the errors; sought if not given.
+    bias_share : float
+        Part of the penalty's bias that counts as uncertainty; see `pipeline.vision.smoothing.Problem.smooth`.
+        Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
+    """
+    found = _settle(
+        points,
+        std,
+        start,
+        s,
+        order=order,
+        longest=longest,
+        correlation_length=correlation_length,
+        iterations=iterations,
+    )
+    smooth = found.problem.smooth(found.length, bias_share=bias_share)
+    curve = found.before.moved(smooth.estimate - found.before.parameters)
+    s, residual = _step_to_foot(curve, points, curve.foot(points, found.s, steps=1))
+    return CurveFit(curve, smooth, points, std, s, residual, found.weight)
+
+
+def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int, iterations: int = 2) -> PlaneCurve:
+    """Smooth curve along points ``(n, 2)`` of equal errors, for the next search: a step or two, no covariance."""
+    spacing = float(np.median(np.diff(s)))
+    return _settle(
+        points,
+        np.ones(len(points)),
+        start,
+        s,
+        order=order,
+        longest=spacing,
+        correlation_length=spacing,
+        iterations=iterations,
+    ).curve
+
+
+class _Settled(NamedTuple):
+    """Curve after the last step, and before it the curve with its problem, feet, weights and correlation length."""
+
+    curve: PlaneCurve
+    before: PlaneCurve
+    problem: Problem
+    s: Array
+    weight: Array
+    length: float
+
+
+def _settle(
+    points: Array,
+    std: Array,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    order: int,
+    longest: float,
+    correlation_length: float | None,
+    iterations: int,
+) -> _Settled:
+    """Gauss-Newton with robust weights, ``iterations`` steps at most."""
+    weight = np.ones(len(points))
+    # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
+    length = float(np.median(np.diff(s))) if correlation_length is None else correlation_length
+    for iteration in range(iterations):
+        s, residual = _step_to_foot(curve, points, s)
+        spread = max(1.4826 * float(np.median(np.abs(residual / std))), 1e-12)
+        if iteration:
+            weight = _biweight(residual / std, spread)
+        problem = _linear(curve, s, residual, std, weight, order)
+        if iteration == 1 and correlation_length is None:
+            length = problem.correlation_length(longest)
+        step = problem.estimate(length) - curve.parameters
+        found = _Settled(curve.moved(step), curve, problem, s, weight, length)
+        curve = found.curve
+        # A hundredth of a point's error: the curve's own is a tenth to a third of it.
+        if iteration > 1 and np.max(np.abs(problem.design @ step)) < 0.01 * spread * np.median(std):
+            break
+    return found
+
+
+def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array, order: int) -> Problem:
+    """Distances along the normal, linear in q; points without weight left out."""
+    used = weight > 0.0
+    normal = curve.normal_basis(s[used])
+    return Problem(
+        design=normal,
+        data=residual[used] + normal[:, 2:] @ curve.coefficients,
+        penalty=curve.frame.penalty,
+        null=2 + order,
+        std=std[used] / np.sqrt(weight[used]),
+        position=s[used],
+        least=_bow_roughness(curve, order),
+    )
+
+
+def _bow_roughness(curve: PlaneCurve, order: int) -> float:
+    """``int (d^k kappa / ds^k)^2 ds`` of a half wave from end to end whose curvature varies as much as the curve's.
+
+    An elastica between two bearings obeys ``kappa'' = -(P / EI) kappa``: it is no parabola, however little of the rest
+    the photo shows. A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
+    """
+    knots = curve.frame.knots
+    length = float(knots[-1] - knots[0])
+    amplitude2 = float(np.var(curve.frame.values @ curve.coefficients)) / (0.5 - 4.0 / np.pi**2)
+    return amplitude2 * 0.5 * length * float((np.pi / length) ** (2 * order))
+
+
+def _step_to_foot(curve: PlaneCurve, points: Array, s: Array) -> tuple[Array, Array]:
+    """Feet of points near ``s``, and the distances along the normal.
+
+    One evaluation serves both: a foot missed by ds changes the distance by ``kappa ds^2 / 2``, nothing for a point near
+    the curve.
+    """
+    where, angle = curve.at(s)
+    cos, sin = np.cos(angle), np.sin(angle)
+    du, dv = points[:, 0] - where[:, 0], points[:, 1] - where[:, 1]
+    return s + cos * du + sin * dv, cos * dv - sin * du
+
+
+def _biweight(residual: Array, spread: float) -> Array:
+    """Weights: 1 up to four spreads, which Gaussian errors pass once in 16,000, falling to 0 at six."""
+    beyond = np.clip((np.abs(residual) / spread - 4.0) / 2.0, 0.0, 1.0)
+    return np.asarray((1.0 - beyond**2) ** 2)
