@@ -11,7 +11,7 @@ LONGEST_FILE = 400
 
 # From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
 ROD = [
-    ("measurement", "spline"),
+    ("measurement", "measured_law", "spline"),
     ("characteristic",),
     ("laws", "elastica", "section", "support"),
     ("discretisation",),
@@ -58,6 +58,7 @@ PIPELINE = [
     ("simulate",),
     ("identify",),
     ("diagnosis",),
+    ("identified_model",),
     ("predict", "compare"),
     ("report",),
     ("assembly",),

@@ -26,32 +26,13 @@ from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
 from rod.inverse.law_prior import forms
+from rod.measured_law import MeasuredLaw, Source
 from rod.measurement import MeasuredTest
 
-Source = tuple[str, int]
 
-
-@dataclass(frozen=True)
-class Characterised:
-    """What a way hands to the comparison: log f on a grid with covariance, gains and shortfall, and K0."""
-
-    curve: LogCurve
-    gains: dict[Source, Array]
-    shortfall: Array
-    pre_curvature: float
-    pre_curvature_std: float
-
-    @staticmethod
-    def of_inverse(way: Estimate) -> Characterised:
-        """Of the inverse problem."""
-        curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(curve, way.gains, way.shortfall, way.pre_curvature, way.pre_curvature_std)
-
-    @staticmethod
-    def of_balance(way: BalanceGraph) -> Characterised:
-        """Of the balance equations."""
-        curve = LogCurve(way.kappa, way.tangent, way.log_covariance)
-        return Characterised(curve, way.gains, way.shortfall, way.pre_curvature, way.pre_curvature_std)
+def log_curve(law: MeasuredLaw) -> LogCurve:
+    """What the comparison of two curves needs of a measured law."""
+    return LogCurve(law.kappa, law.tangent, law.log_covariance)
 
 
 @dataclass(frozen=True)
@@ -83,15 +64,18 @@ class Agreement:
 
 def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
     """Compare both ways; None if they visited no common curvature."""
-    one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
-    grid = one.curve.common_grid(two.curve)
-    if grid is None or inverse.model is None:
+    one, two = inverse.law, graph.law
+    if one is None or two is None or inverse.model is None:
         return None
-    ratio = one.curve.log_on(grid) - two.curve.log_on(grid)
+    first, second = log_curve(one), log_curve(two)
+    grid = first.common_grid(second)
+    if grid is None:
+        return None
+    ratio = first.log_on(grid) - second.log_on(grid)
     knots, law = inverse.model.knots, inverse.law_covariance
-    laws = forms(knots, law, one.curve.kappa), forms(knots, law, two.curve.kappa)
+    laws = forms(knots, law, one.kappa), forms(knots, law, two.kappa)
     covariance = difference_covariance(test, one, two, laws, grid)
-    p = p_value(parts_difference(one.curve, two.curve, grid), covariance)
+    p = p_value(parts_difference(first, second, grid), covariance)
     return Agreement(
         range_per_m=(float(grid[0]), float(grid[-1])),
         rms_relative=float(np.sqrt(np.mean(ratio**2))),
@@ -99,18 +83,18 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
         p_value=p,
         compatible=p >= level,
         level=level,
-        hints=() if p >= level else difference_hints(test, inverse, graph),
+        hints=() if p >= level else difference_hints(test, one, two, graph.checks.get("left_right_z", 0.0)),
     )
 
 
 def difference_covariance(
-    test: MeasuredTest, one: Characterised, two: Characterised, laws: tuple[Array, Array], grid: Array
+    test: MeasuredTest, one: MeasuredLaw, two: MeasuredLaw, laws: tuple[Array, Array], grid: Array
 ) -> Array:
     """Covariance of the difference of two ways, mean over each part of the grid, (parts, parts); see the module.
 
     `laws` are those sent through both, each on the way's own grid, (n, p).
     """
-    first, second = one.curve.contraction(grid), two.curve.contraction(grid)
+    first, second = log_curve(one).contraction(grid), log_curve(two).contraction(grid)
     short = first @ one.shortfall @ laws[0] - second @ two.shortfall @ laws[1]
     total: Array = short @ short.T
     for source in one.gains | two.gains:
@@ -152,20 +136,24 @@ def rest_curvature(test: MeasuredTest) -> tuple[float, float] | None:
     return mean, float(np.hypot(1.0 / np.sqrt(sum(weights)), test.scale_std * mean))
 
 
-def difference_hints(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph) -> tuple[str, ...]:
-    """First candidates for a difference of the two ways, each with the size it would have."""
-    one, two = Characterised.of_inverse(inverse), Characterised.of_balance(graph)
-    grid = one.curve.common_grid(two.curve)
+def difference_hints(
+    test: MeasuredTest, inverse: MeasuredLaw, balance: MeasuredLaw, halves_z: float
+) -> tuple[str, ...]:
+    """First candidates for a difference of the two ways, each with the size it would have.
+
+    `halves_z` is the difference of the cable's halves in the balance equations, in standard deviations.
+    """
+    first, second = log_curve(inverse), log_curve(balance)
+    grid = first.common_grid(second)
     if grid is None:
         return ()
     reading = np.interp(grid, inverse.kappa, inverse.secant / inverse.tangent) - 1.0
-    stretch = one.curve.onto(grid) @ one.gains["scale", -1] - two.curve.onto(grid) @ two.gains["scale", -1]
+    stretch = first.onto(grid) @ inverse.gains["scale", -1] - second.onto(grid) @ balance.gains["scale", -1]
     hints = [
         f"reading one curve as a secant and the other as a tangent would make {np.abs(reading).max():.0%}",
         f"a scale wrong by 1 % would make {0.01 / test.scale_std * np.abs(stretch).max():.1%}",
+        f"a pre-curvature that varies along the cable: the halves differ by {abs(halves_z):.1f} standard deviations",
     ]
-    z = graph.checks.get("left_right_z", 0.0)
-    hints.append(f"a pre-curvature that varies along the cable: the halves differ by {abs(z):.1f} standard deviations")
     zeros = [s.chord + s.displacement for s in test.steps if s.chord is not None and s.displacement is not None]
     if len(zeros) > 1:
         spread = max(zeros) - min(zeros)

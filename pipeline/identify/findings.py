@@ -117,10 +117,9 @@ def _pre_curvature(found: Identification, settings: IdentifySettings) -> Iterato
 def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float]]:
     """K0 and its std by independent sources, 1/m: force-free photo, balance and inverse without that photo."""
     sources = {} if found.rest is None else {"photo": found.rest}
-    ways = (("balance", found.balance), ("inverse", found.inverse))
-    for name, way in ways:
-        if np.isfinite(way.loaded_pre_curvature) and np.isfinite(way.loaded_pre_curvature_std):
-            sources[name] = (way.loaded_pre_curvature, way.loaded_pre_curvature_std)
+    for name, law in (("balance", found.balance.law), ("inverse", found.inverse.law)):
+        if law is not None and np.isfinite(law.loaded_pre_curvature) and np.isfinite(law.loaded_pre_curvature_std):
+            sources[name] = (law.loaded_pre_curvature, law.loaded_pre_curvature_std)
     return sources
 
 
@@ -156,8 +155,9 @@ def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Findi
 
 
 def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+    laws = [branch.law for branch in found.branches.values() if branch.law is not None]
     if found.branches_p is not None and found.branches_p < settings.branch_level:
-        one, two = found.branches["loading"], found.branches["unloading"]
+        one, two = laws  # loading, unloading
         yield Finding(
             "identify/branches",
             "warning",

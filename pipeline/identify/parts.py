@@ -64,21 +64,22 @@ def identification_parts(found: Identification) -> IdentificationParts:
 
 def curve(way: Estimate | BalanceGraph) -> Curve | None:
     """Curve of a way on the visited range; None without one."""
-    if way.kappa.size == 0:
+    law = way.law
+    if law is None:
         return None
-    values, vectors = np.linalg.eigh(way.log_covariance)
+    values, vectors = np.linalg.eigh(law.log_covariance)
     # Directions below a millionth of the largest variance are rounding.
     keep = values > 1e-6 * values[-1]
-    factor = way.tangent[:, None] * vectors[:, keep] * np.sqrt(values[keep])
+    factor = law.tangent[:, None] * vectors[:, keep] * np.sqrt(values[keep])
     return Curve(
-        kappa_per_m=_list(way.kappa),
-        moment_Nm=_list(way.moment),
-        moment_std_Nm=_list(way.moment_std),
-        tangent_Nm2=_list(way.tangent),
-        tangent_std_Nm2=_list(way.tangent_std),
-        secant_Nm2=_list(way.secant),
-        secant_std_Nm2=_list(way.secant_std),
-        supported=[True] * way.kappa.size,
+        kappa_per_m=_list(law.kappa),
+        moment_Nm=_list(law.moment),
+        moment_std_Nm=_list(law.moment_std),
+        tangent_Nm2=_list(law.tangent),
+        tangent_std_Nm2=_list(law.tangent_std),
+        secant_Nm2=_list(law.secant),
+        secant_std_Nm2=_list(law.secant_std),
+        supported=[True] * law.kappa.size,
         tangent_factor_Nm2=[_list(row) for row in factor],
     )
 
@@ -86,8 +87,8 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
 def inverse_part(found: Identification) -> InversePart:
     """The inverse problem."""
     way = found.inverse
-    law, model = way.characteristic, way.model
-    if law is None or model is None:
+    spline, law, model = way.characteristic, way.law, way.model
+    if spline is None or law is None or model is None:
         return InversePart(
             outcome=way.outcome.name.lower(), advice=way.outcome.value, converged=False, iterations=way.iterations
         )
@@ -97,14 +98,14 @@ def inverse_part(found: Identification) -> InversePart:
         advice=way.outcome.value,
         converged=way.outcome in (InverseOutcome.CONVERGED, InverseOutcome.NOT_VISIBLE),
         iterations=way.iterations,
-        pre_curvature_per_m=way.pre_curvature,
-        pre_curvature_std_per_m=way.pre_curvature_std,
-        supported_per_m=(float(way.kappa[0]), float(way.kappa[-1])),
+        pre_curvature_per_m=law.pre_curvature,
+        pre_curvature_std_per_m=law.pre_curvature_std,
+        supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
         knots=[
             KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))
-            for k, f, std in zip(law.knots, law.ordinates, way.ordinates_std, strict=True)
+            for k, f, std in zip(spline.knots, spline.ordinates, way.ordinates_std, strict=True)
         ],
-        knots_chosen_by=_choice(way.evidence, len(law.knots)),
+        knots_chosen_by=_choice(way.evidence, len(spline.knots)),
         curve=curve(way),
         misfit=misfit_part(way),
         nuisance={
@@ -148,7 +149,8 @@ def misfit_part(way: Estimate) -> MisfitPart | None:
 
 def balance_part(way: BalanceGraph) -> BalancePart:
     """The balance equations."""
-    if not way.measured:
+    law = way.law
+    if law is None:
         return BalancePart(outcome=way.outcome.name.lower(), advice=way.outcome.value)
     pointwise = []
     for points in way.points:
@@ -161,9 +163,9 @@ def balance_part(way: BalanceGraph) -> BalancePart:
     return BalancePart(
         outcome=way.outcome.name.lower(),
         advice=way.outcome.value,
-        pre_curvature_per_m=way.pre_curvature,
-        pre_curvature_std_per_m=way.pre_curvature_std,
-        supported_per_m=(float(way.kappa[0]), float(way.kappa[-1])),
+        pre_curvature_per_m=law.pre_curvature,
+        pre_curvature_std_per_m=law.pre_curvature_std,
+        supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
         curve=curve(way),
         points_kappa_per_m=_list(np.concatenate([p.kappa for p in way.points])),
         points_moment_Nm=_list(np.concatenate([p.moment for p in way.points])),

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
-from pipeline.identify.agreement import Characterised, compare, rest_curvature
+from pipeline.identify.agreement import compare, log_curve, rest_curvature
 from pipeline.identify.contrast import chi_square, parts_difference
 from pipeline.identify.findings import identification_findings
 from pipeline.identify.identification import Identification
@@ -60,9 +60,7 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
         branches_p=_branches_p(branches),
         rest=rest_curvature(test),
     )
-    if inverse.characteristic is not None and graph.measured:
-        agreement = compare(test, inverse, graph, level=settings.agreement_level)
-        found = replace(found, agreement=agreement)
+    found = replace(found, agreement=compare(test, inverse, graph, level=settings.agreement_level))
     return replace(found, findings=identification_findings(found, settings))
 
 
@@ -116,15 +114,16 @@ def _branches(test: MeasuredTest, options: InverseOptions) -> dict[str, Estimate
 
 def _branches_p(branches: dict[str, Estimate]) -> float | None:
     """Test of equal characteristic and K0; the branches share no photo and no force: their errors are independent."""
-    if len(branches) < 2:
+    laws = [branch.law for branch in branches.values() if branch.law is not None]
+    if len(laws) < 2:
         return None
-    one, two = Characterised.of_inverse(branches["loading"]), Characterised.of_inverse(branches["unloading"])
-    shift = one.pre_curvature - two.pre_curvature
-    z = shift / np.hypot(one.pre_curvature_std, two.pre_curvature_std)
-    common = one.curve.common_grid(two.curve)
+    one, two = laws
+    z = (one.pre_curvature - two.pre_curvature) / np.hypot(one.pre_curvature_std, two.pre_curvature_std)
     chi2, free = float(z**2), 1
+    first, second = log_curve(one), log_curve(two)
+    common = first.common_grid(second)
     if common is not None:
-        difference = parts_difference(one.curve, two.curve, common)
-        chi2 += chi_square(difference, one.curve.parts_covariance(common) + two.curve.parts_covariance(common))
+        difference = parts_difference(first, second, common)
+        chi2 += chi_square(difference, first.parts_covariance(common) + second.parts_covariance(common))
         free += difference.size
     return float(chdtrc(free, chi2))

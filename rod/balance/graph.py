@@ -25,7 +25,6 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rod.balance.compliance import compliance_basis
 from rod.balance.moment_points import CommonErrors, MomentPoints, moment_points
@@ -37,10 +36,8 @@ from rod.balance.moment_regression import (
     regress,
     uniform_at_rest,
 )
+from rod.measured_law import Array, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
-Source = tuple[str, int]
 
 
 class BalanceOutcome(Enum):
@@ -94,35 +91,15 @@ class BalanceOptions:
     iterations: int = 25
 
 
-def _none() -> Array:
-    return np.empty(0)
-
-
 @dataclass(frozen=True)
 class BalanceGraph:
-    """The characteristic by the balance equations, with bands; SI units.
+    """What the balance equations make of a test; SI units.
 
     Attributes
     ----------
     outcome : BalanceOutcome
-    pre_curvature, pre_curvature_std : 1/m
-        Zero of the moment, all photos.
-    loaded_pre_curvature, loaded_pre_curvature_std : 1/m
-        The same without the force-free photo: a witness of its own.
-    kappa : (n,) 1/m
-        Grid over the visited range.
-    moment, tangent, secant : (n,) N m, N m^2, N m^2
-        With ``moment_std``, ``tangent_std``, ``secant_std``.
-    log_covariance : (n, n)
-        Joint covariance of log(tangent) on the grid.
-    gains : dict
-        Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
-        same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
-        ``("force", step)`` (n, 1) per N; then, per standard deviation of what is wrong on all photos alike,
-        ``("scale", -1)`` (n, 1) and ``("axes", -1)`` (n, 2), left and right across the chord; ``("floor", step)`` per
-        standard deviation of the curvature that no photo resolves, at each point.
-    shortfall : (n, n)
-        Error of log(tangent) on the grid by the roughness prior, per log(tangent) of the true law there.
+    law : MeasuredLaw or None
+        None with any other outcome than ``MEASURED``. K0 is the zero of the moment, all photos.
     points : tuple of MomentPoints
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
@@ -132,20 +109,7 @@ class BalanceGraph:
     """
 
     outcome: BalanceOutcome
-    pre_curvature: float = np.nan
-    pre_curvature_std: float = np.nan
-    loaded_pre_curvature: float = np.nan
-    loaded_pre_curvature_std: float = np.nan
-    kappa: Array = field(default_factory=_none)
-    moment: Array = field(default_factory=_none)
-    moment_std: Array = field(default_factory=_none)
-    tangent: Array = field(default_factory=_none)
-    tangent_std: Array = field(default_factory=_none)
-    secant: Array = field(default_factory=_none)
-    secant_std: Array = field(default_factory=_none)
-    log_covariance: Array = field(default_factory=_none)
-    gains: dict[Source, Array] = field(default_factory=dict)
-    shortfall: Array = field(default_factory=_none)
+    law: MeasuredLaw | None = None
     points: tuple[MomentPoints, ...] = ()
     varying: tuple[float, ...] = (0.0,) * BOW_TERMS
     checks: dict[str, float] = field(default_factory=dict)
@@ -233,36 +197,27 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     by_moment[:, p] = -f
     by_log = -curve.log_slope(m)[:, None] * by_moment
     by_log[:, :p] -= curve.basis.at(m)
-    # Secant m / (K - K0); within a thousandth of the range from K0 it is the tangent.
-    D = kappa - K0
-    near = np.abs(D) < 1e-3 * (kappa[-1] - kappa[0])
-    D = np.where(near, 1.0, D)
-    by_secant = by_moment / D[:, None]
-    by_secant[:, p] += m / D**2
-    by_secant = np.where(near[:, None], f[:, None] * by_log, by_secant)
-    covariance = found.posterior.covariance
-
-    def std(by: Array) -> Array:
-        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0)))
-
+    law = propagated(
+        kappa,
+        K0,
+        moment=m,
+        tangent=f,
+        by_moment=by_moment,
+        by_log=by_log,
+        by_pre_curvature=np.eye(found.unknowns.size)[p],
+        covariance=found.posterior.covariance,
+    )
     loaded, loaded_std = _loaded_pre_curvature(model, found)
     return BalanceGraph(
         outcome=BalanceOutcome.MEASURED,
-        pre_curvature=K0,
-        pre_curvature_std=float(np.sqrt(covariance[p, p])),
-        loaded_pre_curvature=loaded,
-        loaded_pre_curvature_std=loaded_std,
-        kappa=kappa,
-        moment=m,
-        moment_std=std(by_moment),
-        tangent=f,
-        tangent_std=f * std(by_log),
-        secant=np.where(near, f, m / D),
-        secant_std=std(by_secant),
-        log_covariance=by_log @ covariance @ by_log.T,
-        gains=_gains(model, found, by_log),
-        # Coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis.
-        shortfall=by_log @ found.posterior.shrinkage @ np.linalg.pinv(curve.basis.at(m)),
+        law=replace(
+            law,
+            gains=_gains(model, found, by_log),
+            # Coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis.
+            shortfall=by_log @ found.posterior.shrinkage @ np.linalg.pinv(curve.basis.at(m)),
+            loaded_pre_curvature=loaded,
+            loaded_pre_curvature_std=loaded_std,
+        ),
         points=model.data,
         varying=tuple(float(v) for v in model.bow(found.unknowns)),
         checks=checks,

@@ -9,16 +9,13 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rod.characteristic import Characteristic
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel
 from rod.inverse.options import InverseOptions
 from rod.inverse.smoothness import Averaged, averaged
-
-Array = NDArray[np.float64]
-Source = tuple[str, int]
+from rod.measured_law import Array, MeasuredLaw, Source, propagated
 
 
 class InverseOutcome(Enum):
@@ -58,27 +55,16 @@ def _none() -> Array:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The characteristic by the inverse problem, with bands; SI units, tangent reading.
+    """What the inverse problem makes of a test; SI units, tangent reading.
 
     Attributes
     ----------
     outcome : InverseOutcome
     characteristic : Characteristic or None
-    pre_curvature, pre_curvature_std : 1/m
-    loaded_pre_curvature, loaded_pre_curvature_std : 1/m
-        Without the force-free photo: a witness of its own.
+        The fitted spline.
+    law : MeasuredLaw or None
+        The same on a grid over the visited range, with bands; None where there is no characteristic.
     ordinates_std : (k,) N m^2
-    kappa : (n,) 1/m
-        Grid over the visited range.
-    moment, tangent, secant : (n,)
-        With ``moment_std``, ``tangent_std``, ``secant_std``.
-    log_covariance : (n, n)
-        Joint covariance of log(tangent) on the grid.
-    gains : dict
-        Response of log(tangent) to the sources of error, keyed and in units as in `rod.balance.graph.BalanceGraph`;
-        beside these ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` (-1: common to all photos).
-    shortfall : (n, n)
-        Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
     law_covariance : (k, k)
         Of log(tangent) at the knots by the smoothness prior alone, its level held at the first.
     evidence : dict of int -> float
@@ -94,21 +80,8 @@ class Estimate:
 
     outcome: InverseOutcome
     characteristic: Characteristic | None = None
-    pre_curvature: float = np.nan
-    pre_curvature_std: float = np.nan
-    loaded_pre_curvature: float = np.nan
-    loaded_pre_curvature_std: float = np.nan
+    law: MeasuredLaw | None = None
     ordinates_std: Array = field(default_factory=_none)
-    kappa: Array = field(default_factory=_none)
-    moment: Array = field(default_factory=_none)
-    moment_std: Array = field(default_factory=_none)
-    tangent: Array = field(default_factory=_none)
-    tangent_std: Array = field(default_factory=_none)
-    secant: Array = field(default_factory=_none)
-    secant_std: Array = field(default_factory=_none)
-    log_covariance: Array = field(default_factory=_none)
-    gains: dict[Source, Array] = field(default_factory=dict)
-    shortfall: Array = field(default_factory=_none)
     law_covariance: Array = field(default_factory=_none)
     evidence: dict[int, float] = field(default_factory=dict)
     model: FitModel | None = None
@@ -129,47 +102,39 @@ def read_off(
 ) -> Estimate:
     """Estimate from a settled fit: curves on the visited range with bands by propagation."""
     k, u, covariance = model.knots.size, found.unknowns, posterior.covariance
-    law, K0 = model.characteristic(u), model.pre_curvature(u)
+    spline, K0 = model.characteristic(u), model.pre_curvature(u)
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
     kappa = np.linspace(min(visited), max(visited), options.grid)
-    m, f, secant = law.moment(kappa, K0), law.tangent(kappa, K0), law.secant(kappa, K0)
+    f = spline.tangent(kappa, K0)
     if not np.all(f > 0.0):  # positive at the control points, but not between them
         return Estimate(InverseOutcome.LIMIT_POINT)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
-    by_moment[:, :k] = law.moment_by_ordinates(kappa, K0) * law.ordinates
-    by_moment[:, k] = law.moment_by_pre_curvature(kappa, K0) / model.length
-    by_log[:, :k] = law.tangent_by_ordinates(kappa, K0) * law.ordinates / f[:, None]
-    # Secant m / (K - K0); within a thousandth of the range from K0 it is the tangent.
-    D = kappa - K0
-    near = np.abs(D) < 1e-3 * (kappa[-1] - kappa[0])
-    D = np.where(near, 1.0, D)
-    by_secant = by_moment / D[:, None]
-    by_secant[:, k] += m / D**2 / model.length
-    by_secant = np.where(near[:, None], f[:, None] * by_log, by_secant)
-
-    def std(by: Array) -> Array:
-        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0)))
-
+    by_moment[:, :k] = spline.moment_by_ordinates(kappa, K0) * spline.ordinates
+    by_moment[:, k] = spline.moment_by_pre_curvature(kappa, K0) / model.length
+    by_log[:, :k] = spline.tangent_by_ordinates(kappa, K0) * spline.ordinates / f[:, None]
+    law = propagated(
+        kappa,
+        K0,
+        moment=spline.moment(kappa, K0),
+        tangent=f,
+        by_moment=by_moment,
+        by_log=by_log,
+        by_pre_curvature=np.eye(u.size)[k] / model.length,
+        covariance=covariance,
+    )
     rest = tuple(name for name in found.blocks if _is_rest(model, name))
     loaded = averaged(model, found, taus=options.tau, without=rest) if rest else replace(posterior, mean=u)
     return Estimate(
         outcome=outcome,
-        characteristic=law,
-        pre_curvature=K0,
-        pre_curvature_std=float(np.sqrt(covariance[k, k])) / model.length,
-        loaded_pre_curvature=float(loaded.mean[k]) / model.length,
-        loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[k, k])) / model.length,
-        ordinates_std=law.ordinates * np.sqrt(np.diag(covariance)[:k]),
-        kappa=kappa,
-        moment=m,
-        moment_std=std(by_moment),
-        tangent=f,
-        tangent_std=f * std(by_log),
-        secant=secant,
-        secant_std=std(by_secant),
-        log_covariance=by_log @ covariance @ by_log.T,
-        gains=_gains(model, found, by_log @ covariance),
-        shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
+        characteristic=spline,
+        law=replace(
+            law,
+            gains=_gains(model, found, by_log @ covariance),
+            shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
+            loaded_pre_curvature=float(loaded.mean[k]) / model.length,
+            loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[k, k])) / model.length,
+        ),
+        ordinates_std=spline.ordinates * np.sqrt(np.diag(covariance)[:k]),
         law_covariance=posterior.law_covariance,
         model=model,
         evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),

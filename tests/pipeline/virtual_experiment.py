@@ -29,8 +29,8 @@ def identified(test, *, name="virtual", way=None):
         inverse=InversePart(
             outcome=way.outcome.name.lower(),
             converged=way.converged,
-            pre_curvature_per_m=way.pre_curvature,
-            pre_curvature_std_per_m=way.pre_curvature_std,
+            pre_curvature_per_m=way.law.pre_curvature,
+            pre_curvature_std_per_m=way.law.pre_curvature_std,
             curve=curve(way),
         ),
     )

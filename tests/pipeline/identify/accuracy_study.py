@@ -34,17 +34,17 @@ class Score:
     z: float
 
     @staticmethod
-    def of(way, law):
-        f, m = law.tangent(way.kappa), law.moment(way.kappa)
-        shift = way.pre_curvature - law.K0
+    def of(found, law):
+        f, m = law.tangent(found.kappa), law.moment(found.kappa)
+        shift = found.pre_curvature - law.K0
         # At the very end of the range the moment is zero in truth and in the estimate's own K0.
         inner = slice(1, None)
         return Score(
-            float(np.sqrt(np.mean((way.tangent / f - 1) ** 2))),
-            float(np.mean(np.abs(way.tangent - f) < 1.96 * way.tangent_std)),
-            float(np.mean((np.abs(way.moment - m) < 1.96 * way.moment_std)[inner])),
+            float(np.sqrt(np.mean((found.tangent / f - 1) ** 2))),
+            float(np.mean(np.abs(found.tangent - f) < 1.96 * found.tangent_std)),
+            float(np.mean((np.abs(found.moment - m) < 1.96 * found.moment_std)[inner])),
             shift,
-            shift / way.pre_curvature_std,
+            shift / found.pre_curvature_std,
         )
 
 
@@ -73,8 +73,8 @@ def case(seed, number, *, kind="stick-slip", axes=0.0):
         mounted,
         len(chords),
         law.EI0 / law.EI1,
-        Score.of(found.inverse, law),
-        Score.of(found.balance, law),
+        Score.of(found.inverse.law, law),
+        Score.of(found.balance.law, law),
         found.agreement.p_value,
         found.inverse.characteristic.knots.size,
         tuple(finding.code for finding in found.findings if finding.level != "info"),

@@ -108,5 +108,5 @@ def test_identify_names_the_photos_of_the_steps(specimen, traces, settings, law)
     found = identify(specimen, traces, settings)
     parts = identification_parts(found)
     assert [s.image for s in parts.steps] == [s.image for s in specimen.steps]
-    error = found.inverse.tangent / law.tangent(found.inverse.kappa) - 1
+    error = found.inverse.law.tangent / law.tangent(found.inverse.law.kappa) - 1
     assert np.sqrt(np.mean(error**2)) < 0.02

@@ -32,7 +32,7 @@ def test_characteristic_from_rendered_photos(tmp_path, name):
     settings = Settings()
     specimen = read_specimen(written.folder, settings.intake)
     found = identify(specimen, trace_series(specimen, settings.vision), settings.identify)
-    for way in (found.inverse, found.balance):
+    for way in (found.inverse.law, found.balance.law):
         relative = way.tangent / law.tangent(way.kappa) - 1
         assert np.sqrt(np.mean(relative**2)) < 0.015
         assert abs(way.pre_curvature - law.K0) < 0.05

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.identify import identification_parts, identify_test, identify_without
-from pipeline.identify.agreement import Characterised, difference_covariance, rest_curvature, source_covariance
+from pipeline.identify.agreement import difference_covariance, log_curve, rest_curvature, source_covariance
 from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
 from pipeline.result import Result, SpecimenPart, from_json, to_json
 from rod.inverse import InverseOutcome
@@ -37,8 +37,8 @@ def test_three_sources_of_pre_curvature_agree_with_the_truth(found, law):
 
 def test_both_ways_are_compared_on_the_range_both_visited(found):
     low, high = found.agreement.range_per_m
-    assert low == pytest.approx(max(found.inverse.kappa[0], found.balance.kappa[0]))
-    assert high == pytest.approx(min(found.inverse.kappa[-1], found.balance.kappa[-1]))
+    assert low == pytest.approx(max(found.inverse.law.kappa[0], found.balance.law.kappa[0]))
+    assert high == pytest.approx(min(found.inverse.law.kappa[-1], found.balance.law.kappa[-1]))
     assert 0 < found.agreement.rms_relative <= found.agreement.max_relative
 
 
@@ -46,19 +46,19 @@ def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     """What the comparison sends through a way is all that its band holds, away from the ends of the range."""
     way = found.inverse
     noise = sum(
-        gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.gains.items()
+        gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.law.gains.items()
     )
-    short = way.shortfall @ forms(way.model.knots, way.law_covariance, way.kappa)
-    ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.log_covariance))
+    short = way.law.shortfall @ forms(way.model.knots, way.law_covariance, way.law.kappa)
+    ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.law.log_covariance))
     # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
     # mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.
     assert np.all((ratio[15:-1] > 0.75) & (ratio[15:-1] < 1.3))
 
 
 def test_what_both_ways_share_cancels_in_their_difference(found, measured):
-    one, two = Characterised.of_inverse(found.inverse), Characterised.of_balance(found.balance)
-    grid = one.curve.common_grid(two.curve)
-    no_form = tuple(np.zeros((way.curve.kappa.size, 1)) for way in (one, two))
+    one, two = found.inverse.law, found.balance.law
+    grid = log_curve(one).common_grid(log_curve(two))
+    no_form = tuple(np.zeros((law.kappa.size, 1)) for law in (one, two))
 
     def variances(first, second):
         return np.diag(difference_covariance(measured, first, second, no_form, grid))
@@ -131,14 +131,14 @@ def test_one_displacement_for_all_steps_is_told(measured, settings):
 
 def test_wrong_zero_of_displacement_leaves_the_result_alone(measured, settings, found):
     moved = with_steps(measured, lambda s: replace(s, displacement=s.displacement + 1e-3))
-    assert np.allclose(identify_test(moved, settings).inverse.tangent, found.inverse.tangent, rtol=1e-9)
+    assert np.allclose(identify_test(moved, settings).inverse.law.tangent, found.inverse.law.tangent, rtol=1e-9)
 
 
 def test_what_is_at_fault_is_left_out_of_both_ways(measured, settings, law):
     wrong = with_steps(measured, lambda s: replace(s, force=1.25 * s.force) if s.step == 3 else s)
     spoiled = identify_test(wrong, settings)
     again = identify_without(spoiled, photos=[], forces=[3], settings=settings)
-    for way in (again.inverse, again.balance):
+    for way in (again.inverse.law, again.balance.law):
         truth = law.tangent(way.kappa)
         # what is left is the noise of the data; with the force a quarter too high it is 5 % or more
         assert np.sqrt(np.mean((way.tangent / truth - 1.0) ** 2)) < 0.02
