@@ -240,6 +240,14 @@ def test_check_measures_nothing_and_says_what_is_wrong(cheap):
     assert not (cheap / "out").exists()
 
 
+def test_a_place_that_cannot_be_used_is_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    done = call("demo", "-o", tmp_path / "file" / "inside")
+    assert done.exit_code == 2
+    assert done.stderr.startswith(f"cablebend: {tmp_path / 'file' / 'inside'}")
+    assert done.stderr.endswith(": not a directory; check that the place exists and can be used.\n")
+
+
 def test_init_then_check_then_run(cheap):
     folder = cheap / "batch/a"
     (folder / "specimen.toml").unlink()

@@ -42,7 +42,7 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
         first = error.errors()[0]
         place = [str(part) for part in first["loc"]]
         raise InputError(
-            f"{'.'.join(place)} = {first['input']!r} cannot be used",
+            f"{'.'.join(place)} = {first['input']!r} cannot be used ({first['msg'][:1].lower()}{first['msg'][1:]})",
             path=file,
             line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
             code="settings/wrong-value",

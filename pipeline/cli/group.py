@@ -16,7 +16,7 @@ INTERRUPTED = 130
 
 
 class Commands(click.Group):
-    """Commands found by name in their modules; an `InputError` of any of them is one sentence and exit code 2."""
+    """Commands found by name in their modules; a file that cannot be used is one sentence and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of use."""
@@ -39,6 +39,12 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             click.echo("cablebend: interrupted", err=True)
             ctx.exit(INTERRUPTED)
+        except OSError as error:
+            if error.filename is None:  # a closed pipe, not a place the user named
+                raise
+            reason = (error.strerror or type(error).__name__).lower()
+            click.echo(f"cablebend: {error.filename}: {reason}; check that the place exists and can be used.", err=True)
+            ctx.exit(2)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

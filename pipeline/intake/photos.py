@@ -20,6 +20,8 @@ from pipeline.settings.intake import IntakeSettings
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 FOLDERS = ("images", "bilder", "fotos", "photos", "pictures", "aufnahmen")
+# Pictures of telephones and cameras that have to be converted first.
+OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".webp", ".gif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf")
 NO_PHOTO = re.compile(r"^\.|^~|^@|thumb|vorschau|preview|^__macosx$", re.IGNORECASE)
 
 
@@ -50,11 +52,9 @@ def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings)
         ``folder/too-many-photos``.
     """
     names = []
-    for place in ("", *(entry for entry in _entries(folder) if entry.casefold() in FOLDERS)):
+    for place in _places(folder, settings):
         directory = folder / place
         if without is not None and os.path.realpath(directory) == os.path.realpath(without):
-            continue
-        if place and inside(folder, place, allow_outside=settings.allow_outside) is None:
             continue
         names += [str(PurePosixPath(place) / entry) for entry in _entries(directory) if _is_photo(entry)]
     if len(names) > settings.photos_max:
@@ -65,6 +65,24 @@ def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings)
             remedy="split it or raise intake.photos_max",
         )
     return tuple(sorted(names, key=natural_key))
+
+
+def no_photos(
+    folder: Path, told: str, settings: IntakeSettings, *, remedy: str = "put the photos into its folder images"
+) -> InputError:
+    """The error for a folder without a photo; pictures that only need to be converted are named."""
+    entries = [entry for place in _places(folder, settings) for entry in _entries(folder / place)]
+    other = [entry for entry in entries if PurePosixPath(entry).suffix.casefold() in OTHER_SUFFIXES]
+    if other:
+        told = f"{told}, only pictures of other kinds: {_some(other)}"
+        remedy = "convert them to png or jpg at full size"
+    return InputError(told, path=folder, code="folder/no-photos", remedy=remedy)
+
+
+def _places(folder: Path, settings: IntakeSettings) -> list[str]:
+    """Where photos may lie: beside ``specimen.toml``, and in folders named after them that do not lead out of it."""
+    named = [entry for entry in _entries(folder) if entry.casefold() in FOLDERS]
+    return ["", *(place for place in named if inside(folder, place, allow_outside=settings.allow_outside) is not None)]
 
 
 def _entries(directory: Path) -> list[str]:
@@ -93,7 +111,7 @@ def match_photos(
     present = list_photos(folder, without=calibration, settings=settings)
     findings: list[Finding] = []
     if not any(step.image for step in steps):
-        steps, noted = _by_order(folder, steps, present, log_name)
+        steps, noted = _by_order(folder, steps, present, log_name, settings)
         findings += noted
     paths: dict[str, Path] = {}
     hashes: dict[str, str] = {}
@@ -117,11 +135,9 @@ def match_photos(
                 paths[name], hashes[name] = path, digest
         matched.append(step if name is None else replace(step, image=name))
     if not paths:
-        raise InputError(
-            "has no photo that can be used" + (f" ({findings[-1].message})" if findings else ""),
-            path=folder,
-            code="folder/no-photos",
-            remedy="put the photos into its folder images, as named in the force log",
+        told = "has no photo that can be used" + (f" ({findings[-1].message})" if findings else "")
+        raise no_photos(
+            folder, told, settings, remedy="put the photos into its folder images, as named in the force log"
         )
     unused = [name for name in present if name not in used]
     if unused:
@@ -136,13 +152,11 @@ def _some(names: Sequence[str]) -> str:
 
 
 def _by_order(
-    folder: Path, steps: Sequence[LoadStep], present: Sequence[str], log_name: str
+    folder: Path, steps: Sequence[LoadStep], present: Sequence[str], log_name: str, settings: IntakeSettings
 ) -> tuple[list[LoadStep], list[Finding]]:
     """Photos for steps of a log that names none: by the step numbers in their names, or one for each in order."""
     if not present:
-        raise InputError(
-            "has no photos", path=folder, code="folder/no-photos", remedy="put the photos into its folder images"
-        )
+        raise no_photos(folder, "has no photos", settings)
     numbers = [_last_number(name) for name in present]
     at = {step.step: place for place, step in enumerate(steps)}
     if len(present) == len(steps):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.intake.folder import candidate_logs
-from pipeline.intake.photos import list_photos
+from pipeline.intake.photos import list_photos, no_photos
 from pipeline.intake.specimenfile import NAME, folder_name
 from pipeline.settings.intake import IntakeSettings
 
@@ -63,9 +63,7 @@ def write_template(folder: Path, settings: IntakeSettings) -> Path:
         raise InputError("is no folder", path=folder, code="folder/missing", remedy="give a folder of photos")
     photos = list_photos(folder, without=None, settings=settings)
     if not photos:
-        raise InputError(
-            "has no photos", path=folder, code="folder/no-photos", remedy="put the photos into its folder images"
-        )
+        raise no_photos(folder, "has no photos", settings)
     logs = candidate_logs(folder)
     text = TEMPLATE.format(
         id=folder_name(folder),

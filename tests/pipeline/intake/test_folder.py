@@ -42,6 +42,17 @@ def test_missing_photo_is_a_finding(specimen_folder):
     )
 
 
+def test_pictures_of_a_telephone_are_to_be_converted(specimen_folder):
+    log = "force_N,displacement_mm\n0.001,0\n2.3,4\n"
+    folder = specimen_folder(log=log, photos=("images/IMG_0001.HEIC", "images/IMG_0002.HEIC"))
+    with pytest.raises(InputError) as refused:
+        folder.read()
+    assert refused.value.sentence == (
+        f"{folder.path}: has no photos, only pictures of other kinds: IMG_0001.HEIC, IMG_0002.HEIC; "
+        "convert them to png or jpg at full size."
+    )
+
+
 def test_doubled_photos_are_told(specimen_folder):
     folder = specimen_folder()
     folder.write("images/step_2.png", "photo images/step_1.png")

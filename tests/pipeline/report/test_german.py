@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.words import could_have_been_seen, headline
+from pipeline.diagnosis.words import SPOKEN, could_have_been_seen, headline
 from pipeline.errors import InputError
 from pipeline.report.german import EDGES, entries
 from pipeline.report.words import Words
@@ -64,7 +64,8 @@ def no_messages(node):
     if isinstance(node, ast.Expr):
         return isinstance(node.value, ast.Constant)
     if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-        return getattr(node.exc.func, "id", "InputError") != "InputError"
+        name = getattr(node.exc.func, "id", "")  # functions that make an InputError have names of their own
+        return name.endswith("Error") and name != "InputError"
     return isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Field"
 
 
@@ -102,8 +103,8 @@ def test_every_sentence_has_a_german_twin(module):
         if len(re.findall(r"[A-Za-z]{2,}", text)) > 1 and re.search(r"[\w)}] [\w({]", text)
         if not NO_SENTENCES.search(text)
     }
-    # each of these needs a line in pipeline/report/templates/german
-    assert sorted(sentences - GERMAN.keys()) == []
+    # each of these needs a line in pipeline/report/templates/german; names of causes have theirs in words.toml
+    assert sorted(sentences - GERMAN.keys() - set(SPOKEN.values())) == []
 
 
 def test_no_twin_is_left_over():
@@ -224,11 +225,6 @@ def test_causes_are_explained_in_german():
 def test_what_is_not_known_stays_and_is_called_english(text):
     said = Words("de").said(text)
     assert (said.text, said.language) == (text, "en")
-
-
-def test_english_names_causes_as_english_does():
-    said = Words("en").said("The simulation lacks pre curvature varying or in plane load (1 1/m).")
-    assert said.text == "The simulation lacks varying pre-curvature or in-plane load (1 1/m)."
 
 
 def test_english_stays_english():
