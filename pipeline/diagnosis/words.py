@@ -6,10 +6,18 @@ from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.verdict import Verdict
 from pipeline.units import amount_unit
 
+# Names that English says in another order or with a hyphen; the others as they are, with blanks.
+SPOKEN = {
+    "pre_curvature": "pre-curvature",
+    "pre_curvature_varying": "varying pre-curvature",
+    "stiffness_varying": "varying stiffness",
+    "in_plane_load": "in-plane load",
+}
+
 
 def spoken(name: str) -> str:
-    """Name of a cause as one says it."""
-    return name.replace("_", " ")
+    """Name of a cause as one says it in English: the one place that terminal, findings and reports take it from."""
+    return SPOKEN.get(name, name.replace("_", " "))
 
 
 def listed(names: list[str], *, last: str = "or") -> str:

@@ -16,13 +16,12 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from html import escape
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
@@ -205,7 +204,7 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
     axes.set_ylabel(y)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6))
-        axis.set_major_formatter(number_ticks(axis, decimal))
+        axis.set_major_formatter(number_ticks(decimal))
     axes.tick_params(length=3)
     if legend:
         place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
@@ -216,17 +215,24 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
     return axes
 
 
-def number_ticks(axis: Axis, decimal: str) -> FuncFormatter:
+def number_ticks(decimal: str) -> FuncFormatter:
     """Tick labels with the decimal sign of the language and a true minus, all of an axis to the same decimal place."""
 
     def label(value: float, _: int | None) -> str:
-        labels = [plain(float(f"{place:.6g}"), 4) for place in axis.get_majorticklocs()]
-        if any("·" in text for text in labels):  # with powers of ten
-            return plain(float(f"{value:.6g}"), 4, decimal=decimal)
-        places = max((len(text.partition(".")[2]) for text in labels), default=0)
-        return fixed(value, places, decimal)
+        places = _decimal_places(tuple(formatter.locs))
+        return plain(float(f"{value:.6g}"), 4, decimal=decimal) if places is None else fixed(value, places, decimal)
 
-    return FuncFormatter(label)
+    formatter = FuncFormatter(label)
+    return formatter
+
+
+@lru_cache(maxsize=64)  # every label of an axis asks for the same
+def _decimal_places(ticks: tuple[float, ...]) -> int | None:
+    """Decimal places that all ticks of an axis need; None where one is written with a power of ten."""
+    labels = [plain(float(f"{tick:.6g}"), 4) for tick in ticks]
+    if any("·" in text for text in labels):
+        return None
+    return max((len(text.partition(".")[2]) for text in labels), default=0)
 
 
 def _compact(svg: str, name: str, size: tuple[float, float], title: str, description: str) -> str:

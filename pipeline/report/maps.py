@@ -114,7 +114,7 @@ def _scale(figure: Area, axes: Axes, image: ScalarMappable, label: str, words: W
     """Colour bar right of the axes."""
     box, width = axes.get_position(), figure.bbox.width
     bar = figure.add_axes((box.x1 + 12.0 / width, box.y0, 12.0 / width, box.height))
-    figure.colorbar(image, cax=bar, format=number_ticks(bar.yaxis, words.decimal))
+    figure.colorbar(image, cax=bar, format=number_ticks(words.decimal))
     bar.set_ylabel(label)
     bar.grid(False)
 

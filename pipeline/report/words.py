@@ -1,8 +1,9 @@
 """The words of report and index in English and German; the numbers in the reader's format.
 
-The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences
-made by other rooms (findings, headline of the diagnosis) are stored in English; `Words.said` gives them in the reader's
-language, see `pipeline.report.german`. One that has no German twin stays English and is marked as such on the page.
+The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes; the English
+names of causes are the diagnosis's own. Sentences made by other rooms (findings, headline of the diagnosis) are stored
+in English; `Words.said` gives them in the reader's language, see `pipeline.report.german`. One that has no German twin
+stays English and is marked as such on the page.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+from pipeline.diagnosis.words import spoken
 from pipeline.report.german import in_german
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
@@ -21,22 +24,15 @@ LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 
 
 @cache
-def _table() -> dict[str, dict[str, list[str]]]:
+def _table() -> dict[str, dict[str, Any]]:
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))
 
 
 @cache
 def _german_causes() -> dict[str, str]:
-    """German names of the causes by their names of the contract, with and without underscores, and by the English."""
+    """German names of the causes, by their names of the contract and by the English ones."""
     rows = _table()["causes"].items()
-    return {english: row[1] for name, row in rows for english in (name, name.replace("_", " "), row[0])}
-
-
-@cache
-def _spoken_causes() -> tuple[tuple[str, str], ...]:
-    """Names of causes as the diagnosis speaks them where English says otherwise, the longest first."""
-    named = ((name.replace("_", " "), row[0]) for name, row in _table()["causes"].items())
-    return tuple(sorted((pair for pair in named if pair[0] != pair[1]), key=lambda pair: -len(pair[0])))
+    return {english: german for name, german in rows for english in (name, spoken(name))}
 
 
 @dataclass(frozen=True)
@@ -85,25 +81,22 @@ class Words:
 
     def __call__(self, key: str, **values: object) -> str:
         """Words for a key with values put in; a key that is not in the table is a ``KeyError``."""
-        text = _table()["words"][key][LANGUAGES[self.language][0]]
+        text = str(_table()["words"][key][LANGUAGES[self.language][0]])
         return text.format(**values) if values else text
 
     def tip(self, key: str) -> str:
         """Meaning of a term: symbol, unit, one sentence."""
-        return _table()["tips"][key][LANGUAGES[self.language][0]]
+        return str(_table()["tips"][key][LANGUAGES[self.language][0]])
 
     def cause(self, name: str) -> str:
         """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
-        row = _table()["causes"].get(name)
-        return row[LANGUAGES[self.language][0]] if row else name.replace("_", " ")
+        return str(_table()["causes"].get(name, spoken(name))) if self.language == "de" else spoken(name)
 
     def said(self, sentence: str) -> Said:
         """A stored sentence (finding, reason, headline, advice) in this language, as far as it is known."""
         if self.language == "de":
             text, known = in_german(sentence, _german_causes())
             return Said(text.replace("+-", "±"), "de" if known else "en")
-        for spoken, written in _spoken_causes():
-            sentence = sentence.replace(spoken, written)
         return Said(sentence.replace("+-", "±"), "en")
 
     def branch(self, name: str) -> str:
@@ -116,7 +109,7 @@ class Words:
 
     def _known(self, key: str, otherwise: str) -> str:
         row = _table()["words"].get(key)
-        return row[LANGUAGES[self.language][0]] if row else otherwise
+        return str(row[LANGUAGES[self.language][0]]) if row else otherwise
 
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""
