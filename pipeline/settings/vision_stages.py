@@ -245,14 +245,30 @@ class BearingSettings(StageSettings):
         0.35, gt=0, lt=1, description="share of the rim with an edge on the circle; chance alone gives a tenth"
     )
     sure_rim: float = Field(0.7, gt=0, lt=1, description="share of the rim; with so much seen no other centre is tried")
-    dot_radii: tuple[float, ...] = Field(
-        (0.12, 0.16, 0.21, 0.28, 0.37, 0.5, 0.9),
-        description="radii of a cover; sizes of a dot, screw or bevel on its axis that are tried",
+    mark_radii: float = Field(
+        0.6, gt=0, lt=1, description="radii of a cover; largest dot, screw or bevel that marks the axis of one not seen"
     )
     cover_radii_widths: tuple[float, float] = Field(
         (0.9, 3.2),
         description="widths of the cable; range of radii searched where no size is given: covers of 2 to 6 diameters,"
         " and the mask may be a tenth wider or narrower than the cable",
+    )
+    mark_widths: float = Field(
+        0.8,
+        gt=0,
+        description="widths of the cable; largest radius of a dot or screw that marks an axis where no size is given:"
+        " half a cover of the usual size",
+    )
+    mark_cells: float = Field(
+        12.0,
+        gt=4,
+        description="cells; a mark's largest radius in the picture it is searched on: a line stays a cell wide",
+    )
+    mark_aside: float = Field(
+        0.3, gt=0, description="of the distance ahead of the cable's end; how far aside of its direction the axis lies"
+    )
+    mark_tries: int = Field(
+        4, ge=1, description="roundest places where a mark is fitted: edges of cover and shadow pass for round ones"
     )
     astray_radii: float = Field(
         0.16, gt=0, lt=0.5, description="radii; how far a rim that is not sure may lie off the centre: half a bevel"

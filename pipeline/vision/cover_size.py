@@ -5,6 +5,9 @@
 A cable that vanishes ends on the rim of the cover, ahead of which the centre lies; a dot or screw of the right size
 lies too far ahead, a disc under a clamped end not far enough. One radius must serve both ends of several photos, all
 round: then it is what the user would have given as ``bearing_marker_mm``, and each photo is searched again with it.
+
+The rim of a cover of the ground's own grey shows in parts only. There the dot or screw on its axis tells the same: seen
+all round, and everywhere at one distance ahead of where the cable vanishes, which is the radius.
 Units: px.
 """
 
@@ -18,6 +21,7 @@ from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
+from pipeline.vision.rings import find_mark
 from pipeline.vision.rough import RoughCable
 
 
@@ -35,16 +39,38 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
     px or None
         None unless one radius fits both ends on every photo.
     """
-    radii = []
-    for photo, cable in seen:
-        for end in visible_ends(cable):
-            radius = _at_end(photo, end, 2.0 * cable.half_width_px, settings)
-            if radius is None:
-                return None
-            radii.append(radius)
-    if not radii or np.ptp(radii) > settings.same_radius * np.mean(radii):
-        return None
-    return float(np.median(radii))
+    pairs = [(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
+    for measured in (_at_end, _to_mark):
+        radii = _alike((measured(photo, end, width, settings) for photo, end, width in pairs), settings)
+        if radii is not None:
+            return float(np.median(radii))
+    return None
+
+
+def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[float] | None:
+    """All values, if each is known and they are the same within what covers of one rig differ; else None."""
+    known: list[float] = []
+    for value in values:
+        if value is None:
+            return None
+        known.append(value)
+    return known if known and np.ptp(known) <= settings.same_radius * np.mean(known) else None
+
+
+def _to_mark(photo: Photo, end: CableEnd, width: float, settings: BearingSettings) -> float | None:
+    """Distance (px) from the cable's end to what is turned about an axis ahead of it, as far ahead as covers reach."""
+    reach = settings.mark_widths * width
+    step = reach / settings.mark_cells
+    ahead = np.arange(settings.cover_radii_widths[0] * width, settings.cover_radii_widths[1] * width, step)
+    most = settings.mark_aside * ahead[-1]
+    aside = np.arange(-most, most + step, step)
+    along, across = (grid.ravel() for grid in np.meshgrid(ahead, aside))
+    near = np.abs(across) <= settings.mark_aside * along
+    normal = np.array([-end.outward[1], end.outward[0]])
+    places = end.place + along[near, None] * end.outward + across[near, None] * normal
+    inside = (places >= reach).all(axis=1) & (places < np.array(photo.size) - reach).all(axis=1)
+    mark = find_mark(photo, places[inside], reach, settings) if inside.any() else None
+    return None if mark is None else float(np.hypot(*(np.array(mark.center) - end.place)))
 
 
 def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:

@@ -21,7 +21,7 @@ from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rim import Circle, Radius, fit_circle
-from pipeline.vision.rings import with_rings
+from pipeline.vision.rings import find_mark, with_rings
 
 
 def find_cover(
@@ -63,29 +63,18 @@ def find_cover(
             found = _best_circle(photo, window, radius, votes, softness, settings)
             if found is not None and found.rim >= least:
                 return with_rings(photo, found, radius, settings)
-    return _by_dot(photo, window, radius.px, along, aside, settings)
+    return _by_mark(photo, end, radius.px, settings)
 
 
-def _by_dot(
-    photo: Photo, window: _Window, radius_px: float, along: Array, aside: Array, settings: BearingSettings
-) -> Circle | None:
+def _by_mark(photo: Photo, end: CableEnd, radius_px: float, settings: BearingSettings) -> Circle | None:
     """Cover of the ground's own look: the cable ends at its rim, and a dot, screw or bevel marks the axis."""
-    spread = settings.aside_std_radii * radius_px
-    prior = np.exp(-0.5 * (aside / spread) ** 2 - 0.5 * ((along - radius_px) / spread) ** 2)
-    nowhere = np.zeros(prior.shape, bool)
-    # the sizes tried are a third apart
-    sizes = [Radius(share * radius_px, 0.08) for share in settings.dot_radii]
-    dots = [
-        _best_circle(
-            photo, window, size, _votes(window, size.px / window.reduction, nowhere, settings) * prior, 1.0, settings
-        )
-        for size in sizes
-    ]
-    seen = [dot for dot in dots if dot is not None and dot.rim >= settings.sure_rim]
-    if not seen:
-        return None
-    dot = max(seen, key=lambda circle: circle.rim)
-    return replace(dot, radius=radius_px, radius_std=0.1 * radius_px)
+    reach = settings.mark_radii * radius_px
+    step, most = reach / settings.mark_cells, 1.5 * settings.aside_std_radii * radius_px
+    across = np.arange(-most, most + step, step)
+    grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
+    grid = grid[np.hypot(*grid.T) <= most]
+    mark = find_mark(photo, end.place + radius_px * end.outward + grid, reach, settings)
+    return None if mark is None else replace(mark, radius=radius_px, radius_std=0.1 * radius_px)
 
 
 def _best_circle(

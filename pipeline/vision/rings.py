@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, reduce_area
 from pipeline.vision.rim import Circle, Radius, fit_circle
 
 
@@ -61,6 +61,44 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     # What was taken for the rim is none, or part of one: the radius is the expected one.
     doubt = float(np.hypot(rim.radius_std, abs(rim.radius - expected.px)))
     return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim)
+
+
+def find_mark(photo: Photo, places: Array, reach: float, settings: BearingSettings) -> Circle | None:
+    """The surest ring turned about one of some places: a dot, screw or groove seen all round.
+
+    Parameters
+    ----------
+    photo : Photo
+    places : (k, 2) px
+        Where its centre may be, closer together than a cell of the search (``settings.mark_cells`` to the reach).
+    reach : px
+        Largest radius of the ring.
+    settings : BearingSettings
+
+    Returns
+    -------
+    Circle or None
+    """
+    reduction = max(1, int(reach / settings.mark_cells))
+    low = np.maximum(np.floor(places.min(axis=0) - 1.2 * reach).astype(int), 0)
+    high = np.minimum(np.ceil(places.max(axis=0) + 1.2 * reach).astype(int) + 1, photo.size)
+    size = (high - low) // reduction
+    if (size < 4).any():
+        return None
+    part = photo.pixels[low[1] : low[1] + size[1] * reduction, low[0] : low[0] + size[0] * reduction]
+    small = Photo(photo.name, reduce_area(part, (int(size[0]), int(size[1]))), photo.bit_depth)
+    cells = (places - low - 0.5 * (reduction - 1)) / reduction
+    # OpenCV draws pictures of 32767 rows at most
+    groups = np.array_split(cells, len(cells) // 400 + 1)
+    roundness = np.concatenate(
+        [(_slopes(small, group, reach / reduction, 0.7) ** 2).sum(axis=(1, 2)) for group in groups]
+    )
+    found: list[Circle] = []
+    for _ in range(settings.mark_tries):
+        place = places[int(np.argmax(roundness))]
+        found += _rings(photo, _roundest(photo, place, reach, settings), reach, settings)
+        roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
+    return min(found, key=lambda ring: ring.std) if found else None
 
 
 def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Array:

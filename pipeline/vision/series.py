@@ -101,9 +101,8 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         specimen, _as_sure_as_steady(shots, calibration, settings.series), found, calibration, settings
     )
     lines = tuple(_line(shot, calibration.plane, specimen.diameter_m, settings) for shot in named)
-    if specimen.camera.scale_px_per_m is not None or specimen.camera.calibration is not None:
-        pairs = zip(named, lines, strict=True)
-        lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
+    pairs = zip(named, lines, strict=True)
+    lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     found = [shot.found for shot in named if isinstance(shot.found, RoughCable)]
     findings = (
         *calibration.findings,

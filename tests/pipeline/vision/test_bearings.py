@@ -8,12 +8,14 @@ from scipy.special import erfc
 
 from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.bearings import BearingHints, find_bearings, left_first
+from pipeline.vision.cover_size import cover_radius, visible_ends
 from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.render.strand import Curve
+from pipeline.vision.rough import Bearing, RoughCable
 
 STAGE = BearingSettings()
 SCALE = 9_000.0
@@ -181,3 +183,57 @@ def test_given_axes_are_assigned_to_the_nearer_ends() -> None:
 def test_left_is_by_u_and_upper_where_the_chord_is_upright(angle_deg: float, first_is_left: bool) -> None:
     angle = np.radians(angle_deg)
     assert left_first(np.zeros(2), np.array([np.cos(angle), np.sin(angle)]), STAGE) == first_is_left
+
+
+def ground_grey_covers(lefts: list[tuple[float, float]], right: tuple[float, float], radius: float) -> list[Photo]:
+    """Painted here: discs of the ground's grey with a thin circle on each, a soft shadow aside, a cable."""
+    rng = np.random.default_rng(8)
+    v, u = np.mgrid[:220, :700].astype(float)
+    photos = []
+    for left in lefts:
+        grey = np.full(u.shape, 150.0)
+        for axis in (left, right):
+            shade = 0.5 * erfc((np.hypot(u - axis[0] + 8.0, v - axis[1] + 7.0) - radius) / (np.sqrt(2.0) * 5.0))
+            grey *= 1.0 - 0.25 * shade
+        along = np.subtract(right, left) / np.hypot(*np.subtract(right, left))
+        s = (u - left[0]) * along[0] + (v - left[1]) * along[1]
+        t = (v - left[1]) * along[0] - (u - left[0]) * along[1]
+        between = (s > 0.0) & (s < np.hypot(*np.subtract(right, left)))
+        grey += (50.0 - grey) * between * 0.5 * erfc((np.abs(t) - 14.0) / np.sqrt(2.0))
+        for axis in (left, right):
+            distance = np.hypot(u - axis[0], v - axis[1])
+            disc, line = 0.5 * erfc((distance - radius) / np.sqrt(2.0)), np.exp(-0.5 * ((distance - 18.0) / 1.2) ** 2)
+            grey += disc * (150.0 - 30.0 * line - grey)
+        grey += rng.normal(0.0, 1.5, grey.shape)
+        photos.append(Photo("painted", grey.clip(0, 255).astype(np.uint8), 8))
+    return photos
+
+
+def cable_to_the_rims(left: tuple[float, float], right: tuple[float, float], radius: float) -> RoughCable:
+    """What a search without any size finds: the cable from visible end to visible end."""
+    along = np.subtract(right, left) / np.hypot(*np.subtract(right, left))
+    path = np.linspace(np.array(left) + radius * along, np.array(right) - radius * along, 80)
+    ends = [Bearing((float(place[0]), float(place[1])), 2.8, kind="end") for place in path[[0, -1]]]
+    nothing = np.zeros((1, 1), np.float32)
+    return RoughCable("a", path, (0, 79), ends[0], ends[1], 14.0, nothing, (0, 0), True, 0.4, 0.01, 1.0)
+
+
+def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
+    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
+    photos = ground_grey_covers(lefts, right, radius)
+    seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
+    found = cover_radius(seen, STAGE)
+    # the radius is as good as the place where the cable vanishes
+    assert found is not None and abs(found / radius - 1.0) < STAGE.same_radius
+    for (photo, cable), left in zip(seen, lefts, strict=True):
+        bearings = find_bearings(photo, visible_ends(cable), 28.0, BearingHints(cover_px=2.0 * found), STAGE)
+        for bearing, true in zip(bearings, (left, right), strict=True):
+            assert bearing is not None
+            assert np.abs(np.subtract(bearing.center_px, true)).max() < 3.5 * bearing.std_px < 0.7
+
+
+def test_one_cover_without_a_screw_tells_no_size() -> None:
+    left, right, radius = (90.4, 120.7), (610.3, 90.6), 36.0
+    photo = ground_grey_covers([left], right, radius)[0]
+    photo.pixels[60:120, 580:640] = 150  # the right one's circle is gone
+    assert cover_radius([(photo, cable_to_the_rims(left, right, radius))], STAGE) is None
