@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import cache
 from html import escape
 from typing import Any
 
@@ -24,11 +24,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextToPath
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from pipeline.rounding import fixed, plain
+from pipeline.report.ruling import FONT, Ruling, rule, text_width
 
 # A figure of its own, or a part of a page.
 Area = Figure | SubFigure
@@ -57,9 +54,6 @@ ONE_ROW, TWO_ROWS = 22.0, 38.0
 # Between the labels of an axis and both its sides, in px.
 LABEL_GAP = 10.0
 
-# Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.
-FONT = "DejaVu Sans"
-
 STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cablebend",
@@ -81,8 +75,6 @@ STYLE: dict[str, Any] = {
     "ytick.labelcolor": LIGHT["ink"],
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
     "grid.color": LIGHT["grid"],
     "grid.linewidth": 0.8,
     "axes.linewidth": 0.8,
@@ -193,19 +185,14 @@ def plot_area(
 
 def label_width(labels: Iterable[str], *, most: float) -> float:
     """Room in px that labels of an axis need, at most so much: names differ in length from language to language."""
-    properties = FontProperties(family=FONT, size=STYLE["font.size"])
-    widths = (TextToPath().get_text_width_height_descent(label, properties, ismath=False)[0] for label in labels)
-    return min(most, max(widths, default=0.0) + LABEL_GAP)
+    return min(most, STYLE["font.size"] * max(map(text_width, labels), default=0.0) + LABEL_GAP)
 
 
-def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes:
-    """Name the axes with their units, write the ticks in the reader's number format, put the legend above."""
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(6))
-        axis.set_major_formatter(number_ticks(decimal))
-    axes.tick_params(length=3)
+def finish(axes: Axes, *, x: str | Ruling, y: str | Ruling, decimal: str, legend: int = 0) -> Axes:
+    """Rule the axes with names, units and the reader's number format, put the legend above; their limits are final."""
+    axes.apply_aspect()
+    for side, given in (("bottom", x), ("left", y)):
+        rule(axes, side, Ruling(given) if isinstance(given, str) else given, decimal=decimal)
     if legend:
         place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
         many = (
@@ -213,26 +200,6 @@ def finish(axes: Axes, *, x: str, y: str, decimal: str, legend: int = 0) -> Axes
         )
         axes.legend(ncols=legend, **place, **many)
     return axes
-
-
-def number_ticks(decimal: str) -> FuncFormatter:
-    """Tick labels with the decimal sign of the language and a true minus, all of an axis to the same decimal place."""
-
-    def label(value: float, _: int | None) -> str:
-        places = _decimal_places(tuple(formatter.locs))
-        return plain(float(f"{value:.6g}"), 4, decimal=decimal) if places is None else fixed(value, places, decimal)
-
-    formatter = FuncFormatter(label)
-    return formatter
-
-
-@lru_cache(maxsize=64)  # every label of an axis asks for the same
-def _decimal_places(ticks: tuple[float, ...]) -> int | None:
-    """Decimal places that all ticks of an axis need; None where one is written with a power of ten."""
-    labels = [plain(float(f"{tick:.6g}"), 4) for tick in ticks]
-    if any("·" in text for text in labels):
-        return None
-    return max((len(text.partition(".")[2]) for text in labels), default=0)
 
 
 def _compact(svg: str, name: str, size: tuple[float, float], title: str, description: str) -> str:

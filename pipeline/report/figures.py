@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
+from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
 from pipeline.settings import ReportSettings
@@ -176,14 +176,13 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
         steps = [step for step in result.steps if step.branch == branch]
         if steps:
             _branch(axes, branch, steps, unit, band_width(settings), words)
-    under = "" if fitted else words("axis_displacement")
+    under = Ruling(labelled=False) if fitted else Ruling(words("axis_displacement"))
     if fitted:
         _simulated(axes, fitted, unit, words)
         rest = plot_area(figure, top=0.68 * height)
         rest.sharex(axes)
         _force_rest(rest, result, words, settings)
     finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
-    axes.tick_params(labelbottom=not fitted)
     return axes
 
 
@@ -215,8 +214,8 @@ def _force_rest(rest: Axes, result: Result, words: Words, settings: ReportSettin
     rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in result.steps)])
     rest.set_ylim(-limit, limit)
-    finish(rest, x=words("axis_displacement"), y=words("axis_sigma"), decimal=words.decimal)
-    rest.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+    sigma = Ruling(words("axis_sigma"), most=4, whole=True)
+    finish(rest, x=words("axis_displacement"), y=sigma, decimal=words.decimal)
 
 
 def _marks(branch: str) -> dict[str, Any]:

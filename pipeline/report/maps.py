@@ -7,12 +7,15 @@ none.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
+from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, number_ticks, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, plot_area
+from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
 from pipeline.result import ResidualMap, Result
 from pipeline.settings import ReportSettings
@@ -21,6 +24,7 @@ from pipeline.units import suited
 Array = NDArray[np.float64]
 # More names than this on an axis cannot be annotated at 440 px.
 ANNOTATED_NAMES = 9
+SHADES = 64  # of a scale of colours; no eye tells more of them apart
 # Below this width, in px, numbers under a map would run into each other: half a page of report.pdf.
 NARROW = 330.0
 
@@ -68,15 +72,11 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: Repor
         interpolation="nearest",
         extent=(s[0], s[-1], len(residuals.steps) - 0.5, -0.5),
     )
-    finish(axes, x=words("axis_s"), y="", decimal=words.decimal)
-    axes.locator_params(axis="x", nbins=6 if width > NARROW else 3)
     axes.set_facecolor(LIGHT["grid"])
-    axes.grid(False)
     every = max(1, len(residuals.steps) // 12)
-    axes.set_yticks(
-        range(0, len(residuals.steps), every),
-        names[::every],
-    )
+    steps = Ruling(at=tuple(range(0, len(names), every)), labels=tuple(names[::every]), grid=False)
+    along = Ruling(words("axis_s"), most=6 if width > NARROW else 3, grid=False)
+    finish(axes, x=along, y=steps, decimal=words.decimal)
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)
     return axes
@@ -93,9 +93,8 @@ def draw_force_rest(
         if residuals.force_sigma:
             values = _numbers(residuals.force_sigma)
             axes.plot(range(values.size), values, color=LIGHT[role], marker=marker, lw=0.8, label=words(label))
-    finish(axes, x=words("step"), y=words("axis_sigma"), decimal=words.decimal, legend=2)
-    axes.set_xticks(range(len(before.steps)), [str(step) for step in before.steps])
-    return axes
+    steps = Ruling(words("step"), at=tuple(range(len(before.steps))), labels=tuple(map(str, before.steps)))
+    return finish(axes, x=steps, y=words("axis_sigma"), decimal=words.decimal, legend=2)
 
 
 def draw_leftover(figure: Area, s_m: list[float], shape_m: list[float], words: Words) -> Axes:
@@ -110,13 +109,16 @@ def _numbers(row: list[float | None]) -> Array:
     return np.array([np.nan if v is None else v for v in row])
 
 
-def _scale(figure: Area, axes: Axes, image: ScalarMappable, label: str, words: Words) -> None:
-    """Colour bar right of the axes."""
+def _scale(figure: Area, axes: Axes, image: AxesImage, label: str, words: Words) -> None:
+    """Colours and their values right of the axes."""
     box, width = axes.get_position(), figure.bbox.width
     bar = figure.add_axes((box.x1 + 12.0 / width, box.y0, 12.0 / width, box.height))
-    figure.colorbar(image, cax=bar, format=number_ticks(words.decimal))
-    bar.set_ylabel(label)
-    bar.grid(False)
+    low, high = image.get_clim()
+    shades = np.linspace(low, high, SHADES)[:, None]
+    bar.imshow(shades, cmap=image.get_cmap(), aspect="auto", origin="lower", extent=(0.0, 1.0, low, high))
+    bar.spines[:].set_visible(True)
+    rule(bar, "bottom", Ruling(at=()), decimal=words.decimal)
+    rule(bar, "right", Ruling(label, grid=False), decimal=words.decimal)
 
 
 def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Words) -> Axes:
@@ -128,10 +130,8 @@ def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Word
     axes = plot_area(figure, left=longest, right=64.0, top=8.0, bottom=0.68 * longest + 8.0)
     table = np.array([[_cosine(cosines, a, b) for b in names] for a in names])
     image = axes.imshow(np.ma.masked_invalid(table), cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
-    axes.set_xticks(range(len(names)), labels, rotation=40, ha="right", rotation_mode="anchor")
-    axes.set_yticks(range(len(names)), labels)
-    axes.tick_params(length=0)
-    axes.grid(False)
+    causes = Ruling(at=tuple(range(len(names))), labels=tuple(labels), grid=False, mark=0.0)
+    finish(axes, x=replace(causes, lean=40.0), y=causes, decimal=words.decimal)
     axes.spines[:].set_visible(False)
     if len(names) <= ANNOTATED_NAMES:
         size = min(9.0, 0.36 * axes.bbox.width / len(names))  # four signs are 2.2 letters wide: a fifth stays free

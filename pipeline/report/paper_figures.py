@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, TWO_ROWS, Area, finish, plot_area, step_colours
+from pipeline.report.ruling import Ruling
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
 from rod.characteristic import Characteristic
 from rod.paper import Difference, TableOne
@@ -37,9 +37,7 @@ def draw_evolution(fit: PaperFit, figure: Area) -> Axes:
     names = [*(f"f_EI({knot:g} 1/m)" for knot in TABLE_1_KNOTS), "K0"]
     for column, (name, colour, mark) in enumerate(zip(names, step_colours(4), "osD^", strict=True)):
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
-    finish(axes, x="iteration", y="relative to Table 1", decimal=".", legend=2)
-    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    return axes
+    return finish(axes, x=Ruling("iteration", whole=True), y="relative to Table 1", decimal=".", legend=2)
 
 
 def draw_iterates(fit: PaperFit, figure: Area) -> Axes:

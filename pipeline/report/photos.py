@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
 from pipeline.report.figures import band_width
+from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart
 from pipeline.settings import ReportSettings
@@ -75,21 +76,14 @@ def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words, settings:
     if seen.any():  # under a cover the band widens without bound; what is seen decides the scale
         low, high = (kappa - half)[seen].min(), (kappa + half)[seen].max()
         axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-    all_axes = [axes]
+    _along_the_cable(axes, s, seen)
     if residual:
-        all_axes.append(_residual(figure, photo, s, words, settings))
-        all_axes[1].sharex(axes)
-    for each in all_axes:
-        for left, right in _hidden(s, seen):
-            each.axvspan(left, right, color=LIGHT["unvisited"], alpha=0.18, lw=0.0)
-        each.set_xlim(s[0], s[-1])
-    label = "" if residual else words("axis_s")
-    finish(axes, x=label, y=words("axis_kappa"), decimal=words.decimal, legend=3)
-    axes.tick_params(labelbottom=not residual)
-    return axes
+        _residual(figure, photo, s, words, settings)
+    under = Ruling(labelled=False) if residual else Ruling(words("axis_s"))
+    return finish(axes, x=under, y=words("axis_kappa"), decimal=words.decimal, legend=3)
 
 
-def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> Axes:
+def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> None:
     """Measured minus simulated position along the normal, with the noise of the photo as a band around zero."""
     axes = plot_area(figure, top=0.66 * figure.bbox.height)
     unit = suited([*photo.shape_residual_m, *photo.shape_residual_std_m], "m", decimal=words.decimal)
@@ -98,9 +92,16 @@ def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, setti
         axes.fill_between(s, -half, half, color=LIGHT["unvisited"], alpha=0.2, lw=0.0)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     axes.plot(s, unit.factor * np.asarray(photo.shape_residual_m), color=LIGHT["measured"], lw=1.2)
-    finish(axes, x=words("axis_s"), y=words("axis_residual", unit=unit.symbol), decimal=words.decimal)
-    axes.locator_params(axis="y", nbins=4)
-    return axes
+    _along_the_cable(axes, s, np.asarray(photo.seen, dtype=bool))
+    left_over = Ruling(words("axis_residual", unit=unit.symbol), most=4)
+    finish(axes, x=words("axis_s"), y=left_over, decimal=words.decimal)
+
+
+def _along_the_cable(axes: Axes, s: np.ndarray, seen: np.ndarray) -> None:
+    """From bearing to bearing, what the photo does not show shaded."""
+    for left, right in _hidden(s, seen):
+        axes.axvspan(left, right, color=LIGHT["unvisited"], alpha=0.18, lw=0.0)
+    axes.set_xlim(s[0], s[-1])
 
 
 def _hidden(s: np.ndarray, seen: np.ndarray) -> list[tuple[float, float]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 
 from pipeline.report.canvas import LIGHT, Area, finish, label_width, plot_area
+from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart
 from pipeline.settings import ReportSettings
@@ -47,13 +48,11 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings:
     pull.set_xlim(-limit, limit)
     reach = max([1.0, *(1.1 * abs(shift) for shift in shifts)])
     impact.set_xlim(-reach, reach)
-    finish(pull, x=words("axis_pull"), y="", decimal=words.decimal)
-    finish(impact, x=words("axis_impact"), y="", decimal=words.decimal)
     for axes in (pull, impact):
-        axes.locator_params(axis="x", nbins=4)
         axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.grid(axis="y", visible=False)
         axes.axvline(0.0, color=LIGHT["muted"], lw=0.8)
-        axes.set_yticks(list(places), labels if axes is pull else [])
-    pull.tick_params(axis="y", length=0)
+    causes = Ruling(at=tuple(places), labels=tuple(labels), grid=False, mark=0.0)
+    finish(pull, x=Ruling(words("axis_pull"), most=4), y=causes, decimal=words.decimal)
+    unnamed = Ruling(at=tuple(places), grid=False, labelled=False)
+    finish(impact, x=Ruling(words("axis_impact"), most=4), y=unnamed, decimal=words.decimal)
     return pull

@@ -30,9 +30,10 @@ def _table() -> dict[str, dict[str, Any]]:
 
 @cache
 def _german_causes() -> dict[str, str]:
-    """German names of the causes, by their names of the contract and by the English ones."""
+    """German names of the causes, by their names of the contract, with and without underscores, and by the English."""
     rows = _table()["causes"].items()
-    return {english: german for name, german in rows for english in (name, spoken(name))}
+    forms = {name: (name, name.replace("_", " "), spoken(name)) for name, _ in rows}  # the second: earlier results
+    return {english: german for name, german in rows for english in forms[name]}
 
 
 @dataclass(frozen=True)
