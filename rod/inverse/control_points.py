@@ -183,8 +183,8 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
     }
     best = max(evidence, key=lambda count: evidence[count])
     count = min(best + options.spare, most)
-    knots, broad = place_knots(low, high, count), rich.posterior(options.tau).prior
-    prior = replace(broad, places=np.interp(knots, rich.model.knots, broad.places))
+    knots = place_knots(low, high, count)
+    prior = rich.posterior(options.tau).prior.carried(rich.model.knots, knots)
     chosen = refit(rich, knots, prior, blur=rich.model.blur, evaluations=options.evaluations)
     used += chosen.evaluations
     if chosen.evaluation.failure is not None:  # the start with fewer control points has no equilibrium

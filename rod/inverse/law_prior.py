@@ -16,7 +16,7 @@ Units: knots in 1/m; z, t and the sizes are pure numbers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,6 +59,18 @@ class LawPrior:
         g = first_slope(self.places)
         values, vectors = np.linalg.eigh(roughness(self.places) / self.tau**2 + np.outer(g, g) / self.slope**2)
         return np.asarray(np.sqrt(values[1:])[:, None] * vectors[:, 1:].T)
+
+    def carried(self, knots: Array, to: Array) -> LawPrior:
+        """The same prior for a spline whose knots lie at `to` (n,) instead of `knots` (k,), both in 1/m and rising.
+
+        Beyond the old knots the places go on with the slope of the nearest two: a fit may visit a little more than its
+        knots cover, and knots that share a place carry no spline.
+        """
+        reach = float(max(knots[0] - to.min(), to.max() - knots[-1], 0.0)) + float(np.ptp(knots))
+        slopes = np.diff(self.places)[[0, -1]] / np.diff(knots)[[0, -1]]
+        beyond = self.places[[0, -1]] + np.array([-reach, reach]) * slopes
+        wide = np.concatenate([[knots[0] - reach], knots, [knots[-1] + reach]])
+        return replace(self, places=np.interp(to, wide, np.concatenate([beyond[:1], self.places, beyond[1:]])))
 
 
 def first_prior(knots: Array) -> LawPrior:

@@ -61,7 +61,7 @@ def averaged(
 ) -> Averaged:
     """Posterior from the rows of an evaluation, the blocks named in `without` left out."""
     J, value = _data_rows(found, without)
-    return _average(value, J, found.unknowns, model.places(found.unknowns), taus)
+    return average(value, J, found.unknowns, model.places(found.unknowns), taus)
 
 
 def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus: tuple[float, float]) -> float:
@@ -74,7 +74,7 @@ def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus:
     projected = np.hstack([J[:, :k] @ onto, J[:, k:]])
     unknowns = np.concatenate([z, found.unknowns[k:]])
     places = replace(model, knots=knots).places(unknowns)
-    return _average(moved, projected, unknowns, places, taus).log_evidence
+    return average(moved, projected, unknowns, places, taus).log_evidence
 
 
 def _data_rows(found: Evaluation, without: tuple[str, ...]) -> tuple[Array, Array]:
@@ -105,11 +105,24 @@ def _even(bounds: tuple[float, float], count: int) -> Array:
     return np.linspace(np.log(bounds[0]), np.log(bounds[1]), count)
 
 
-def _average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], taus: tuple[float, float]) -> Averaged:
+def average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], taus: tuple[float, float]) -> Averaged:
     """Average over the priors of the law's form; only the laws' unknowns (control points, K0) change with them.
 
-    The other unknowns are eliminated once: with A = [[A_ll, A_ln], [A_nl, A_nn]] every prior acts on the Schur
-    complement of A_nn, and mean, covariance and response of all unknowns are linear in what is found there.
+    Parameters
+    ----------
+    value : (n,)
+        Whitened residuals of data and of other prior knowledge than that on the law's form.
+    J : (n, q)
+        Their derivatives by the unknowns.
+    unknowns : (q,)
+        Where they were taken: logarithms of f_EI at the k knots first, then K0 in any unit, then all others.
+    places : tuple of (k,)
+        Of the knots along what the law may be smooth.
+    taus : (low, high)
+        Range of the roughness.
+
+    Strategy: the other unknowns are eliminated once: with A = [[A_ll, A_ln], [A_nl, A_nn]] every prior acts on the
+    Schur complement of A_nn, and mean, covariance and response of all unknowns are linear in what is found there.
     """
     k = places[0].size
     law, rest = slice(0, k + 1), slice(k + 1, unknowns.size)
@@ -122,7 +135,8 @@ def _average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...],
 
     priors, precisions, norms = _priors(places, taus)
     z = unknowns[law]
-    unit = 1.0 / np.sqrt(np.diag(schur))  # unknowns of very different size
+    # Unknowns of very different size; what the data do not see at all is zero but for rounding, of either sign.
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(schur), np.finfo(float).eps * np.diag(A).max()))
     scaled = unit[:, None] * (schur + precisions) * unit
     inverses = unit[:, None] * np.linalg.inv(scaled) * unit
     toward = force - precisions @ z

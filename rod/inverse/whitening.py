@@ -84,7 +84,8 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     x, y = _on_curve(shape, mean, x, y)
     covariance = block_covariance(s, std, first, sections, shape.correlation_length)
     slow = (mean[:, None] - mean[None, :]) / max(shape.systematic_length, 1e-12)
-    covariance += shape.systematic_std**2 * np.exp(-0.5 * slow**2)
+    # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
+    covariance += min(shape.systematic_std, reach) ** 2 * np.exp(-0.5 * slow**2)
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     return Midline(

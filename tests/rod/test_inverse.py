@@ -8,6 +8,7 @@ import pytest
 from rod.characteristic import Characteristic
 from rod.inverse import InverseOutcome, estimate
 from rod.inverse.estimate import invisible_combinations
+from rod.inverse.law_prior import LawPrior
 from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
@@ -201,6 +202,21 @@ def test_one_hardly_bent_step_leaves_parameters_invisible():
     assert result.outcome is not InverseOutcome.CONVERGED
     if result.outcome is InverseOutcome.NOT_VISIBLE:
         assert any("f_EI at" in text for text in result.invisible)
+
+
+@pytest.mark.parametrize("doubt_m", [5.0, 1e3])
+def test_one_photo_that_says_nothing_of_the_shape_ends_in_an_outcome(doubt_m):
+    test = measured(seed=1)
+    steps = [replace(step, shape=None, chord=None, chord_std=None) for step in test.steps]
+    steps[1] = replace(steps[1], shape=replace(test.steps[1].shape, systematic_std=doubt_m))
+    result = estimate(replace(test, steps=tuple(steps)), options=QUICK)
+    assert result.outcome is InverseOutcome.NOT_VISIBLE
+
+
+def test_a_prior_is_carried_to_knots_beyond_its_own():
+    knots = np.array([1.0, 2.0, 4.0])
+    prior = LawPrior(np.array([0.0, 3.0, 5.0]), 1.0, 1.0)
+    assert np.allclose(prior.carried(knots, np.array([0.0, 1.0, 3.0, 4.0, 4.5, 9.0])).places, [-3, 0, 4, 5, 5.5, 10])
 
 
 def test_invisible_combinations_are_named():
