@@ -172,6 +172,14 @@ class CurveSettings(BaseModel):
     min_contrast_to_noise: float = Field(
         5.0, gt=0, description="ratio; below it false edges win and the errors are not Gaussian"
     )
+    patterned_contrast_to_noise: float = Field(
+        2.0,
+        gt=0,
+        description="ratio, where the width is surely constant; strands of two colours scatter by half their contrast",
+    )
+    sure_width_scatter: float = Field(
+        0.04, gt=0, description="relative, robust; edges sought in noise alone scattered by 0.09, in coarse texture by 0.2"
+    )
     min_measured_share: float = Field(
         0.6, gt=0, le=1, description="of the visible sections; with fewer both edges were not found on a cable"
     )

@@ -98,6 +98,11 @@ class SegmentationSettings(StageSettings):
     joint_gap_widths: float = Field(
         5.0, ge=0, description="widths; a sticker, glare or crossing interrupts the mask by a few widths"
     )
+    ring_gap_widths: float = Field(
+        2.5,
+        ge=0,
+        description="widths; a ring or writing on the sheath interrupts the skeleton by so much, a cover by more",
+    )
     min_length_share: float = Field(
         0.2, gt=0, lt=1, description="share of the photo's long side; a shorter strip is not the subject of the photo"
     )
@@ -146,6 +151,14 @@ class SegmentationSettings(StageSettings):
     pair_search_widths: float = Field(
         0.6, gt=0, description="widths; a shadow as wide as the cable draws the mask's middle half a width aside"
     )
+    band_widths: tuple[float, ...] = Field(
+        (2.2, 3.2),
+        description="widths; bands of cable and hard shadow are at most so wide: a lamp 45 and 25 degrees above the"
+        " table; covers are seldom narrower than the first",
+    )
+    min_band_edges: float = Field(
+        0.5, gt=0, le=1, description="share of sections that show both edges of a cable within a band"
+    )
     pair_wander_cost: float = Field(
         0.5,
         ge=0,
@@ -160,7 +173,7 @@ class SegmentationSettings(StageSettings):
     )
     pair_width_doubt: float = Field(
         0.6,
-        gt=0,
+        ge=0,
         lt=1,
         description="weight of a pair far off the given width: diameters are mistyped",
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Image, Standout
+from pipeline.vision.bands import strips_in_bands
 from pipeline.vision.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
 
 
@@ -31,6 +33,7 @@ class Reading:
     thick: Mask
     width: float
     level: float
+    banded: bool = False  # the cable was sought within wider bands
 
     @property
     def longest(self) -> float:
@@ -51,7 +54,7 @@ class Wanted:
 def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Iterator[tuple[Reading, ...]]:
     """Readings with a strip that is long enough, one tuple for each picture and level, the likeliest first.
 
-    Where none has one, the reading with the longest strip comes alone.
+    Then those with the cable in a wider band. Where none has one, the reading with the longest strip comes alone.
     """
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
@@ -62,8 +65,12 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
             given += 1
             yield long
         if given >= settings.max_judged_pictures:
-            return
+            break
         best = max([best, *readings], key=lambda reading: reading.longest)
+    if wanted.width is not None:
+        for reading in islice(_banded(standout, wanted, wanted.width, settings), settings.max_judged_pictures):
+            given += 1
+            yield (reading,)
     if not given:
         yield (best,)
 
@@ -75,8 +82,7 @@ def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> 
         return True
     reach = settings.junction_widths * width
     long = [other for other in reading.strips if other.length > settings.min_piece_widths * width]
-    ends = np.array([end for other in long for end in (other.path[0], other.path[-1])])
-    if any((np.hypot(*(ends - end).T) < reach).sum() >= 3 for end in (strip.path[0], strip.path[-1])):
+    if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
         return True
     near = settings.touching_widths * width
     partners = [o for o in reading.strips if o is not strip and o.length > settings.min_partner_widths * width]
@@ -84,6 +90,16 @@ def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> 
         _touches(end, a, b, near) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)
     ]
     return any(meets)
+
+
+def _arms(path: Array, junction: Array, reach: float) -> int:
+    """How many ends of a path lie at a junction and lead away from it: 0, 1, or 2 of a loop.
+
+    A piece that stays within reach is no arm: a letter, a bearing cover, a shadow where the cable ends.
+    """
+    if np.hypot(*(path - junction).T).max() <= reach:
+        return 0
+    return int((np.hypot(*(path[[0, -1]] - junction).T) < reach).sum())
 
 
 def _touches(end: int, strip: Strip, other: Strip, near: float) -> bool:
@@ -158,14 +174,30 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
         yield reading
 
 
+def _banded(standout: Standout, wanted: Wanted, width: float, settings: SegmentationSettings) -> Iterator[Reading]:
+    """Readings with the cable as part of a wider band: a hard shadow has widened it."""
+    for picture, level in _pictures(standout, settings):
+        mask = strip_mask(picture > level, width, settings)
+        if mask.mean() > settings.max_covered_share:
+            continue
+        for most in settings.band_widths:
+            thick = thick_part(mask, most * width)
+            strips = strips_in_bands(picture, mask, thick, width, most, settings)
+            strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
+            if strips:
+                yield Reading(tuple(strips), mask, thick, width, level, banded=True)
+
+
 def _read(
     above: NDArray[np.bool_], width: float, level: float, wanted: Wanted, settings: SegmentationSettings
 ) -> Reading:
     mask = strip_mask(above, width, settings)
-    thick = thick_part(mask, width, settings)
+    thick = thick_part(mask, settings.thick_widths * width)
     strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
-    if not strips or strips[0].length < wanted.least_length or wanted.across_objects:
-        strips = join_strips(strips, width, settings, obstacle=None if wanted.across_objects else thick)
+    short = not strips or strips[0].length < wanted.least_length
+    gap = settings.joint_gap_widths if short or wanted.across_objects else settings.ring_gap_widths
+    joined = join_strips(strips, width, settings, gap=gap * width, obstacle=None if wanted.across_objects else thick)
+    strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:
         width = strips[0].width
     return Reading(tuple(strips), mask, thick, width, level)

@@ -98,11 +98,14 @@ def _refusal(
     def rejected(code: str, reason: str) -> Rejected:
         return Rejected(rough.image, code, reason, figure=figure)
 
-    if ratio < options.min_contrast_to_noise:
+    # chance gives no constant width: what then counts as noise is a pattern of the sheath or the ground
+    constant = scatter < options.sure_width_scatter
+    needed = options.patterned_contrast_to_noise if constant else options.min_contrast_to_noise
+    if ratio < needed:
         return rejected(
             "photo/contrast",
             f"contrast of the cable's edges is {ratio:.1f} times the noise, too little to place"
-            f" an edge (at least {options.min_contrast_to_noise:g})",
+            f" an edge (at least {needed:g})",
         )
     if sections.blur > options.max_blur_radii * radius:
         return rejected(

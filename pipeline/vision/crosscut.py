@@ -73,16 +73,24 @@ def path_normals(path: Array) -> tuple[Array, Array]:
 
 
 def cut_across(
-    standout: Standout, path: Array, width: float, settings: SegmentationSettings, *, known: bool = False
+    standout: Standout,
+    path: Array,
+    width: float,
+    settings: SegmentationSettings,
+    *,
+    known: bool = False,
+    shaded: bool = False,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
+
+    ``shaded`` says that a hard shadow lies on one side.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
     of edges one width apart gives middle and width of each section (`pipeline.vision.flanks`).
     """
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
-    straight, rows, offsets = _straighten(standout.residual, path, normal, width, settings)
+    straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
     weights = _projection(straight, offsets / width, standout.covariance)
     grey = straight @ weights.astype(np.float32)
     core, flank = np.abs(offsets) < 0.35 * width, (np.abs(offsets) > 0.9 * width) & (np.abs(offsets) < 1.7 * width)
@@ -92,12 +100,7 @@ def cut_across(
     pitch = len(path) / len(rows)
     flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
     step = _core_level(relief, offsets, flanks)
-    # a shadow runs along the cable: it is no texture, and what texture does along the path it does across, too
-    beside = grey[:, flank] - ground[:, None]
-    # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
-    light = round(np.sqrt(12.0) * settings.texture_widths * width / pitch)
-    beside = beside - uniform_filter1d(beside, light, axis=0, mode="nearest")
-    texture = float(np.hypot(_MAD_TO_STD * np.median(np.abs(beside)), settings.min_ground_std))
+    texture = _texture(grey, ground, offsets / width, settings.texture_widths * width / pitch, shaded=shaded)
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")
@@ -107,10 +110,25 @@ def cut_across(
         width=(flanks.right - flanks.left)[nearest],
         step=step[nearest],
         contrast=float(np.median(step)),
-        texture=texture,
+        texture=float(np.hypot(texture, settings.min_ground_std)),
         weights=weights,
         dark=sign < 0,
     )
+
+
+def _texture(grey: Array, ground: Array, offset_widths: Array, light: float, *, shaded: bool) -> float:
+    """Scatter of the ground ``(n, m)`` beside the cable about what changes along it over less than ``light`` rows.
+
+    A shadow runs along the cable: it is no texture, and what texture does along the path it does across, too. The
+    border of a hard shadow (``shaded``) wanders over the columns of its side, and the other side tells.
+    """
+    beside = (np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7)
+    values = grey[:, beside] if shaded else grey[:, beside] - ground[:, None]
+    # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
+    values = np.abs(values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="nearest"))
+    right = offset_widths[beside] > 0.0
+    sides = (values[:, right], values[:, ~right]) if shaded else (values,)
+    return _MAD_TO_STD * min(float(np.median(side)) for side in sides)
 
 
 def _core_level(relief: Array, offsets: Array, flanks: Flanks) -> Array:
@@ -121,7 +139,7 @@ def _core_level(relief: Array, offsets: Array, flanks: Flanks) -> Array:
     return np.asarray(np.median(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
 
 
-def _straighten(
+def straighten(
     picture: Image, path: Array, normal: Array, width: float, settings: SegmentationSettings
 ) -> tuple[Image, Array, Array]:
     """Picture ``(n, m, c)`` along the path, the places of its rows on it, and the offsets of its columns.

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.records import Rejected
+from pipeline.records import Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout
+from pipeline.vision.bands import by_diameter
 from pipeline.vision.bearings import BearingHints, find_bearings, left_first
 from pipeline.vision.candidates import Reading, approaches_itself, branches
 from pipeline.vision.closeup import Closeup, take_closeup
@@ -53,8 +54,9 @@ def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
 ) -> RoughCable | Rejected:
     """One strip: is it the cable? The checks run from what misleads most to what misleads least."""
-    stage = settings.segmentation
-    cut = cut_across(standout, strip.path, reading.width, stage, known=cable.diameter_px is not None)
+    known = cable.diameter_px is not None
+    stage = by_diameter(settings.segmentation) if reading.banded else settings.segmentation
+    cut = cut_across(standout, strip.path, reading.width, stage, known=known, shaded=reading.banded)
     faint = cut.contrast < stage.min_contrast_to_noise * cut.texture
     # Beside a crossing lies more cable, which is no texture; what hardly stands out shows no crossing either.
     if faint and reading.level < stage.least_level:
@@ -75,7 +77,7 @@ def judge_strip(
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
-    cut = cut_across(standout, path, reading.width, stage, known=cable.diameter_px is not None)
+    cut = cut_across(standout, path, reading.width, stage, known=known, shaded=reading.banded)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, settings)
 
@@ -235,4 +237,15 @@ def _assemble(
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
+        findings=tuple(_hidden_end(axis) for axis in axes if axis.kind == "clamp"),
     )
+
+
+def _hidden_end(axis: Bearing) -> Finding:
+    """Say that the line ends where the light does: what the cable does in front of or behind a thing is not seen."""
+    u, v = axis.center_px
+    text = (
+        f"the cable vanishes at something larger near ({u:.0f}, {v:.0f}) px; the line ends there, not at the cable's "
+        "end"
+    )
+    return Finding("photo/hidden-end", "info", text)

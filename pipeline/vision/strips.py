@@ -67,9 +67,9 @@ def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSet
     return cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
 
 
-def thick_part(mask: Mask, width: float, settings: SegmentationSettings) -> Mask:
-    """Things clearly wider than the cable: clamps, covers, the holder."""
-    disc = _disc(settings.thick_widths * width)
+def thick_part(mask: Mask, least: float) -> Mask:
+    """Things at least so many cells wide: clamps, covers, the holder."""
+    disc = _disc(least)
     if len(disc) <= _LARGE_DISC:
         return cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc)
     # The same by distances, whose time does not grow with the disc.
@@ -81,8 +81,15 @@ def thick_part(mask: Mask, width: float, settings: SegmentationSettings) -> Mask
     return np.asarray(cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius).astype(np.uint8)
 
 
-def find_strips(mask: Mask, thick: Mask, width: float, settings: SegmentationSettings) -> list[Strip]:
-    """Strips of about the given width (cells), longest first."""
+def find_strips(
+    mask: Mask,
+    thick: Mask,
+    width: float,
+    settings: SegmentationSettings,
+    *,
+    ratios: tuple[float, float] | None = None,
+) -> list[Strip]:
+    """Strips of about the given width (cells), longest first; ``ratios`` are their least and greatest width to it."""
     grown = cv2.dilate(thick, _disc(3.0))
     thin = mask & (1 - grown)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
@@ -94,7 +101,7 @@ def find_strips(mask: Mask, thick: Mask, width: float, settings: SegmentationSet
         piece = np.pad((labels[v : v + h, u : u + w] == label).astype(np.uint8), 1)
         strip = _trace(piece, width)
         if strip is not None:
-            low, high = settings.width_ratio_range
+            low, high = settings.width_ratio_range if ratios is None else ratios
             if low * width <= strip.width <= high * width:
                 strips.append(
                     Strip(strip.path + np.array([u - 1, v - 1]), strip.width, strip.width_scatter, strip.branch)
@@ -120,12 +127,12 @@ def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[tuple[float
 
 
 def join_strips(
-    strips: list[Strip], width: float, settings: SegmentationSettings, *, obstacle: Mask | None = None
+    strips: list[Strip], width: float, settings: SegmentationSettings, *, gap: float, obstacle: Mask | None = None
 ) -> list[Strip]:
-    """Join strips whose ends face each other across a gap (glare, a sticker), but not across an obstacle."""
+    """Join strips whose ends face each other across a gap (glare, a sticker) up to ``gap``, but not an obstacle."""
     strips = list(strips)
     while True:
-        best = _best_joint(strips, width, settings, obstacle)
+        best = _best_joint(strips, width, settings, gap, obstacle)
         if best is None:
             return sorted(strips, key=lambda strip: -strip.length)
         i, j, first, second = best
@@ -147,16 +154,17 @@ def _bridge(start: Array, stop: Array) -> Array:
 
 
 def _best_joint(
-    strips: list[Strip], width: float, settings: SegmentationSettings, obstacle: Mask | None
+    strips: list[Strip], width: float, settings: SegmentationSettings, least: float, obstacle: Mask | None
 ) -> tuple[int, int, Array, Array] | None:
-    best, least = None, settings.joint_gap_widths * width
+    best = None
     for i, a in enumerate(strips):
         for j in range(i + 1, len(strips)):
             for first in (a.path, a.path[::-1]):
                 for second in (strips[j].path, strips[j].path[::-1]):
                     gap = float(np.hypot(*(second[0] - first[-1])))
-                    free = obstacle is None or not _blocked(first[-1], second[0], obstacle)
-                    if gap < least and free and _continues(first, second, width, settings):
+                    if gap >= least or (obstacle is not None and _blocked(first[-1], second[0], obstacle)):
+                        continue
+                    if _continues(first, second, width, settings):
                         best, least = (i, j, first, second), gap
     return best
 

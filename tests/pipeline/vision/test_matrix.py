@@ -183,7 +183,7 @@ TRACED: dict[str, Case] = {
     "text": Case(sheath=Sheath(text="NYM-J 3x1.5 VDE", gloss=0.3)),
     "red": Case(sheath=Sheath(colour=(0.8, 0.1, 0.1), gloss=0.4), scene={"sensor": Sensor(mode="colour")}),
     "stripe": Case(sheath=Sheath(colour=(0.1, 0.5, 0.1), stripe=0.3), scene={"sensor": Sensor(mode="colour")}),
-    "strands": Case(sheath=Sheath(strands=0.35)),
+    "strands": Case(sheath=Sheath(strands=0.7)),
     "bright on dark": Case(sheath=Sheath(colour=WHITE), scene={"ground": Ground("plain", (0.1, 0.1, 0.1))}),
     "dark covers": Case(scene={"covers": (Cover(0.012, (0.05, 0.05, 0.05), 0.0),) * 2}),
     "light covers": Case(scene={"covers": (Cover(0.012, (0.9, 0.9, 0.9), 0.003),) * 2}),

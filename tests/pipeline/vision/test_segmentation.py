@@ -1,6 +1,7 @@
 """The cable is found on any usable photo and refused with its reason on any other. Truth: the rendered curve."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -10,12 +11,15 @@ from scipy.spatial import cKDTree
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings import BearingHints
+from pipeline.vision.candidates import Reading, branches
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
+from pipeline.vision.strips import Strip
+from tests.pipeline.vision.second_renderer import photograph, random_look
 
 SETTINGS = VisionSettings()
 SCALE = 5_500.0
@@ -114,6 +118,59 @@ def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
         assert rough.left.kind == rough.right.kind == "cover"
         assert np.hypot(*np.subtract(rough.left.center_px, picture.left_px)) < 0.5
         assert np.hypot(*np.subtract(rough.right.center_px, picture.right_px)) < 0.5
+
+
+def strip_of(*corners: tuple[float, float]) -> Strip:
+    """A strip ten cells wide through the corners, points a cell apart."""
+    legs = [np.linspace(a, b, int(np.hypot(*np.subtract(b, a)))) for a, b in pairwise(corners)]
+    return Strip(np.vstack(legs), 10.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("others", "crossing"),
+    [
+        ([((410, 0), (439, 0))], False),  # a cover three cables wide where the cable ends
+        ([((405, 8), (405, 34)), ((408, 0), (435, 0))], False),  # letters
+        ([((405, 5), (480, 80)), ((405, -5), (480, -80))], True),
+        ([((405, 5), (480, 80), (480, -80), (405, -5))], True),  # a loop
+    ],
+)
+def test_crossing_is_where_three_arms_lead_away(others: list[tuple[tuple[float, float]]], crossing: bool) -> None:
+    cable = strip_of((0, 0), (400, 0))
+    strips = (cable, *(strip_of(*corners) for corners in others))
+    none = np.zeros((1, 1), np.uint8)
+    assert branches(cable, Reading(strips, none, none, 10.0, 5.0), SETTINGS.segmentation) == crossing
+
+
+def test_cover_about_three_cables_wide_makes_no_crossing() -> None:
+    wide = Cover(3.0 * DIAMETER, (0.15,) * 3)
+    rough, _ = find(scene(covers=(wide, wide)), UNKNOWN)
+    assert isinstance(rough, RoughCable), rough.reason
+
+
+@pytest.mark.parametrize("azimuth", [-1.3, 1.7])
+def test_cable_is_found_in_the_band_that_it_makes_with_a_hard_shadow(azimuth: float) -> None:
+    lamp = np.array([np.cos(0.45) * np.cos(azimuth), np.cos(0.45) * np.sin(azimuth), np.sin(0.45)])
+    look = replace(random_look(np.random.default_rng(1)), lamp=lamp, shadow=0.6, softness=0.1, ambient=0.4, radius=13.0)
+    look = replace(look, sheath=np.full(3, 0.2), ground=np.full(3, 0.8), specular=0.1, letters=False, texture=0.0)
+    picture = photograph(CURVE, look, DIAMETER, np.random.default_rng(2))
+    rough = find_cable(photo_of(picture), SETTINGS, cable=Cable(26.0, 26.0 * LENGTH / DIAMETER))
+    assert isinstance(rough, RoughCable), rough.reason
+    true = np.column_stack([picture.u_px, picture.v_px])
+    distance, nearest = cKDTree(true).query(rough.path_px)
+    beside = (nearest > 0) & (nearest < len(true) - 1)  # the ends stick out, the truth stops at the axes
+    assert beside.mean() > 0.8
+    assert distance[beside].max() < 0.25 * 26.0
+
+
+def test_end_at_a_larger_thing_is_told() -> None:
+    box = Thing("box", (0.0, 0.0), (0.03, 0.03), 0.0, (0.1,) * 3)
+    rough, _ = find(scene(covers=(None, None), things=(box,)), Cable(DIAMETER * SCALE))
+    assert isinstance(rough, RoughCable)
+    assert (rough.left.kind, rough.right.kind) == ("clamp", "end")
+    (finding,) = rough.findings
+    assert finding.code == "photo/hidden-end"
+    assert f"({rough.left.center_px[0]:.0f}, {rough.left.center_px[1]:.0f}) px" in finding.message
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -240,6 +240,8 @@ def test_real_cable_is_followed_from_clamp_to_clamp(shared_data: Path) -> None:
     # 1.5 m of cable, 4 mm thick
     assert 300 < line.traced_length_m / line.width_m < 420
     assert line.width_std_m < 0.05 * line.width_m
+    # black cable before a black holder: the line ends where the light does, and says so
+    assert [finding.code for finding in line.findings] == ["photo/hidden-end"] * 2
 
 
 @pytest.mark.shared

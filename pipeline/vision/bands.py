@@ -1,0 +1,81 @@
+"""The cable within a band: what it makes together with a hard shadow beside it.
+
+``mask -> pieces up to a few cables wide -> skeleton -> picture straightened along it -> the pair of opposite edges one
+diameter apart -> strip of the cable``
+
+A lamp draws a shadow as dark as the cable, and both melt into one band up to two and a half cables wide that narrows
+where the cable runs along the light. The shadow adds edges of its own; the known diameter tells which two are the
+cable's.
+All lengths in cells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, median_filter
+
+from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.vision.backdrop import Image
+from pipeline.vision.crosscut import path_normals, smooth_path, straighten
+from pipeline.vision.flanks import find_flanks
+from pipeline.vision.strips import Mask, Strip, find_strips
+
+_MAD_TO_STD = 1.4826
+
+
+def strips_in_bands(
+    picture: Image, mask: Mask, thick: Mask, width: float, most: float, settings: SegmentationSettings
+) -> list[Strip]:
+    """Strips of the cable's width within the bands of a mask, longest first.
+
+    Parameters
+    ----------
+    picture : (h, w) ground sigmas
+        What the mask was made of.
+    mask : (h, w)
+    thick : (h, w)
+        What is wider than any band.
+    width : cells
+        The cable's.
+    most : widths
+        Of the widest band.
+    settings : SegmentationSettings
+    """
+    bands = find_strips(mask, thick, width, settings, ratios=(settings.width_ratio_range[0], most))
+    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0), settings) for band in bands]
+    return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
+
+
+def by_diameter(settings: SegmentationSettings) -> SegmentationSettings:
+    """Settings by which the diameter alone tells the pair of edges: the shadow's are as strong as the cable's."""
+    return settings.model_copy(update={"pair_width_doubt": 0.0})
+
+
+def _cable_within(
+    picture: Image, band: Strip, width: float, search: float, settings: SegmentationSettings
+) -> Strip | None:
+    """The cable's strip in a band; None where most sections show no pair of edges."""
+    path = smooth_path(band.path, settings.smoothing_widths * width)
+    # a skeleton runs into a corner of the band over its last half width
+    corner = round(0.5 * band.width)
+    path = path[corner : len(path) - corner]
+    if len(path) < settings.min_piece_widths * width:
+        return None
+    _, normal = path_normals(path)
+    straight, rows, offsets = straighten(picture, path, normal, width, settings)
+    wide = by_diameter(settings).model_copy(update={"pair_search_widths": search})
+    flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), wide, known=True)
+    both = np.isfinite(flanks.left + flanks.right)
+    if both.mean() < settings.min_band_edges:
+        return None
+    middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
+    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width * len(rows) / len(path), mode="nearest")
+    across = (flanks.right - flanks.left)[both]
+    return replace(
+        band,
+        path=path + np.interp(np.arange(len(path)), rows, middle)[:, None] * normal,
+        width=float(np.median(across)),
+        width_scatter=_MAD_TO_STD * float(np.median(np.abs(across - np.median(across)))) / width,
+    )
