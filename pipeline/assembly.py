@@ -11,7 +11,7 @@ import base64
 import datetime
 import importlib.metadata
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -84,6 +84,7 @@ def assemble(
         The command that reproduces the result.
     """
     parts = identification_parts(identification)
+    photos = photo_parts(specimen, traces, parts)
     measured = parts.inverse.converged or parts.balance.curve is not None
     gathered = [
         *specimen.findings,
@@ -94,7 +95,7 @@ def assemble(
     ]
     return Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
-        headline=headline(parts, diagnosis),
+        headline=headline(parts, diagnosis, photos),
         specimen=SpecimenPart(
             id=specimen.id,
             length_m=specimen.length_m,
@@ -108,7 +109,7 @@ def assemble(
             std_relative=traces.scale.std_relative,
             source=traces.scale.source,
         ),
-        photos=photo_parts(specimen, traces, parts),
+        photos=photos,
         steps=parts.steps,
         inverse=parts.inverse,
         balance=parts.balance,
@@ -119,14 +120,17 @@ def assemble(
     )
 
 
-def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None) -> str:
+def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos: Sequence[PhotoPart]) -> str:
     """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
 
-    Where the diagnosis extended the model, what the extended model gives is the answer.
+    Where the diagnosis extended the model, what the extended model gives is the answer; where no photo could be used,
+    why the first was not.
     """
     way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
     extended = visited("extended", diagnosis.extended) if diagnosis is not None else None
     curve = extended or visited(name, way.curve)
+    if curve is None and photos and all(photo.reason for photo in photos):
+        return f"None of the {len(photos)} photos could be used. The first: {photos[0].reason}"
     if curve is None:
         return f"No characteristic was measured: {parts.inverse.advice}."
     low, high = (

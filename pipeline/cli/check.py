@@ -68,8 +68,20 @@ def echo_rows(rows: list[dict[str, Any]]) -> None:
     colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}
     for row in rows:
         state = click.style(f"{row['status']:<8}", colours[row["status"]])
-        counts = "" if row["status"] == "error" else f": {row['steps']} steps, {row['photos']} photos"
-        click.echo(f"{state} {row['id'] or row['folder']}{counts}")
+        counts = "" if row["status"] == "error" else f": {_count(row, 'step')}, {_count(row, 'photo')}"
+        click.echo(f"{state} {_name(row)}{counts}")
         for finding in row["findings"]:
             level = click.style(finding["level"], colours[finding["level"]])
             click.echo(f"{'':8} {level}: {finding['message']} [{finding['code']}]")
+
+
+def _name(row: dict[str, Any]) -> str:
+    """The id, and the folder where that has another name: copied folders keep the id of the first."""
+    if row["id"] is None:
+        return str(row["folder"])
+    return row["id"] if Path(row["folder"]).name == row["id"] else f"{row['id']} ({row['folder']})"
+
+
+def _count(row: dict[str, Any], noun: str) -> str:
+    number = row[f"{noun}s"]
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

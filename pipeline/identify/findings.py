@@ -86,12 +86,16 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
             )
             return
         slope = -np.polyfit(moved, chord, 1)[0]
+        approach = f"on the photos the bearings approach by {slope:.1%} of what the log says"
+        if slope < 0.0:
+            approach = (
+                "on the photos the bearings move apart where the log pushes them together: is their order reversed?"
+            )
         yield Finding(
             "identify/chord-displacement",
             "warning",
             f"chord on the photos and displacement in the log disagree by up to {1e3 * abs(off[worst]):.3f} mm (step "
-            f"{both[worst].step}, {abs(off[worst]) / std[worst]:.0f} standard deviations); on the photos the bearings "
-            f"approach by {slope:.1%} of what the log says",
+            f"{both[worst].step}, {abs(off[worst]) / std[worst]:.0f} standard deviations); {approach}",
         )
 
 

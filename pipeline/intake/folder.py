@@ -111,7 +111,8 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     photos = match_photos(
         folder, log.steps, calibration=file.camera.calibration, log_name=log_path.name, settings=settings
     )
-    sizes = size_findings(file.length_m, file.diameter_m, photos.steps, settings=settings)
+    scale = file.camera.scale_px_per_m
+    sizes = size_findings(file.length_m, file.diameter_m, photos.steps, scale_px_per_m=scale, settings=settings)
     calibration = _calibration_hashes(folder, file, settings)
     names = {NAME: folder / NAME, log_path.relative_to(folder).as_posix(): log_path}
     return Specimen(

@@ -66,7 +66,7 @@ def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:
     if encoding == "cp1252":
         findings.append(inferred("log/encoding-inferred", f"{path.name}: read as cp1252, because it is not UTF-8"))
     if columns.skipped_lines:
-        message = f"{columns.skipped_lines} lines above the header, line {columns.header_line}, were skipped"
+        message = f"the header is line {columns.header_line}; what stands above it was skipped"
         findings.append(inferred("log/metadata", f"{path.name}: {message}"))
     if columns.assumed:
         taken = ", ".join(f"{role} in {columns.units[role]}" for role in columns.assumed)

@@ -18,10 +18,22 @@ from pipeline.settings.intake import IntakeSettings
 
 
 def size_findings(
-    length_m: float, diameter_m: float, steps: Sequence[LoadStep], *, settings: IntakeSettings
+    length_m: float,
+    diameter_m: float,
+    steps: Sequence[LoadStep],
+    *,
+    scale_px_per_m: float | None = None,
+    settings: IntakeSettings,
 ) -> tuple[Finding, ...]:
     """Warnings, with the figures, about sizes that do not fit together."""
     findings = []
+    width = None if scale_px_per_m is None else scale_px_per_m * diameter_m
+    if width is not None and width < settings.cable_width_min_px:
+        message = (
+            f"at the scale given the cable is {width:.2g} px wide on the photos, too thin to be measured: "
+            "scale_px_per_mm counts px per mm, not mm per px"
+        )
+        findings.append(doubtful("size/scale", message))
     slenderness = length_m / diameter_m
     if slenderness < settings.slenderness_min:
         message = f"length_mm / diameter_mm is {slenderness:.3g}; below {settings.slenderness_min:g} a cable does not"

@@ -19,6 +19,7 @@ from pipeline.errors import InputError
 from pipeline.intake.access import read_bytes
 
 Check = Callable[[Any], Any]
+TWICE = re.compile("overwrite|twice|duplicate", re.IGNORECASE)  # in the words of the parser
 HEADER = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]")
 
 
@@ -72,13 +73,11 @@ def read_toml(path: Path, *, limit: int) -> TomlFile:
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else None
         shown = "" if number is None else f" ({lines[min(number, len(lines)) - 1].strip()[:60]!r})"
-        raise InputError(
-            f"is not valid TOML{shown}",
-            path=path,
-            line=number,
-            code="toml/syntax",
-            remedy='write key = value, texts in "double quotes", numbers with a decimal point',
-        ) from error
+        message = f"is not valid TOML{shown}"
+        remedy = 'write key = value, texts in "double quotes", numbers with a decimal point'
+        if TWICE.search(str(error)):
+            message, remedy = f"gives a key or table a second time{shown}", "keep one of the two"
+        raise InputError(message, path=path, line=number, code="toml/syntax", remedy=remedy) from error
     return TomlFile(path, tables, lines)
 
 

@@ -71,6 +71,12 @@ class IntakeSettings(BaseModel):
     scale_range_px_per_mm: tuple[float, float] = Field(
         (0.05, 5_000.0), description="px/mm; from a phone at 10 m to a microscope; outside, surely another unit"
     )
+    cable_width_min_px: float = Field(
+        4.0,
+        gt=0,
+        description="px; diameter times the scale given: a cable thinner than this on the photos has no two edges to "
+        "measure, and the scale was probably written as mm per px",
+    )
     slenderness_min: float = Field(
         5.0, gt=0, description="length / diameter; below, a cable is no rod in bending and a unit is probably wrong"
     )

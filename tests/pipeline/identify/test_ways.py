@@ -123,6 +123,12 @@ def test_chord_against_displacement(measured, settings):
     assert "97.9%" in finding.message or "98.0%" in finding.message  # 1 / 1.02 but for the photos' noise
 
 
+def test_photos_in_reverse_order_are_asked_about(measured, settings):
+    back = with_steps(measured, lambda s: replace(s, displacement=0.016 - s.displacement))
+    (finding,) = chord_findings(back, settings)
+    assert finding.message.endswith("the log pushes them together: is their order reversed?")
+
+
 def test_one_displacement_for_all_steps_is_told(measured, settings):
     still = with_steps(measured, lambda s: replace(s, displacement=0.01))
     (finding,) = chord_findings(still, settings)

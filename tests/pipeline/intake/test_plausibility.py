@@ -51,3 +51,10 @@ def test_stocky_cable_and_odd_displacements():
     assert "size/slenderness" in codes(0.02, 6e-3, 50.0, 1e-3)
     assert "size/displacement" in codes(0.181, 4.6e-3, 0.5, 4.0)
     assert "size/displacement" in codes(0.181, 4.6e-3, 0.5, 4e-6)
+
+
+def test_scale_the_wrong_way_round():
+    seen = size_findings(0.181, 4.6e-3, steps(0.5, 0.012), scale_px_per_m=1e3 / 5.1, settings=SETTINGS)
+    assert [finding.code for finding in seen] == ["size/scale"]
+    assert "0.9 px wide" in seen[0].message and "not mm per px" in seen[0].message
+    assert size_findings(0.181, 4.6e-3, steps(0.5, 0.012), scale_px_per_m=5.1e3, settings=SETTINGS) == ()

@@ -124,3 +124,11 @@ def test_deep_nesting_is_a_syntax_error(tmp_path):
     with pytest.raises(InputError) as refused:
         read(tmp_path, "a = " + "[" * 100_000)
     assert refused.value.code == "toml/syntax"
+
+
+@pytest.mark.parametrize("again", ["length_mm = 182.0", "[specimen]", "x = {a = 1, a = 2}"])
+def test_what_stands_twice_is_called_so(again, tmp_path):
+    (tmp_path / "specimen.toml").write_text(f"[specimen]\nlength_mm = 181.0\n{again}\n")
+    with pytest.raises(InputError, match=r"a second time \(.*\); keep one of the two") as refused:
+        read_specimen_file(tmp_path, SETTINGS)
+    assert (refused.value.code, refused.value.line) == ("toml/syntax", 3)
