@@ -21,7 +21,7 @@ from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.covers import Radius, find_cover
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
-from pipeline.vision.rings import find_mark
+from pipeline.vision.rings import find_marks
 from pipeline.vision.rough import RoughCable
 
 
@@ -69,8 +69,8 @@ def _to_mark(photo: Photo, end: CableEnd, width: float, settings: BearingSetting
     normal = np.array([-end.outward[1], end.outward[0]])
     places = end.place + along[near, None] * end.outward + across[near, None] * normal
     inside = (places >= reach).all(axis=1) & (places < np.array(photo.size) - reach).all(axis=1)
-    mark = find_mark(photo, places[inside], reach, settings) if inside.any() else None
-    return None if mark is None else float(np.hypot(*(np.array(mark.center) - end.place)))
+    marks = find_marks(photo, places[inside], reach, settings) if inside.any() else []
+    return float(np.hypot(*(np.array(marks[0].center) - end.place))) if marks else None
 
 
 def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:

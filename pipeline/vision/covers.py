@@ -21,7 +21,7 @@ from pipeline.settings.vision_stages import BearingSettings
 from pipeline.vision.ends import CableEnd
 from pipeline.vision.photo import Photo
 from pipeline.vision.rim import Circle, Radius, fit_circle
-from pipeline.vision.rings import find_mark, with_rings
+from pipeline.vision.rings import find_marks, with_rings
 
 
 def find_cover(
@@ -55,26 +55,54 @@ def find_cover(
     # A dome lit from one side is brighter than the ground there and darker on the other: quarters of its rim add up.
     # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
     # a sharp rim, what is soft and round is the shadow.
+    partial: Circle | None = None
     sharp, soft = (1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)
     for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
+        if softness > 1.0 and partial is not None:
+            break
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             votes = _votes(window, radius.px / window.reduction, on_cable, settings, sectors=sectors) * prior
             found = _best_circle(photo, window, radius, votes, softness, settings)
-            if found is not None and found.rim >= least:
+            if found is not None and found.rim >= settings.sure_rim:
                 return with_rings(photo, found, radius, settings)
-    return _by_mark(photo, end, radius.px, settings)
+            if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
+                partial = found
+    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
+    ahead = np.exp(-0.5 * (aside / (2.0 * settings.aside_std_radii * radius.px)) ** 2) * (along > 0.0)
+    votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool), settings) * ahead
+    farther = _best_circle(photo, window, radius, votes, 1.0, settings)
+    if farther is not None and farther.rim >= settings.sure_rim:
+        return with_rings(photo, farther, radius, settings)
+    return _by_marks(photo, end, radius, partial, settings)
 
 
-def _by_mark(photo: Photo, end: CableEnd, radius_px: float, settings: BearingSettings) -> Circle | None:
-    """Cover of the ground's own look: the cable ends at its rim, and a dot, screw or bevel marks the axis."""
-    reach = settings.mark_radii * radius_px
-    step, most = reach / settings.mark_cells, 1.5 * settings.aside_std_radii * radius_px
-    across = np.arange(-most, most + step, step)
+def _by_marks(
+    photo: Photo, end: CableEnd, radius: Radius, partial: Circle | None, settings: BearingSettings
+) -> Circle | None:
+    """Cover whose rim shows in parts or not at all, by the dot, screw or bevel on its axis.
+
+    The border of a hard shadow passes for a part of a rim, a screw beside the axis for a mark of it: where both of one
+    centre are seen, that is the cover. A mark alone, near where the cable's end tells, is the axis of a cover of the
+    ground's own look.
+    """
+    reach, spread = settings.mark_radii * radius.px, settings.aside_std_radii * radius.px
+    # An end led astray by a shadow lies twice as far from where it should be.
+    across = np.arange(-3.0 * spread, 3.0 * spread, reach / settings.mark_cells)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
-    grid = grid[np.hypot(*grid.T) <= most]
-    mark = find_mark(photo, end.place + radius_px * end.outward + grid, reach, settings)
-    return None if mark is None else replace(mark, radius=radius_px, radius_std=0.1 * radius_px)
+    expected = end.place + radius.px * end.outward
+    marks = find_marks(photo, expected + grid[np.hypot(*grid.T) <= 3.0 * spread], reach, settings)
+    both: list[Circle] = []
+    for mark in marks:
+        rim = fit_circle(photo, np.array(mark.center), radius, settings)
+        if rim is not None and rim.rim >= settings.min_rim:
+            off = np.hypot(*np.subtract(rim.center, mark.center))
+            both += [rim] if off < settings.same_axis_radii * radius.px else []
+    rims = both if both or partial is None else [partial]
+    if rims:
+        return with_rings(photo, max(rims, key=lambda circle: circle.rim), radius, settings)
+    near = [mark for mark in marks if np.hypot(*(np.array(mark.center) - expected)) < 1.5 * spread]
+    return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
 def _best_circle(

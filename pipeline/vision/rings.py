@@ -63,8 +63,8 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim)
 
 
-def find_mark(photo: Photo, places: Array, reach: float, settings: BearingSettings) -> Circle | None:
-    """The surest ring turned about one of some places: a dot, screw or groove seen all round.
+def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSettings) -> list[Circle]:
+    """Rings turned about some places, the surest first: dots, screws and grooves seen all round.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ def find_mark(photo: Photo, places: Array, reach: float, settings: BearingSettin
 
     Returns
     -------
-    Circle or None
+    list of Circle
     """
     reduction = max(1, int(reach / settings.mark_cells))
     low = np.maximum(np.floor(places.min(axis=0) - 1.2 * reach).astype(int), 0)
     high = np.minimum(np.ceil(places.max(axis=0) + 1.2 * reach).astype(int) + 1, photo.size)
     size = (high - low) // reduction
     if (size < 4).any():
-        return None
+        return []
     part = photo.pixels[low[1] : low[1] + size[1] * reduction, low[0] : low[0] + size[0] * reduction]
     small = Photo(photo.name, reduce_area(part, (int(size[0]), int(size[1]))), photo.bit_depth)
     cells = (places - low - 0.5 * (reduction - 1)) / reduction
@@ -98,7 +98,7 @@ def find_mark(photo: Photo, places: Array, reach: float, settings: BearingSettin
         place = places[int(np.argmax(roundness))]
         found += _rings(photo, _roundest(photo, place, reach, settings), reach, settings)
         roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
-    return min(found, key=lambda ring: ring.std) if found else None
+    return sorted(found, key=lambda ring: ring.std)
 
 
 def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Array:

@@ -85,6 +85,11 @@ LOOKS = {
         "light": Light(0.8, 0.6, ambient=0.35, shadow=0.7, softness=0.1),
         "covers": (Cover(rim=0.3, colour=(0.7,) * 3),) * 2,
     },
+    "faint beside its hard shadow": {
+        "light": Light(-1.2, 0.6, ambient=0.35, shadow=0.75, softness=0.05),
+        "covers": (Cover(colour=(0.45,) * 3),) * 2,
+        "ground": Ground(colour=(0.55,) * 3),
+    },
     "noise of 5 %": {"sensor": Sensor(noise=0.05)},
     "colour, same luminance": {
         "covers": (Cover(colour=(0.95, 0.66, 0.75)),) * 2,
@@ -110,6 +115,12 @@ def test_centre_does_not_depend_on_the_first_guess(off: float, radius_error: flo
     first, stds = centre_errors(scene())
     again, _ = centre_errors(scene(), off=off, radius_error=radius_error)
     assert np.abs(again - first).max() < 0.5 * stds.max()
+
+
+def test_cover_is_found_where_the_cable_seems_to_end_a_radius_before_it() -> None:
+    errors, stds = centre_errors(scene(), off=-1.05)
+    assert np.all(np.abs(errors) < 3.5 * stds[:, None])  # as for any look
+    assert np.all(stds < 0.1)
 
 
 def test_standard_deviation_of_the_centre_is_true() -> None:
