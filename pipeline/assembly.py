@@ -30,7 +30,7 @@ from pipeline.result import (
     ScalePart,
     SpecimenPart,
 )
-from pipeline.rounding import rounded
+from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
 from pipeline.visited import visited
 
@@ -134,7 +134,7 @@ def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos
     if curve is None:
         return f"No characteristic was measured: {parts.inverse.advice}."
     low, high = (
-        f"{rounded(1e3 * curve.tangent[i], 1e3 * curve.tangent_std[i])} mN m² at {curve.kappa[i]:.3g} 1/m"
+        f"{rounded(1e3 * curve.tangent[i], 1e3 * curve.tangent_std[i])} mN m² at {plain(curve.kappa[i], zeros=True)} 1/m"
         for i in (0, -1)
     )
     name = name if extended is None else "extended model"

@@ -354,8 +354,9 @@ def read_result(path: Path | str) -> Result:
     try:
         return from_json(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
+        told = error.strerror.lower() if isinstance(error, OSError) and error.strerror else type(error).__name__
         raise InputError(
-            f"is no readable result ({type(error).__name__})",
+            f"is no readable result ({told})",
             path=file,
             code="result/unreadable",
             remedy="give a result.json that `cablebend run` wrote, or its folder",

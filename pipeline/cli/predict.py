@@ -106,7 +106,7 @@ def echo_prediction(prediction: Prediction) -> None:
     start = rounded(prediction.pre_curvature_per_m, prediction.pre_curvature_std_per_m)
     click.echo(
         f"{prediction.specimen} ({prediction.method}), {plain(1e3 * prediction.length_m, 4)} mm long, "
-        f"K0 {start} 1/m, f_EI known from {plain(low)} to {plain(high)} 1/m"
+        f"K0 {start} 1/m, f_EI known from {plain(low, zeros=True)} to {plain(high, zeros=True)} 1/m"
     )
     for step in prediction.steps:
         shown = f"{plain(1e3 * step.displacement_m, 4):>8} mm  "
