@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pipeline.diagnosis.explanation import Explanation
 from pipeline.diagnosis.leftover import Leftover
@@ -29,6 +29,8 @@ class Conclusion:
         Test of what the accepted model (or the base model) leaves.
     alien : bool
         Whether that exceeds noise and is no small share.
+    instead : list of int
+        Causes of pairs that may stand instead of a single cause of several forms.
     """
 
     singles: list[Explanation]
@@ -38,3 +40,9 @@ class Conclusion:
     two: TwoCauses | None
     left: Leftover
     alien: bool
+    instead: list[int] = field(default_factory=list)
+
+    @property
+    def names(self) -> list[int]:
+        """Causes that form the set of names of a single cause, most probable first."""
+        return list(dict.fromkeys([*(e.causes[0] for e in self.singles[: self.members]), *self.instead]))

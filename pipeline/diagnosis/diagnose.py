@@ -92,8 +92,8 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
-    two = second_cause(bench, singles, named, settings)
-    return _concluded(bench, singles, chance, len(members), two, settings)
+    two, instead = second_cause(bench, singles, named, settings)
+    return replace(_concluded(bench, singles, chance, len(members), two, settings), instead=instead)
 
 
 def _concluded(
@@ -162,9 +162,15 @@ def _with_finer_law(bench: Workbench, accepted: Explanation, settings: Diagnosis
 
 def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Leftover:
     fields = smooth_fields(bench.observation, bench.facts, rows=len(fitted.residual))
-    rng = np.random.default_rng(settings.seed)
-    rows = bench.observation.rows
-    return test_leftover(fitted.residual, fitted.jacobian, fields, draws=settings.null_draws, rng=rng, rows=rows)
+    return test_leftover(
+        fitted.residual,
+        fitted.jacobian,
+        fields,
+        bench.observation,
+        axis_doubt=settings.axis_doubt,
+        draws=settings.null_draws,
+        rng=np.random.default_rng(settings.seed),
+    )
 
 
 def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

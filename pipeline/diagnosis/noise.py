@@ -123,6 +123,17 @@ def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: floa
     return random
 
 
+def by_axes(sections: Sections, chord: float) -> Array:
+    """What unit errors of the bearing axes do to (chord, normal distances of the sections): columns (1 + k, 3).
+
+    Left axis along x, left and right axis across it; the right axis along x moves the chord alone.
+    """
+    normal_x, normal_y = -np.sin(sections.theta), np.cos(sections.theta)
+    share = sections.x / chord
+    shapes = np.column_stack([-normal_x, -normal_y * (1.0 - share), -normal_y * share])
+    return np.vstack([np.r_[-1.0, 0.0, 0.0], shapes])
+
+
 def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
     """Legendre polynomials (k, functions) of ``s / length``: every misfit of a bent cable that the data can show."""
     return np.asarray(np.polynomial.legendre.legvander(2.0 * s / length - 1.0, functions - 1), dtype=float)
@@ -130,10 +141,15 @@ def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
 
 @dataclass(frozen=True)
 class PhotoNoise:
-    """Correction of the stated noise of sections: std times ``factor``, correlation length times ``stretch``."""
+    """Correction of the stated noise of sections: std times ``factor``, correlation length times ``stretch``.
+
+    ``doubt`` is the standard deviation of the logarithm of its slow part's variance, which is what a misfit has to
+    exceed: nothing but its extrapolation from the fast part is known.
+    """
 
     factor: float = 1.0
     stretch: float = 1.0
+    doubt: float = 0.0
 
 
 def calibrate_photo_noise(
@@ -147,8 +163,9 @@ def calibrate_photo_noise(
 ) -> PhotoNoise:
     """Noise level and correlation of the sections from what is faster along s than ``bases``.
 
-    Restricted maximum likelihood over all photos: the smooth basis is projected out, so neither a misfit of the model
-    nor a cause can raise the level.
+    Restricted likelihood over all photos: the smooth basis is projected out, so neither a misfit of the model nor a
+    cause can raise the level. The stretch is the mean over the likelihood, not its maximum: that jumps from trial to
+    trial, and the slow noise with it.
 
     Parameters
     ----------
@@ -157,7 +174,7 @@ def calibrate_photo_noise(
     sections, bases : lists
         Per photo; bases (k, q) as of `smooth_basis`.
     stretches : tuple of float
-        Trial factors of the stated correlation length.
+        Trial factors of the stated correlation length, at equal ratios or nearly so.
     stretch_spread : float
         Standard deviation of the logarithm of that factor before the photos are looked at. What is fast along s tells
         factor^2 / stretch well and the stretch alone badly, but the slow noise that a cause must exceed goes with
@@ -169,21 +186,31 @@ def calibrate_photo_noise(
     -------
     PhotoNoise
     """
-    contrasts = [linalg.qr(basis)[0][:, basis.shape[1] :] for basis in bases]
-    fast = [contrast.T @ residual for contrast, residual in zip(contrasts, residuals, strict=True)]
-    best, likelihood = PhotoNoise(), -np.inf
-    for stretch in stretches:
-        square, freedom, determinant = prior_weight, prior_weight, 0.0
-        for part, block, contrast in zip(fast, sections, contrasts, strict=True):
-            root = linalg.cholesky(contrast.T @ section_covariance(block, stretch=stretch) @ contrast, lower=True)
+    turned = [linalg.qr(basis)[0] for basis in bases]
+    split = [(q[:, : basis.shape[1]], q[:, basis.shape[1] :]) for q, basis in zip(turned, bases, strict=True)]
+    fast = [contrast.T @ residual for (_, contrast), residual in zip(split, residuals, strict=True)]
+
+    def level(stretch: float) -> tuple[float, float, float]:
+        """Factor, log-likelihood and log of the slow variance at a stretch."""
+        square, freedom, determinant, slow = prior_weight, prior_weight, 0.0, 0.0
+        for part, block, (smooth, contrast) in zip(fast, sections, split, strict=True):
+            covariance = section_covariance(block, stretch=stretch)
+            root = linalg.cholesky(contrast.T @ covariance @ contrast, lower=True)
             square += float(np.sum(linalg.solve_triangular(root, part, lower=True) ** 2))
             freedom += contrast.shape[1]
             determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
+            slow += float(np.sum(smooth * (covariance @ smooth)))
         off = np.log(stretch) / stretch_spread
         value = -0.5 * (determinant + freedom * np.log(square / freedom) + off**2)
-        if value > likelihood:
-            best, likelihood = PhotoNoise(float(np.sqrt(square / freedom)), stretch), value
-    return best
+        return float(np.sqrt(square / freedom)), value, float(np.log(slow * square / freedom))
+
+    trials = np.array([level(stretch) for stretch in stretches])
+    weight = np.exp(trials[:, 1] - trials[:, 1].max())
+    weight /= weight.sum()
+    stretch = float(np.exp(weight @ np.log(stretches)))
+    freedom = prior_weight + sum(part.size for part in fast)
+    scatter = float(weight @ (trials[:, 2] - weight @ trials[:, 2]) ** 2)
+    return PhotoNoise(level(stretch)[0], stretch, float(np.sqrt(scatter + 2.0 / freedom)))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from pipeline.diagnosis.noise import (
     PhotoNoise,
     Sections,
     block_means,
+    by_axes,
     force_noise,
     section_covariance,
     smooth_basis,
@@ -181,11 +182,7 @@ def _whitening(
     takes residuals to components of unit variance.
     """
     axis = chord_std / np.sqrt(2.0)
-    # columns: left axis along x, left and right axis across; right axis along x moves the chord alone
-    normal_x, normal_y = -np.sin(sections.theta), np.cos(sections.theta)
-    share = sections.x / chord
-    shape_by_axis = np.column_stack([-normal_x, -normal_y * (1.0 - share), -normal_y * share])
-    by_axis = np.vstack([np.r_[-1.0, 0.0, 0.0], shape_by_axis])
+    by_axis = by_axes(sections, chord)
     joint = np.zeros((1 + len(sections.s), 1 + len(sections.s)))
     joint[1:, 1:] = section_covariance(sections, factor=noise.factor, stretch=noise.stretch)
     joint[0, 0] = axis**2 + settings.displacement_std**2

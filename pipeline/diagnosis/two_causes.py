@@ -4,9 +4,17 @@ A second cause is asked for where something scores beside the best single cause,
 single cause can on the exhaustive linear search (the best single cause may be neither of two that act together). Two
 causes may also hide each other: their scores cancel, and only the best pair stands out (`masking`).
 
+The linear search is only a start, since one cause of a pair is judged rightly beside the right amount of the other
+alone: each cause of the best pair is taken out in turn, everything is scored beside the other as it is there, and what
+scores nearly as much is refitted in its place (`_exchanged`), until no exchange makes the pair better.
+
 Every pair that is accepted for itself is weighed like the single causes are (`verdict.probabilities`); those that
 together hold 95 % form the set, and with them every pair that differs by a twin. So each of the two causes has a class
 of names: what stands in its place in the pairs of the set.
+
+One cause of several forms may do what two plain ones do (friction between the wires in two elements: friction of the
+bearings and set). It has as many free numbers, so a larger gain of either is no proof. Both are weighed, two causes
+with a lower probability beforehand, and whichever wins, the other joins the names unless it is improbable.
 """
 
 from __future__ import annotations
@@ -17,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanation import Explanation, candidates, explanation_of, fit_terms
+from pipeline.diagnosis.fit import Fit, fit
 from pipeline.diagnosis.pairs import Pair, best_pairs, null_pair_gain, pair_gains
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.twins import between_causes, cosines
@@ -36,15 +45,18 @@ class TwoCauses:
     pairs : list of Explanation
         Most probable first; the causes of each in the order of the first one's: what stands for what.
     probability : list of float
-        Of each, given that it is one of them.
+        Of each, given that it is one of them or one of ``alone``.
+    alone : tuple of int
+        Causes of several forms that may stand for both.
     """
 
     pairs: list[Explanation]
     probability: list[float]
+    alone: tuple[int, ...] = ()
 
     def names(self, place: int) -> list[int]:
         """Causes that may stand at a place (0 or 1), the most probable pair's first."""
-        return list(dict.fromkeys(pair.causes[place] for pair in self.pairs))
+        return list(dict.fromkeys([*(pair.causes[place] for pair in self.pairs), *self.alone]))
 
     def chance(self, cause: int) -> float:
         """Probability of the pairs a cause is part of."""
@@ -53,35 +65,59 @@ class TwoCauses:
 
 def second_cause(
     bench: Workbench, singles: list[Explanation], named: set[int], settings: DiagnosisSettings
-) -> TwoCauses | None:
+) -> tuple[TwoCauses | None, list[int]]:
     """Pairs that are significant beyond the best single cause and of which neither half can be dropped.
 
     Another control point of the law beside a cause is a finer base and no second cause; that pair stands for the cause
     alone, which must then be one of those ``named`` by itself.
+
+    Returns
+    -------
+    TwoCauses or None
+    list of int
+        Where a single cause stays more probable: causes of pairs that may stand instead of it.
     """
     best = max(singles, key=lambda e: e.gain)
     suspicion = bench.suspicion
     second = suspect(bench.observation, best.fitted, suspicion.causes, visible=settings.visible, trace=settings.trace)
     if second.statistic.size == 0:
-        return None
+        return None, []
     limit = scored(bench.test, bench.observation, best.fitted, second, settings).limit
     least = max(limit**2, settings.pair_share * best.gain)
     linear = _linear_pairs(bench, settings)
     beyond = linear[0].gain - max(best.gain, bench.largest**2) if linear else 0.0
-    if max(float(second.statistic.max()) ** 2, beyond) <= least:
-        return None
+    if not _composed(best) and max(float(second.statistic.max()) ** 2, beyond) <= least:
+        return None, []
     found = _refitted(bench, linear, settings, hopeless=best.fitted.chi2)
     found += _beside(bench, best, second, settings)
-    alone = {e.causes[0]: e.gain for e in singles}
-    accepted = []
-    for pair in found:
+
+    def acceptable(pair: Explanation) -> bool:
         beside_law = [c for c in pair.causes if suspicion.causes[c].name != "nonlinear_stiffness"]
-        if len(beside_law) == 1 and beside_law[0] not in named:
-            continue
-        others = [alone.get(cause, _linear_gain(suspicion, cause)) for cause in pair.causes]
-        if pair.gain - max(best.gain, *others) > least:
-            accepted.append(pair)
-    return _weighed(bench, accepted, settings)
+        known = len(beside_law) != 1 or beside_law[0] in named
+        return known and _both_needed(pair, singles, suspicion, least)
+
+    accepted = [pair for pair in found if acceptable(pair)]
+    accepted += [pair for pair in _exchanged(bench, accepted, settings) if acceptable(pair)]
+    return _weighed(bench, accepted, settings, [e for e in singles if _composed(e)])
+
+
+def _composed(single: Explanation) -> bool:
+    """Whether a single cause acts in several forms, and so may do what two causes do."""
+    return len(single.fitted.extension.terms) > 1
+
+
+def _both_needed(pair: Explanation, singles: list[Explanation], suspicion: Suspicion, least: float) -> bool:
+    """Whether either half would be missed: beside the other, and against all single causes that are simpler."""
+    for cause in pair.causes:
+        own = [k for k, term in enumerate(pair.fitted.extension.terms) if term.cause is suspicion.causes[cause]]
+        at = [pair.fitted.extension.owners[k] for k in own]
+        amount, covariance = pair.fitted.vector[at], pair.fitted.covariance[np.ix_(at, at)]
+        if float(amount @ np.linalg.solve(covariance, amount)) <= least:
+            return False
+    refitted = {e.causes[0] for e in singles}
+    simpler = [e.gain for e in singles if not _composed(e) or e.weighed.tuned < pair.weighed.tuned]
+    simpler += [_linear_gain(suspicion, cause) for cause in pair.causes if cause not in refitted]
+    return pair.gain - max(simpler, default=0.0) > least
 
 
 def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
@@ -102,9 +138,9 @@ def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
     )
     if linear[0].gain <= limit:
         return None
-    found = _refitted(bench, linear, settings, hopeless=bench.base.chi2)
+    found = _exchanged(bench, _refitted(bench, linear, settings, hopeless=bench.base.chi2), settings)
     law = [k for k, cause in enumerate(suspicion.causes) if cause.name == "nonlinear_stiffness"]
-    return _weighed(bench, [e for e in found if e.gain > limit and not set(law) & set(e.causes)], settings)
+    return _weighed(bench, [e for e in found if e.gain > limit and not set(law) & set(e.causes)], settings, [])[0]
 
 
 def _linear_pairs(bench: Workbench, settings: DiagnosisSettings) -> list[Pair]:
@@ -156,28 +192,107 @@ def _beside(bench: Workbench, best: Explanation, second: Suspicion, settings: Di
     return found
 
 
-def _weighed(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> TwoCauses | None:
-    """The set of pairs, each pair of causes once, by its best fit."""
+def _exchanged(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
+    """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
+    every, done = list(found), set[frozenset[int]]()
+    for _ in range(EXCHANGES):
+        best = max(every, key=_worth, default=None)
+        if best is None or frozenset(best.causes) in done:
+            break
+        done.add(frozenset(best.causes))
+        for place in (0, 1):
+            every += _in_place_of(bench, best, place, settings)
+    return every[len(found) :]
+
+
+EXCHANGES = 2
+"""Rounds at most; the second is for what the first has put right."""
+
+
+def _worth(explanation: Explanation) -> float:
+    """Logarithm of its weight, as far as fit and free numbers go."""
+    return 0.5 * explanation.gain - explanation.weighed.tuned
+
+
+def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings) -> list[Explanation]:
+    """The pair with one of its causes replaced by whatever scores nearly as much beside the other."""
+    suspicion, other, found = bench.suspicion, pair.causes[1 - place], []
+    rest = _without(bench, pair.fitted, pair.causes[place], settings)
+    if rest is None:
+        return []
+    beside = suspect(bench.observation, rest, suspicion.causes, visible=settings.visible, trace=settings.trace)
+    if beside.statistic.size == 0:
+        return []
+    near = settings.model_copy(update={"refit_margin": settings.exchange_margin, "refit_most": settings.exchange_most})
+    for cause in candidates(beside, near):
+        direction = beside.best(cause)
+        if cause in pair.causes or direction is None:
+            continue  # itself, or further forms of the other cause: that is a single cause
+        fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2)
+        if fitted is not None and not fitted.converged:  # kinks: the form as it is scored does not stall
+            fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, tuned=False) or fitted
+        if fitted is not None:
+            causes = (cause, other) if place == 0 else (other, cause)
+            found.append(explanation_of(causes, bench.base, fitted, suspicion))
+    return found
+
+
+def _without(bench: Workbench, fitted: Fit, cause: int, settings: DiagnosisSettings) -> Fit | None:
+    """The model with a cause taken out and all else left where it is; None where that has no equilibrium."""
+    kind, extension = bench.suspicion.causes[cause], fitted.extension
+    gone = [
+        list(range(at, at + 1 + len(term.variant.tuned)))
+        for at, term in zip(extension.owners, extension.terms, strict=True)
+        if term.cause is kind
+    ]
+    rest = fit(
+        bench.observation,
+        replace(extension, terms=tuple(term for term in extension.terms if term.cause is not kind)),
+        np.delete(fitted.vector, np.concatenate(gone)),
+        iterations=0,
+        tolerance=settings.tolerance,
+        near=fitted.run,
+    )
+    return None if rest.run.prediction is None else rest
+
+
+def _weighed(
+    bench: Workbench, found: list[Explanation], settings: DiagnosisSettings, singles: list[Explanation]
+) -> tuple[TwoCauses | None, list[int]]:
+    """The set of pairs, each pair of causes once, by its best fit; and what may stand instead, see `second_cause`.
+
+    ``singles`` are the causes of several forms that may do what two do.
+    """
     best: dict[frozenset[int], Explanation] = {}
-    for pair in sorted(found, key=lambda e: -e.gain):
+    for pair in sorted(found, key=lambda e: -_worth(e)):
         best.setdefault(frozenset(pair.causes), pair)
     if not best:
-        return None
+        return None, []
     pairs = list(best.values())
+    every = [*pairs, *singles]
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
     weight = probabilities(
-        [e.weighed for e in pairs], reduced_chi2=pairs[0].fitted.chi2 / freedom, implausible=settings.implausible
+        [e.weighed for e in every],
+        reduced_chi2=min(e.fitted.chi2 for e in every) / freedom,
+        implausible=settings.implausible,
     )
+    weight = weight * np.where(np.arange(len(every)) < len(pairs), settings.pair_prior, 1.0)
+    weight /= weight.sum()
+    members = credible_set(weight, level=settings.set_level)
+    if float(weight[: len(pairs)].sum()) < 0.5:
+        return None, list(dict.fromkeys(cause for k in members if k < len(pairs) for cause in pairs[k].causes))
+    alone = tuple(dict.fromkeys(every[k].causes[0] for k in members if k >= len(pairs)))
     suspicion = bench.suspicion
     closeness = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
-    members = credible_set(weight, level=settings.set_level)
+    own = weight[: len(pairs)]
+    members = [k for k in members if k < len(pairs)]
     first = pairs[members[0]]
     pairs = [_in_order(pair, first, closeness) for pair in pairs]
     alike = np.array([min(closeness[a, b] for a, b in zip(pair.causes, first.causes, strict=True)) for pair in pairs])
     gain = np.array([pair.gain for pair in pairs])
-    members = with_twins(members, weight, gain, alike, cosine=settings.twin_cosine, margin=settings.twin_margin)
-    share = weight[members] / weight[members].sum()
-    return TwoCauses([pairs[k] for k in members], share.tolist())
+    members = with_twins(members, own, gain, alike, cosine=settings.twin_cosine, margin=settings.twin_margin)
+    share = own[members] / (own[members].sum() + weight[len(pairs) :].sum())
+    return TwoCauses([pairs[k] for k in members], share.tolist(), alone), []
 
 
 def _in_order(pair: Explanation, first: Explanation, closeness: Array) -> Explanation:

@@ -46,11 +46,16 @@ class DiagnosisSettings(BaseModel):
     noise_prior_weight: float = Field(
         20.0, description="samples; what the noise level stated by the photos counts for against the level seen"
     )
+    axis_doubt: float = Field(
+        0.4,
+        description="log of the variance; what a photo states of its bearing axes can be checked against nothing here,"
+        " and 20 % of a standard deviation is a common error of such statements",
+    )
 
     # detection
     false_alarm: float = Field(0.01, description="probability of naming anything on a specimen without effect")
     alien_false_alarm: float = Field(
-        0.003, description="probability of `unexplained` on a specimen without effect; on top of false_alarm"
+        0.005, description="probability of `unexplained` on a specimen without effect; on top of false_alarm"
     )
     null_draws: int = Field(20000, description="draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma")
     power: float = Field(0.9, description="probability at which the minimal detectable effect is stated")
@@ -88,6 +93,15 @@ class DiagnosisSettings(BaseModel):
     )
     pair_collinear: float = Field(0.985, description="|cos| above which the split between two causes is noise")
     pairs_refitted: int = Field(6, description="best pairs of the exhaustive linear search that are refitted; time")
+    exchange_margin: float = Field(
+        0.15,
+        description="share of the score beside the other cause that a rival may fall short of and still be refitted in"
+        " the place of one of two",
+    )
+    exchange_most: int = Field(4, description="rivals refitted in the place of one of two causes at most; time")
+    pair_prior: float = Field(
+        0.1, description="probability of two causes against one of as many free numbers, before the data are looked at"
+    )
     masked_least: float = Field(
         20.0,
         description="chi-square of the best pair below which it is never significant, so no null is simulated; time",

@@ -1,0 +1,68 @@
+"""Two causes: which pair, and what may stand in the place of each."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.hidden import Protocol, Reading, hidden_test
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.explanation import Explanation
+from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis.pairs import Pair
+from pipeline.diagnosis.two_causes import _exchanged, _refitted, _weighed
+from pipeline.diagnosis.verdict import Weighed
+from pipeline.diagnosis.workbench import prepare
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+SETTINGS = DiagnosisSettings()
+
+
+def explanation(causes, gain, tuned):
+    return Explanation(causes, SimpleNamespace(chi2=500.0 - gain), gain, Weighed(gain, tuned=tuned))
+
+
+@pytest.fixture
+def bench():
+    base = SimpleNamespace(residual=np.zeros(120), extension=SimpleNamespace(size=8))
+    scores = SimpleNamespace(unit=np.eye(4))
+    return SimpleNamespace(
+        base=base, suspicion=SimpleNamespace(scores=scores, owner=np.arange(4), causes=CATALOGUE[:4])
+    )
+
+
+PAIR = (0, 1)
+
+
+def test_a_pair_that_fits_better_than_one_cause_of_several_forms_stands_alone(bench):
+    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 370.0, 3)])
+    assert two is not None and [two.names(place) for place in (0, 1)] == [[0], [1]]
+    assert two.chance(0) == pytest.approx(1.0, abs=1e-6) and instead == []
+
+
+def test_one_cause_of_several_forms_that_fits_as_well_may_stand_for_both(bench):
+    """Two more free numbers cost it exp(-2), the pair's prior is a tenth: of equal gain it keeps a place."""
+    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 4)])
+    assert two is not None and instead == []
+    assert [two.names(place) for place in (0, 1)] == [[0, 2], [1, 2]] and 0.5 < two.chance(0) < 0.95
+
+
+def test_the_causes_of_a_pair_that_fits_as_well_join_the_class_of_one_cause(bench):
+    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
+    assert two is None and instead == [0, 1]
+    assert _weighed(bench, [explanation(PAIR, 390.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
+
+
+def test_a_wrong_half_of_a_pair_is_exchanged():
+    """Beside a force that decays, a wrong scale is put right: it is the lens, which moves the same points."""
+    steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
+    reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
+    test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=4, refine=False)
+    names = [cause.name for cause in CATALOGUE]
+    scale, decay, lens = (names.index(n) for n in ("scale_error", "relaxation", "lens_distortion"))
+    given = Pair(bench.suspicion.best(scale), bench.suspicion.best(decay), 0.0)
+    (wrong,) = _refitted(bench, [given], SETTINGS, hopeless=bench.base.chi2)
+    best = max(_exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
+    assert best.causes == (lens, decay) and best.gain > wrong.gain + 16.0
