@@ -134,8 +134,8 @@ def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos
     if curve is None:
         return f"No characteristic was measured: {parts.inverse.advice}."
     low, high = (
-        f"{rounded(1e3 * curve.tangent[i], 1e3 * curve.tangent_std[i])} mN m² at {plain(curve.kappa[i], zeros=True)} 1/m"
-        for i in (0, -1)
+        f"{rounded(1e3 * f, 1e3 * std)} mN m² at {plain(kappa, zeros=True)} 1/m"
+        for kappa, f, std in ((curve.kappa[i], curve.tangent[i], curve.tangent_std[i]) for i in (0, -1))
     )
     name = name if extended is None else "extended model"
     start = rounded(*((way.pre_curvature_per_m, way.pre_curvature_std_per_m) if extended is None else extended.rest()))

@@ -72,8 +72,8 @@ def echo_comparison(comparison: Comparison) -> None:
 
     click.echo(comparison.statement)
     if comparison.range_per_m is not None:
-        low, high = comparison.range_per_m
-        click.echo(f"compared: {' with '.join(comparison.methods)}, {plain(low, zeros=True)} to {plain(high, zeros=True)} 1/m")
+        low, high = (plain(kappa, zeros=True) for kappa in comparison.range_per_m)
+        click.echo(f"compared: {' with '.join(comparison.methods)}, {low} to {high} 1/m")
     mean, rest = comparison.mean_stiffness, comparison.pre_curvature
     if mean is not None:
         change = rounded(100 * mean.difference / mean.a, 100 * mean.std / mean.a)
