@@ -178,7 +178,7 @@ class CurveSettings(BaseModel):
         description="ratio, where the width is surely constant; strands of two colours scatter by half their contrast",
     )
     sure_width_scatter: float = Field(
-        0.04, gt=0, description="relative, robust; edges sought in noise alone scattered by 0.09, in coarse texture by 0.2"
+        0.04, gt=0, description="relative, robust; edges sought in noise scattered by 0.09, in coarse texture by 0.2"
     )
     min_measured_share: float = Field(
         0.6, gt=0, le=1, description="of the visible sections; with fewer both edges were not found on a cable"

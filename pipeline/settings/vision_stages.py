@@ -67,6 +67,18 @@ class SegmentationSettings(StageSettings):
     min_contrast_to_noise: float = Field(
         5.0, gt=0, description="ratio; below it the edges' errors stop being Gaussian and false edges win"
     )
+    sure_edges_share: float = Field(
+        0.95, gt=0, le=1, description="share of sections with both edges from which their distance can show the cable"
+    )
+    sure_width_off: float = Field(
+        0.1, gt=0, description="relative; distance of the edges to a known diameter: scale and blur are off by less"
+    )
+    sure_width_scatter: float = Field(
+        0.04, gt=0, description="relative, robust; a cable's edges keep their distance, a texture's vary by 0.1"
+    )
+    sure_texture_weight: float = Field(
+        0.5, gt=0, le=1, description="weight of the texture beside a strip whose width shows that it is the cable"
+    )
     reduced_side_cells: int = Field(
         1000,
         ge=200,
@@ -99,9 +111,7 @@ class SegmentationSettings(StageSettings):
         5.0, ge=0, description="widths; a sticker, glare or crossing interrupts the mask by a few widths"
     )
     ring_gap_widths: float = Field(
-        2.5,
-        ge=0,
-        description="widths; a ring or writing on the sheath interrupts the skeleton by so much, a cover by more",
+        2.5, ge=0, description="widths; a ring or writing on the sheath interrupts the skeleton so far, covers farther"
     )
     min_length_share: float = Field(
         0.2, gt=0, lt=1, description="share of the photo's long side; a shorter strip is not the subject of the photo"
@@ -152,9 +162,7 @@ class SegmentationSettings(StageSettings):
         0.6, gt=0, description="widths; a shadow as wide as the cable draws the mask's middle half a width aside"
     )
     band_widths: tuple[float, ...] = Field(
-        (2.2, 3.2),
-        description="widths; bands of cable and hard shadow are at most so wide: a lamp 45 and 25 degrees above the"
-        " table; covers are seldom narrower than the first",
+        (2.2, 3.2), description="widths; cable and hard shadow together, by a lamp 45 and 25 degrees above the table"
     )
     min_band_edges: float = Field(
         0.5, gt=0, le=1, description="share of sections that show both edges of a cable within a band"
@@ -172,10 +180,7 @@ class SegmentationSettings(StageSettings):
         0.25, gt=0, description="logarithm; how far a given diameter may be off before the edges count for less"
     )
     pair_width_doubt: float = Field(
-        0.6,
-        ge=0,
-        lt=1,
-        description="weight of a pair far off the given width: diameters are mistyped",
+        0.6, ge=0, lt=1, description="weight of a pair far off the given width: diameters are mistyped"
     )
     pair_width_share: float = Field(
         0.9, gt=0, lt=1, description="ratio to the best pair's score from which a wider pair is preferred"

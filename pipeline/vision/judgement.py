@@ -25,6 +25,8 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.strips import Strip
 
+_MAD_TO_STD = 1.4826
+
 
 @dataclass(frozen=True)
 class Cable:
@@ -50,6 +52,22 @@ def _too_faint(photo: Photo, ratio: float, stage: SegmentationSettings) -> Rejec
     )
 
 
+def _disturbance(cut: CrossCut, standout: Standout, cable: Cable, stage: SegmentationSettings) -> float:
+    """Texture of the ground that counts against a strip: less of it where the strip's width shows that it is the cable.
+
+    Texture alone gives no two edges one diameter apart all along.
+    """
+    if cable.diameter_px is None:
+        return cut.texture
+    width = cut.width[np.isfinite(cut.width)] * standout.reduction / cable.diameter_px
+    if len(width) < stage.sure_edges_share * len(cut.width):
+        return cut.texture
+    off = abs(float(np.median(width)) - 1.0)
+    scatter = _MAD_TO_STD * float(np.median(np.abs(width - np.median(width))))
+    sure = off < stage.sure_width_off and scatter < stage.sure_width_scatter
+    return stage.sure_texture_weight * cut.texture if sure else cut.texture
+
+
 def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
 ) -> RoughCable | Rejected:
@@ -57,10 +75,11 @@ def judge_strip(
     known = cable.diameter_px is not None
     stage = by_diameter(settings.segmentation) if reading.banded else settings.segmentation
     cut = cut_across(standout, strip.path, reading.width, stage, known=known, shaded=reading.banded)
-    faint = cut.contrast < stage.min_contrast_to_noise * cut.texture
+    ratio = cut.contrast / _disturbance(cut, standout, cable, stage)
+    faint = ratio < stage.min_contrast_to_noise
     # Beside a crossing lies more cable, which is no texture; what hardly stands out shows no crossing either.
     if faint and reading.level < stage.least_level:
-        return _too_faint(photo, cut.contrast / cut.texture, stage)
+        return _too_faint(photo, ratio, stage)
     if branches(strip, reading, stage) or approaches_itself(strip.path, reading.width):
         place = standout.to_pixels(strip.path[len(strip.path) // 2])
         return refused(
@@ -72,14 +91,14 @@ def judge_strip(
             v_px=float(place[1]),
         )
     if faint:
-        return _too_faint(photo, cut.contrast / cut.texture, stage)
+        return _too_faint(photo, ratio, stage)
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = cut_across(standout, path, reading.width, stage, known=known, shaded=reading.banded)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
-    return refusal if refusal is not None else _assemble(photo, standout, cut, axes, settings)
+    return refusal if refusal is not None else _assemble(photo, standout, cut, axes, cable, settings)
 
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
@@ -186,7 +205,7 @@ def _check_width(
             width_px=median,
             diameter_px=cable.diameter_px,
         )
-    scatter = 1.4826 * float(np.median(np.abs(widths - median))) / median
+    scatter = _MAD_TO_STD * float(np.median(np.abs(widths - median))) / median
     if scatter > stage.max_width_scatter:
         return refused(
             photo,
@@ -198,7 +217,12 @@ def _check_width(
 
 
 def _assemble(
-    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], settings: VisionSettings
+    photo: Photo,
+    standout: Standout,
+    cut: CrossCut,
+    axes: tuple[Bearing, Bearing],
+    cable: Cable,
+    settings: VisionSettings,
 ) -> RoughCable | Rejected:
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
@@ -214,14 +238,14 @@ def _assemble(
     path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
         return refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")
-    ratio = cut.contrast / max(float(np.hypot(cut.texture, closeup.noise)), 1e-9)
+    ratio = cut.contrast / float(np.hypot(_disturbance(cut, standout, cable, stage), closeup.noise))
     if ratio < stage.min_contrast_to_noise:
         return _too_faint(photo, ratio, stage)
     unsharp = _check_sharpness(photo, closeup, width, stage.max_blur_widths, settings)
     if unsharp is not None:
         return unsharp
     finite = cut.width[np.isfinite(cut.width)]
-    scatter = 1.4826 * float(np.median(np.abs(finite - np.median(finite)))) / float(np.median(finite))
+    scatter = _MAD_TO_STD * float(np.median(np.abs(finite - np.median(finite)))) / float(np.median(finite))
     return RoughCable(
         image=photo.name,
         path_px=path,
