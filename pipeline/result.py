@@ -193,6 +193,21 @@ class AgreementPart(Part):
     hints: list[str] = []
 
 
+class CauseForm(Part):
+    """One form of a cause as it stands in the extended model: what a prediction needs of it."""
+
+    label: str = Field("", description="in words, as it completes the cause's name")
+    amount: float = Field(description="in the cause's unit")
+    std: float
+    at: float = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
+    width: float = Field(0.0, description="of a spot, in shares of the length; or which zero")
+    tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
+    factor: list[Floats] = Field(
+        [],
+        description="G (1 + tuned, r): with F of the extended curve, G F^T is the covariance of amount and form with f",
+    )
+
+
 class CausePart(Part):
     """A named cause with its class of twins, probability and estimate."""
 
@@ -202,6 +217,7 @@ class CausePart(Part):
     estimate: float
     std: float
     unit: str
+    forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
 
 
 class CauseRow(Part):

@@ -11,7 +11,8 @@ What is imposed at a step, one of three:
 * ``chords`` (m): the distance of the axes as measured, e.g. on the photo; offset and compliance do not enter;
 * ``forces`` P (N): the bearing is loaded, not moved.
 
-The zero of displacement is the chord of the mounted, force-free cable (``natural``), or the cable's length, or given.
+The zero of displacement is the chord of the mounted, force-free cable without load (``natural``) or under its load
+(``loaded``), or the cable's length, or given.
 
 Signs and units: chord frame, SI; P positive in compression; d positive where the bearings approach.
 
@@ -66,7 +67,7 @@ class BendingTest:
     friction : InternalFriction or None
     plastic_rate : 1/m per 1/m
         Growth of K0 with the largest curvature reached.
-    zero : "natural", "length" or m
+    zero : "natural", "loaded", "length" or m
         Distance of the axes at displacement zero.
     displacement_offset : m
         Error of the zero: added to every displacement.
@@ -86,7 +87,7 @@ class BendingTest:
     compliance: float = 0.0
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
-    zero: Literal["natural", "length"] | float = "natural"
+    zero: Literal["natural", "loaded", "length"] | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
     axial_stiffness: float | None = None
@@ -112,11 +113,18 @@ class BendingTest:
             self.shear_stiffness,
         )
 
+    @cached_property
+    def free(self) -> Equilibrium:
+        """The mounted cable under its load, free to slide: no force at the right bearing."""
+        return solve(self.rod, self.hold("forces", 0.0))
+
     @property
     def zero_chord(self) -> float:
         """Distance of the axes at displacement zero, m."""
         if self.zero == "natural":
             return self.rod.mounted.chord
+        if self.zero == "loaded":
+            return self.free.chord
         return self.length if self.zero == "length" else float(self.zero)
 
     def hold(self, control: Control, value: float) -> Hold:

@@ -67,10 +67,10 @@ class _Past(NamedTuple):
 
 
 class _Rest(NamedTuple):
-    """Derivative of the mounted shape: edge angles (q, n + 1) and chord (q,)."""
+    """Derivative of the mounted shape, edge angles (q, n + 1), and of the axes' distance at displacement zero (q,)."""
 
     angles: Array
-    chord: Array
+    zero: Array
 
 
 class _Explicit(NamedTuple):
@@ -120,6 +120,8 @@ def derivatives(
         rest.angles[:, 0],
         rest.angles[:, -1],
     )
+    if test.zero == "loaded":
+        rest = rest._replace(zero=_step(test, test.free, moves, rest, past)[0].chord)
     found = []
     for number, step in enumerate(steps):
         if not step.good:
@@ -141,7 +143,7 @@ def _cumulated(values: Array) -> Array:
 
 
 def _mounted(test: BendingTest, moves: Directions) -> _Rest:
-    """Derivative of the force-free shape in its chord frame."""
+    """Derivative of the force-free shape in its chord frame; as if it were without load."""
     rod, h = test.rod, test.rod.edges
     cos, sin = np.cos(rod.mounted.angles), np.sin(rod.mounted.angles)
     turn = rod.weights * moves.pre_curvature
@@ -151,7 +153,8 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     along, across = -relative @ (h * sin), relative @ (h * cos)
     if moves.geometric:
         along, across = along + moves.edges @ cos, across + moves.edges @ sin
-    return _Rest(relative - across[:, None] / rod.mounted.chord, along)
+    zero = {"natural": along, "length": moves.scalar("length")}.get(str(test.zero), moves.none)
+    return _Rest(relative - across[:, None] / rod.mounted.chord, zero)
 
 
 def _weights(moves: Directions) -> Array:
@@ -192,11 +195,7 @@ def _explicit(
     position = moves.scalar("chord") if hold.chord is not None else moves.none
     if hold.from_zero:
         position = position - moves.scalar("displacement_offset")
-        if test.zero == "natural":
-            position = position + rest.chord
-        elif test.zero == "length":
-            position = position + moves.scalar("length")
-        position = position - moves.scalar("rig_compliance") * step.right_reaction[0]
+        position = position + rest.zero - moves.scalar("rig_compliance") * step.right_reaction[0]
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):

@@ -47,11 +47,15 @@ class Base:
         Prior knowledge.
     axis_std : m
         Prior knowledge of each coordinate of the axes, common to all photos; 0 if they are exact.
+    axis_outward_std : m
+        Of what parts both axes along the chord beyond that (`rod.measurement.MeasuredTest`).
     elements : int
     roughness : float
         tau of the prior on the law.
     rest_slope : float
         Standard deviation of d log f / dt at K0: a cable that bends alike to both sides has slope zero there.
+    places : (p,) or None
+        Of the control points, where the law is smooth along another quantity than the curvature.
     first : 1/m
         K0 of the first guess.
     straight : bool
@@ -68,7 +72,9 @@ class Base:
     first: float = 0.0
     straight: bool = False
     axis_std: float = 0.0
+    axis_outward_std: float = 0.0
     rest_slope: float = 1.0
+    places: Array | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,15 +107,29 @@ class Base:
         """Prior knowledge as rows (m, p) of unit variance, around zero: scale, length, axes, smoothness."""
         count, size = len(self.knots), len(self.names)
         rows = [np.eye(size)[-2] / self.scale_std, np.eye(size)[-1] / self.length_std]
-        rows += [np.eye(size)[self.names.index(name)] / self.axis_std for name in self.axes]
+        if self.axes:
+            first = self.names.index(self.axes[0])
+            rows.extend(self._axis_rows() @ np.eye(size)[first : first + len(self.axes)])
         if count > 2:
-            weight, mode = np.linalg.eigh(roughness(self.knots))
+            places = self.knots if self.places is None else self.places
+            weight, mode = np.linalg.eigh(roughness(places))
             kept = weight > 1e-9 * weight[-1]
             bend = np.sqrt(weight[kept])[:, None] * mode.T[kept] / self.roughness
             if not self.straight:  # only then the control points count from the curvature at rest
-                bend = np.vstack([bend, first_slope(self.knots) / self.rest_slope])
+                bend = np.vstack([bend, first_slope(places) / self.rest_slope])
             rows.extend(np.hstack([bend, np.zeros((len(bend), size - count))]))
         return np.array(rows)
+
+    def _axis_rows(self) -> Array:
+        """Prior of the axes' errors (4, 4): each its own, and along the chord a common one that parts both axes."""
+        outward = np.array([-1.0, 0.0, 1.0, 0.0])[:, None]
+        covariance = self.axis_std**2 * np.eye(4) + self.axis_outward_std**2 * outward @ outward.T
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+    @property
+    def known(self) -> int:
+        """Number of rows of prior knowledge that are not about the form of the law; they come first."""
+        return 2 + len(self.axes)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
@@ -196,4 +216,5 @@ def start(
         first=float(rest),
         straight=straight,
         axis_std=test.axis_std,
+        axis_outward_std=test.axis_outward_std,
     )

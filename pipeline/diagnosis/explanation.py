@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fit import Extension, Fit, Term, fit, whole_residual
 from pipeline.diagnosis.observation import Observation
+from pipeline.diagnosis.pairs import pair_gains
 from pipeline.diagnosis.search import Suspicion, suspect
 from pipeline.diagnosis.simulation import run
+from pipeline.diagnosis.twins import cosines
 from pipeline.diagnosis.verdict import Weighed, scan_share
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -54,14 +56,34 @@ class Explanation:
 def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: bool = False) -> list[int]:
     """Causes worth a refit: by linear chi-square gain, within a margin of the best.
 
+    A cause whose forms may act together counts with its best two: a load at an angle to the chord scores little along
+    it and across it. The margin is that of single forms, else many forms of one cause would push out the others.
+
     ``any_sign``: scores of an inadmissible sign count too. About a base model in a false valley of K0 the sign of a
     score says nothing: friction of the bearings on loading alone asks for a negative amount there.
     """
     gains = np.zeros(len(suspicion.causes))
     np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
+    best = gains.max(initial=0.0)
+    needed = best - max(settings.refit_least, settings.refit_margin * best)
+    for k, cause in enumerate(suspicion.causes):
+        if cause.combines:
+            gains[k] = max(gains[k], _best_two_forms(suspicion, k, settings))
     order = np.argsort(-gains, kind="stable")
-    needed = gains[order[0]] - max(settings.refit_least, settings.refit_margin * gains[order[0]])
     return [int(k) for k in order[: settings.refit_most] if gains[k] > max(needed, 0.0)]
+
+
+def _best_two_forms(suspicion: Suspicion, cause: int, settings: DiagnosisSettings) -> float:
+    """Linear chi-square gain of the best two forms of a cause together."""
+    own = suspicion.of(cause)
+    gains = pair_gains(
+        suspicion.scores.z[own],
+        cosines(suspicion.scores.unit[:, own]),
+        suspicion.sign[own],
+        np.arange(own.size),
+        collinear=settings.pair_collinear,
+    )
+    return float(gains.max(initial=0.0))
 
 
 def refit_one(
@@ -80,22 +102,24 @@ def refit_one(
     """
     hopeless = rival + settings.refit_least + settings.hopeless * base.chi2
     enough = settings.fits * (len(base.residual) - base.extension.size)
-    best: Fit | None = None
+    best: dict[str, Fit] = {}
     for direction in _first_forms(suspicion, cause):
-        if best is not None and best.converged and best.chi2 < enough:
+        if any(one.converged and one.chi2 < enough for one in best.values()):
             break
         found = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
         if found is not None and not found.converged and suspicion.terms[direction].variant.tuned:
             # where the trace has kinks (slip), a form that is tuned along may stall: the form as it is scored does not
             held = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless, tuned=False)
             found = held if held is not None and _cost(held) < _cost(found) else found
-        if found is not None and (best is None or _cost(found) < _cost(best)):
-            best = found
-    if best is None:
+        setting = suspicion.terms[direction].variant.setting
+        if found is not None and (setting not in best or _cost(found) < _cost(best[setting])):
+            best[setting] = found
+    if not best:
         return None
-    if suspicion.causes[cause].combines and best.chi2 < hopeless:
-        best = _with_more_forms(observation, best, suspicion.causes[cause].name, suspicion, settings)
-    return explanation_of((cause,), base, best, suspicion)
+    if suspicion.causes[cause].combines:
+        for setting, one in best.items():
+            best[setting] = _with_more_forms(observation, one, setting, suspicion, settings, hopeless)
+    return explanation_of((cause,), base, min(best.values(), key=_cost), suspicion)
 
 
 def _cost(fitted: Fit) -> float:
@@ -104,16 +128,19 @@ def _cost(fitted: Fit) -> float:
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
-    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of the other kind.
+    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of the other kinds.
 
     A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
+    Which setting is right may show only when further forms act beside.
     """
     own = suspicion.of(cause)
     ranked = [int(k) for k in own[np.argsort(-suspicion.statistic[own], kind="stable")]]
     least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]
     loud = [k for k in ranked[:4] if suspicion.statistic[k] >= least]
-    other = [k for k in ranked if suspicion.terms[k].variant.tuned != suspicion.terms[ranked[0]].variant.tuned]
-    return list(dict.fromkeys([*loud, *other[:1]]))
+    first = suspicion.terms[ranked[0]].variant
+    other = [k for k in ranked if suspicion.terms[k].variant.tuned != first.tuned]
+    elsewhere = [k for k in ranked if suspicion.terms[k].variant.setting != first.setting]
+    return list(dict.fromkeys([*loud, *other[:1], *elsewhere[:1]]))
 
 
 NEARLY_AS_LOUD = 0.75
@@ -209,16 +236,24 @@ def _start(
 
 
 def _with_more_forms(
-    observation: Observation, best: Fit, name: str, suspicion: Suspicion, settings: DiagnosisSettings
+    observation: Observation,
+    best: Fit,
+    setting: str,
+    suspicion: Suspicion,
+    settings: DiagnosisSettings,
+    hopeless: float,
 ) -> Fit:
-    """Add further forms of the same cause while each removes ``shape_gain``."""
-    own = [cause for cause in suspicion.causes if cause.name == name]
+    """Add further forms of the same cause while each removes ``shape_gain``, and may get below ``hopeless``."""
+    own = [best.extension.terms[-1].cause]
     while len(best.extension.terms) < settings.shapes_most:
         more = suspect(observation, best, own, visible=settings.visible, trace=settings.trace)
         # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
         fresh = np.array([term not in best.extension.terms for term in more.terms], dtype=bool)
+        fitting = np.array([term.variant.setting == setting for term in more.terms], dtype=bool) * more.statistic
+        if best.chi2 - fitting.max(initial=0.0) ** 2 >= hopeless:
+            break
         added: Fit | None = None
-        for statistic in (np.where(fresh, more.statistic, 0.0), more.statistic):
+        for statistic in (np.where(fresh, fitting, 0.0), fitting):
             if statistic.max(initial=0.0) ** 2 >= settings.shape_gain:
                 added = fit_terms(observation, best, more, (int(np.argmax(statistic)),), settings)
             if added is not None and best.chi2 - added.chi2 >= settings.shape_gain:
@@ -230,11 +265,11 @@ def _with_more_forms(
 
 
 def _without_needless_forms(observation: Observation, best: Fit, settings: DiagnosisSettings) -> Fit:
-    """Drop the forms that later ones have made needless: what each removes is less than ``shape_gain``.
+    """Drop the forms of the last cause that later ones have made needless: each removes less than ``shape_gain``.
 
     A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
     """
-    while len(best.extension.terms) > 1:
+    while len(own := _forms_of_last_cause(best)) > 1:
         shorter = [
             fit(
                 observation,
@@ -245,12 +280,18 @@ def _without_needless_forms(observation: Observation, best: Fit, settings: Diagn
                 near=best.run,
             )
             for dropped, at in enumerate(best.extension.owners)
+            if dropped in own
         ]
         simplest = min(shorter, key=lambda fitted: fitted.chi2 if fitted.run.prediction is not None else np.inf)
         if simplest.run.prediction is None or simplest.chi2 - best.chi2 > settings.shape_gain:
             break
         best = simplest
     return best
+
+
+def _forms_of_last_cause(fitted: Fit) -> list[int]:
+    terms = fitted.extension.terms
+    return [k for k, term in enumerate(terms) if term.cause is terms[-1].cause]
 
 
 def explanation_of(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: Suspicion) -> Explanation:

@@ -5,7 +5,8 @@ covariance of the fit, correlations between control points and K0 included:
 
     df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
 
-Where several causes or finer splines explain the same data, the distance between their curves widens the band.
+Amounts and forms of the causes in the model are errors like these: all share one factor of their joint covariance.
+Where several causes explain the same data, the distance between their curves widens the band.
 """
 
 from __future__ import annotations
@@ -16,9 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.fit import Fit
-from pipeline.result import Curve
+from pipeline.result import CauseForm, Curve
+from rod.characteristic import Characteristic
 
 Array = NDArray[np.float64]
+
+WITHIN = 1.0 / 1.96
+"""Standard deviations per distance at which a curve lies just inside the 95 % band."""
 
 
 def visited(fitted: Fit) -> tuple[float, float]:
@@ -27,40 +32,45 @@ def visited(fitted: Fit) -> tuple[float, float]:
     return float(kappa.min()), float(kappa.max())
 
 
-def curve(fitted: Fit, *, points: int, rivals: Sequence[tuple[Fit, float]] = ()) -> Curve:
+def curve(
+    fitted: Fit,
+    *,
+    points: int,
+    covariance: Array | None = None,
+    rivals: Sequence[tuple[Fit, float]] = (),
+) -> Curve:
     """f_EI and m of a fitted model on its visited range.
 
     Parameters
     ----------
     fitted : Fit
     points : int
+    covariance : (p, p) or None
+        Of the vector, where that is known better than from the linearised fit alone.
     rivals : sequence of (Fit, weight)
         Other explanations of the same data. How far their f_EI lies from this one is part of the band: the variance of
-        a mixture, ``sum_k p_k (f_k - f)^2`` beside the covariance of the fit.
+        a mixture, ``sum_k p_k (f_k - f)^2`` beside the covariance of the fit, and enough of it that each of them lies
+        inside the 95 % band, since none of them can be ruled out.
     """
     base = fitted.extension.base
-    law, K0 = base.characteristic(fitted.vector), base.pre_curvature(fitted.vector)
+    law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
     low, high = visited(fitted)
     K = np.linspace(max(low, K0), high, points)
-    count = len(law.knots)
-    by_tangent = law.tangent_by_ordinates(K, K0) * law.ordinates  # the parameters are logarithms
-    by_moment = law.moment_by_ordinates(K, K0) * law.ordinates
-    used = list(range(count))
+    own = base.law_directions(fitted.vector, law.knots)  # the parameters are logarithms
+    by_tangent, by_moment = np.zeros((2, points, fitted.extension.size))
+    by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own
+    by_moment[:, : own.shape[1]] = law.moment_by_ordinates(K, K0) @ own
     if (bend := base.pre_curvature_index) is not None:
-        step = 1e-5 * (high - K0)
-        slope = (law.tangent(K + step, K0) - law.tangent(K - step, K0)) / (2.0 * step)
-        by_tangent = np.column_stack([by_tangent, -slope])
-        by_moment = np.column_stack([by_moment, law.moment_by_pre_curvature(K, K0)])
-        used.append(bend)
-    covariance = fitted.covariance[np.ix_(used, used)]
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+        by_tangent[:, bend] = -_slope(law, K, K0)
+        by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
+    used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
-    apart_f, apart_m = [by_tangent @ root], [by_moment @ root]
+    apart_f, apart_m = [by_tangent[:, used] @ root], [by_moment[:, used] @ root]
     for rival, chance in rivals:
-        other, own = rival.extension.base.characteristic(rival.vector), rival.extension.base.pre_curvature(rival.vector)
-        apart_f.append(np.sqrt(chance) * (other.tangent(K, own) - tangent)[:, None])
-        apart_m.append(np.sqrt(chance) * (other.moment(K, own) - moment)[:, None])
+        other, rest = law_of(rival), rival.extension.base.pre_curvature(rival.vector)
+        weight = max(np.sqrt(chance), WITHIN)
+        apart_f.append(weight * (other.tangent(K, rest) - tangent)[:, None])
+        apart_m.append(weight * (other.moment(K, rest) - moment)[:, None])
     factor = np.hstack(apart_f)
     tangent_std, moment_std = (np.linalg.norm(columns, axis=1) for columns in (factor, np.hstack(apart_m)))
     excess = K - K0
@@ -80,15 +90,65 @@ def curve(fitted: Fit, *, points: int, rivals: Sequence[tuple[Fit, float]] = ())
     )
 
 
+def law_of(fitted: Fit) -> Characteristic:
+    """f_EI of a fitted model, with the control point a cause may have put into the spline."""
+    law = fitted.extension.model(fitted.vector).bending.characteristic
+    return law if isinstance(law, Characteristic) else fitted.extension.base.characteristic(fitted.vector)
+
+
+def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = None) -> list[CauseForm]:
+    """The forms of a cause as they stand in a fitted model, with their share in the factor of its `curve`.
+
+    ``columns`` is the number of columns of that factor: the rivals' come last, and move the amounts of no cause.
+    """
+    used, root = _root(fitted, covariance)
+    found = []
+    for at, term in zip(fitted.extension.owners, fitted.extension.terms, strict=True):
+        if term.cause.name != cause:
+            continue
+        tuned = term.variant.tuned
+        rows = np.zeros((1 + len(tuned), columns))
+        first = used.index(at)
+        rows[:, : root.shape[1]] = root[first : first + len(rows)]
+        form = term.variant.moved({name: float(fitted.vector[at + 1 + j]) for j, name in enumerate(tuned)})
+        found.append(
+            CauseForm(
+                label=form.label,
+                amount=float(fitted.vector[at]),
+                std=float(np.linalg.norm(rows[0])),
+                at=form.at,
+                width=form.width,
+                tuned=list(tuned),
+                factor=rows.tolist(),
+            )
+        )
+    return found
+
+
+def _root(fitted: Fit, covariance: Array | None) -> tuple[list[int], Array]:
+    """Positions in the vector of law, K0 and the causes' amounts and forms, and a factor (k, k) of their covariance."""
+    base = fitted.extension.base
+    bend = base.pre_curvature_index
+    used = [*range(len(base.knots)), *([] if bend is None else [bend])]
+    used += range(len(base.names), fitted.extension.size)
+    whole = (fitted.covariance if covariance is None else covariance)[np.ix_(used, used)]
+    std = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    values, vectors = np.linalg.eigh(whole / np.outer(std, std))  # amounts and logarithms are of very different size
+    return used, std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def _slope(law: Characteristic, K: Array, K0: float) -> Array:
+    """df/dK, (n,) N m^3."""
+    step = 1e-5 * float(np.ptp(K))
+    return np.asarray((law.tangent(K + step, K0) - law.tangent(K - step, K0)) / (2.0 * step))
+
+
 def stiffness_change(before: Fit, after: Fit) -> float:
     """Root mean square of the relative difference of f_EI at equal curvature, where both models have been bent to."""
     ranges = [(*visited(m), m.extension.base.pre_curvature(m.vector)) for m in (before, after)]
     low, high = max(max(low, K0) for low, _, K0 in ranges), min(high for _, high, _ in ranges)
     K = np.linspace(min(low, high), high, 60)
-    f = [
-        m.extension.base.characteristic(m.vector).tangent(K, m.extension.base.pre_curvature(m.vector))
-        for m in (before, after)
-    ]
+    f = [law_of(m).tangent(K, m.extension.base.pre_curvature(m.vector)) for m in (before, after)]
     return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
 
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.conclusion import Conclusion
 from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.extended import curve, curve_change, stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.extended import curve, curve_change, forms, stiffness_change, stiffness_change_linear
 from pipeline.diagnosis.fit import Fit
 from pipeline.diagnosis.heldout import measured_gain
+from pipeline.diagnosis.identified_again import Identified, identified_again
 from pipeline.diagnosis.maps import residual_map, smooth_share
 from pipeline.diagnosis.next_experiment import next_experiment
 from pipeline.diagnosis.score import adjusted_p, sigma_needed
@@ -19,7 +20,7 @@ from pipeline.diagnosis.search import detectable_amount
 from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
-from pipeline.diagnosis.workbench import Workbench, with_more_knots
+from pipeline.diagnosis.workbench import Workbench
 from pipeline.result import BlindSpot, CausePart, CauseRow, Curve, DiagnosisPart, GainPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -34,16 +35,17 @@ def present(
     gain, held = measured_gain(bench, accepted.fitted, settings) if accepted else (None, None)
     rows = table(bench, conclusion, settings, heldout=held.removed if held else None)
     seen = [(row.name, row.minimal_detectable or 0.0, row.unit) for row in _seen_at_plausible_size(bench, rows)]
-    causes = named_causes(bench, conclusion)
+    again = None if accepted is None else identified_again(bench.observation, accepted.fitted, settings)
+    extended = _extended(again, conclusion, settings)
+    causes = named_causes(bench, conclusion, again, extended)
     verdict = decide(
         detected=accepted is not None,
         alien=conclusion.alien,
         two=len(causes) == 2,
-        names=conclusion.members,
+        names=len(conclusion.names),
         powerless=len(seen) < settings.powerless * len(rows),
     )
     leftover = describe_leftover(bench, conclusion)
-    extended = _extended(bench, conclusion, settings)
     photos, forces = left_out(bench)
     sentence = headline(
         verdict,
@@ -96,19 +98,12 @@ def _change(
     return stiffness_change(bench.base, accepted.fitted) if change is None else change
 
 
-def _extended(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve | None:
-    """f_EI of the extended model, with what the data cannot tell in its band.
-
-    That is the class of the cause, and how closely the spline can follow the law: the data do not ask for another
-    control point, but where it would move f_EI to counts (without it the 95 % band covered 90 to 92 %, with it 94 to
-    98 %, of fresh cables).
-    """
-    if conclusion.accepted is None:
+def _extended(again: Identified | None, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve | None:
+    """f_EI of the extended model, with what the data cannot tell in its band: the law's smoothness, and the class."""
+    if again is None:
         return None
-    fitted = conclusion.accepted.fitted
-    finer = with_more_knots(bench.observation, fitted, settings)
-    rivals = [*_rivals(conclusion), *([] if finer is None else [(finer, 1.0)])]
-    return curve(fitted, points=settings.curve_points, rivals=rivals)
+    rivals = [*_rivals(conclusion), *again.rivals]
+    return curve(again.fitted, points=settings.curve_points, covariance=again.covariance, rivals=rivals)
 
 
 def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
@@ -120,12 +115,25 @@ def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
     return [(e.fitted, p / sum(chance)) for e, p in others]
 
 
-def named_causes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
-    """One entry for each cause that was found, with its class of names."""
+def named_causes(
+    bench: Workbench, conclusion: Conclusion, again: Identified | None, extended: Curve | None
+) -> list[CausePart]:
+    """One entry for each cause that was found, with its class of names, and its forms in the extended model."""
+    parts = _named(bench, conclusion)
+    if again is None or extended is None:
+        return parts
+    columns = len(extended.tangent_factor_Nm2[0])
+    return [
+        part.model_copy(update={"forms": forms(again.fitted, part.name, columns=columns, covariance=again.covariance)})
+        for part in parts
+    ]
+
+
+def _named(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     catalogue, accepted, two = bench.suspicion.causes, conclusion.accepted, conclusion.two
     if accepted is None:
         return []
-    names = [catalogue[e.causes[0]].name for e in conclusion.singles[: conclusion.members]]
+    names = [catalogue[k].name for k in conclusion.names]
     # a law with one more control point is no second cause, only a finer base
     found = [cause for cause in accepted.causes if catalogue[cause].name != "nonlinear_stiffness"] or [*accepted.causes]
     if two is None or len(found) == 1:

@@ -87,12 +87,14 @@ def _bare(steps: tuple[Equilibrium, ...], facts: Facts) -> Prediction:
 def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
     """Steps that are simulated together: their indices, the side to which they are bowed, and whether they are free.
 
-    A mounted cable at displacement zero is free of force, also the straight one, whose chord cannot be imposed; with a
-    load in the plane, or with a wrong zero, its chord is imposed like any other.
+    A mounted cable at displacement zero is free of force, also the straight one, whose chord cannot be imposed, and
+    also under a load in the plane if displacement is counted from there; else, and with a wrong zero, its chord is
+    imposed like any other.
     """
     displacement = facts.displacement + model.shift
     mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
-    free = [i for i in mounted if displacement[i] == 0.0 and model.bending.load == (0.0, 0.0)]
+    at_rest = model.bending.load == (0.0, 0.0) or model.bending.zero == "loaded"
+    free = [i for i in mounted if displacement[i] == 0.0 and at_rest]
     held = [i for i in mounted if i not in free]
     pushed = [i for i in range(len(facts.branch)) if i not in mounted]
     groups: list[tuple[list[int], Branch, bool]] = [(free, "natural", True), (held, "natural", False)]
@@ -108,6 +110,8 @@ def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibriu
     count = model.bending.rod.edges.size
     usable = near is not None and len(near.steps) == len(displacement) and len(near.steps[0].angles) == count
     found: dict[int, Equilibrium] = {}
+    if model.bending.zero == "loaded" and not model.bending.free.good:
+        return (model.bending.free,)
     for index, side, free in _groups(model, facts):
         memory, last = model.bending.rod.virgin, None
         for i in index:

@@ -145,8 +145,8 @@ def test_with_imposed_chords(name: str) -> None:
     assert worst_error(test, name, vary, h, lambda t, s: simulate(t, chords=chords, starts=s)) < 1e-6
 
 
-@pytest.mark.parametrize("zero", ["length", 0.198])
-@pytest.mark.parametrize("name", ["length", "pre_curvature"])
+@pytest.mark.parametrize("zero", ["length", "loaded", 0.198])
+@pytest.mark.parametrize("name", ["length", "pre_curvature", "load_y"])
 def test_zero_of_displacement_takes_part(name: str, zero: str | float) -> None:
     vary, h = VARIATIONS[name]
     assert worst_error(replace(EVERYTHING, zero=zero), name, vary, h, displaced) < 1e-6

@@ -26,6 +26,8 @@ class Variant:
         Which of ``at`` and ``width`` a refit may change.
     at_range, width_range : (low, high)
         Where they may go.
+    setting : str
+        What all forms of the cause that act together have in common, such as where the displacement is counted from.
     """
 
     label: str = ""
@@ -34,6 +36,7 @@ class Variant:
     tuned: tuple[str, ...] = ()
     at_range: tuple[float, float] = (0.0, 1.0)
     width_range: tuple[float, float] = (0.0, 1.0)
+    setting: str = ""
 
     def range(self, name: str) -> tuple[float, float]:
         """Range of ``at`` or ``width``."""

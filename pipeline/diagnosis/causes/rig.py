@@ -18,6 +18,9 @@ import numpy as np
 from pipeline.diagnosis.causes.cause import PLAIN, Variant
 from pipeline.diagnosis.prediction import Facts, Model
 
+UNDER_LOAD = "mounted under the load"
+"""Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""
+
 
 @dataclass(frozen=True)
 class BearingFriction:
@@ -244,11 +247,24 @@ class InPlaneLoad:
         return 0.02 * facts.force_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Along and across the chord."""
-        return (Variant("along the chord"), Variant("across the chord", at=1.0))
+        """Along and across the chord, both with either zero: a load at an angle is a sum of the two.
+
+        Displacement counts from the mounted, force-free cable. Who mounts it under the load has another chord there
+        than who knows it from elsewhere, where the load does not act.
+        """
+        return (
+            Variant("along the chord"),
+            Variant("across the chord", at=1.0),
+            Variant("along the chord, mounted under it", setting=UNDER_LOAD),
+            Variant("across the chord, mounted under it", at=1.0, setting=UNDER_LOAD),
+        )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Load the cable with ``amount`` along (``at`` 0) or across (``at`` 1) the chord."""
-        along, across = model.bending.load
+        """Load the cable with ``amount`` along (``at`` 0) or across (``at`` 1) the chord.
+
+        There is one zero of displacement: a component beside another keeps the zero that is there.
+        """
+        bending, (along, across) = model.bending, model.bending.load
         load = (along, across + amount) if variant.at > 0.5 else (along + amount, across)
-        return replace(model, bending=replace(model.bending, load=load))
+        zero = "loaded" if variant.setting == UNDER_LOAD and bending.load == (0.0, 0.0) else bending.zero
+        return replace(model, bending=replace(bending, load=load, zero=zero))
