@@ -1,17 +1,15 @@
 """A new experiment by the identified model: from a result and displacement steps to forces and shapes with bands.
 
-The model is a cable without friction and set: the characteristic the result answers with (extended, else inverse, else
-balance) and its pre-curvature K0, on an ideal rig of any length (Sec. 2 of the paper: what f_EI is identified for).
+The model is the cable of the result on an ideal rig of any length (Sec. 2 of the paper: what f_EI is identified for):
+the characteristic the result answers with (extended, else inverse, else balance), its pre-curvature K0, and what the
+extended model holds of friction, set and variation along the cable; see `pipeline.identified_model`.
 
-Uncertainty: the result holds f on a grid K_j with F F^T its covariance, K0 with its standard deviation, and the
-standard deviation of the moment m(K) = int_{K0}^{K} f dk. Because of
+A cable with friction or set remembers: its steps then are one test in the order given, from the mounted cable on.
+Without them each step stands for itself.
 
-    dm(K) = int_{K0}^{K} df dk - f(K0) dK0,
-
-the last contains the covariance of K0 with f:  2 f(K0) cov(K0, int df) = var(int df) + f(K0)^2 var(K0) - var(m).
-`identified_model` reads it off there, so that forces get the band that belongs to the moment curve: errors of f and
-of K0 largely cancel in it. The joint covariance goes to forces and shapes by the derivatives of `rod.sensitivity`, to
-first order. Length and displacements of the new experiment are exact.
+The joint covariance of all that goes to forces and shapes to first order, by the derivatives of `rod.sensitivity`, and
+for causes by differences over a tenth of their standard deviation. Length and displacements of the new experiment are
+exact.
 
 Outside the curvatures that were visited no cable was looked at: such a step is refused, or marked where the caller
 asks for it; then f goes on straight and the band says nothing about what the cable does there.
@@ -27,20 +25,18 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
+from pipeline.diagnosis.words import spoken
+from pipeline.identified_model import IdentifiedModel, Zero, identified_model
 from pipeline.records import Finding
-from pipeline.result import Result
+from pipeline.result import CausePart, Result
 from pipeline.settings.predict import PredictSettings
-from pipeline.visited import Visited, best, pre_curvature
 from rod.bending_test import BendingTest, simulate
-from rod.characteristic import Characteristic
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
 
 Array = NDArray[np.float64]
-Zero = Literal["natural", "length"]
 Status = Literal["predicted", "extrapolated", "refused", "no equilibrium"]
 
 # Arrays of a predicted step along the cable.
@@ -56,41 +52,9 @@ PREDICTED = (
     "kappa_std_per_m",
 )
 
-# Share of the largest moment band below which a direction of the covariance tells nothing about its link to K0:
-# the integrals are trapezoidal sums, right to about 1e-4.
-RESOLVED = 1e-2
-
-
-@dataclass(frozen=True, eq=False)
-class IdentifiedModel:
-    """Characteristic and pre-curvature of a result with their joint covariance.
-
-    Attributes
-    ----------
-    method : str
-        ``extended``, ``inverse`` or ``balance``.
-    characteristic : Characteristic
-        Tangent reading, a control point at each of the n curvatures of the result.
-    pre_curvature : 1/m
-    factor : (n + 1, r)
-        F with F F^T the covariance of the n control points (N m^2) and, last, the pre-curvature (1/m).
-    visited : (low, high) 1/m
-    """
-
-    method: str
-    characteristic: Characteristic
-    pre_curvature: float
-    factor: Array
-    visited: tuple[float, float]
-
-    @property
-    def pre_curvature_std(self) -> float:
-        """Standard deviation of the pre-curvature, 1/m."""
-        return float(np.linalg.norm(self.factor[-1]))
-
-    def bending_test(self, length: float, *, zero: Zero = "natural", elements: int = 100) -> BendingTest:
-        """An ideal test of such a cable of another length, m."""
-        return BendingTest(length, self.characteristic, self.pre_curvature, zero=zero, elements=elements)
+DIFFERENCE = 0.1
+"""Standard deviations of an amount or form by which it is moved to see what that does: within its band, well above
+rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +165,7 @@ def predict(
     if length is None or not (np.isfinite(length) and length > 0.0):
         raise ValueError(f"a cable cannot be {length} m long")
     test = model.bending_test(length, zero=zero, elements=settings.elements)
-    steps = tuple(_step(test, model, float(d), extrapolate, settings) for d in displacements_m)
+    steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate, settings)
     limit = reachable(test, model) if any(step.status != "predicted" for step in steps) else None
     return Prediction(
         specimen=result.specimen.id,
@@ -217,17 +181,6 @@ def predict(
     )
 
 
-def identified_model(result: Result) -> IdentifiedModel | None:
-    """Characteristic, K0 and joint covariance of a result; None without a characteristic."""
-    curve = best(result)
-    if curve is None:
-        return None
-    K0, std = pre_curvature(result, curve)
-    law = Characteristic.from_ordinates(curve.kappa, curve.tangent)
-    low, high = float(curve.kappa[0]), float(curve.kappa[-1])
-    return IdentifiedModel(curve.method, law, K0, _joint_factor(curve, K0, std), (low, high))
-
-
 def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:
     """Largest displacement at which the cable is still within the visited range, m; None if there is none."""
     high = model.visited[1]
@@ -241,26 +194,50 @@ def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:
     return float(brentq(excess, 0.0, top, xtol=1e-6 * top)) if excess(0.0) < 0.0 < excess(top) else None
 
 
+def _steps(
+    test: BendingTest, model: IdentifiedModel, displacements: list[float], extrapolate: bool, settings: PredictSettings
+) -> tuple[PredictedStep, ...]:
+    """All steps; where the cable remembers, those after one that cannot be predicted cannot either."""
+    if not model.remembers:
+        paths = [simulate(test, [d], branch="up") for d in displacements]
+        return tuple(
+            _step(test, model, path, d, extrapolate, settings) for path, d in zip(paths, displacements, strict=True)
+        )
+    whole, steps, lost = simulate(test, displacements, branch="up"), [], ""
+    for count, displacement in enumerate(displacements, start=1):
+        if lost:
+            steps.append(PredictedStep(displacement, "refused", lost))
+            continue
+        steps.append(_step(test, model, whole[:count], displacement, extrapolate, settings))
+        if steps[-1].force_N is None:
+            lost = f"the cable remembers the step to {1e3 * displacement:.4g} mm, which is not predicted"
+    return tuple(steps)
+
+
 def _step(
-    test: BendingTest, model: IdentifiedModel, displacement: float, extrapolate: bool, settings: PredictSettings
+    test: BendingTest,
+    model: IdentifiedModel,
+    path: tuple[Equilibrium, ...],
+    displacement: float,
+    extrapolate: bool,
+    settings: PredictSettings,
 ) -> PredictedStep:
-    """One step, on its own: without friction and set it does not matter what came before."""
-    bent = simulate(test, [displacement], branch="up")
-    (step,) = bent
+    """The last step of a path."""
+    step = path[-1]
     if not step.good:
         return PredictedStep(displacement, "no equilibrium", step.outcome.advice)
     (low, high), sharpest = model.visited, float(step.kappa.max())
     slack = settings.range_slack * (high - low)
     status: Status = "predicted"
     reason = ""
-    if sharpest > high + slack or step.kappa.min() < min(low, model.pre_curvature) - slack:
+    if sharpest > high + slack or step.kappa.min() < min(low, float(test.rod.section.pre_curvature.min())) - slack:
         reason = (
             f"curvature {step.kappa.min():.3g} to {sharpest:.3g} 1/m leaves the visited range {low:.3g} to {high:.3g}"
         )
         if not extrapolate:
             return PredictedStep(displacement, "refused", reason, chord_m=step.chord, kappa_max_per_m=sharpest)
         status = "extrapolated"
-    return replace(_with_bands(test, model, bent), displacement_m=displacement, status=status, reason=reason)
+    return replace(_with_bands(test, model, path), displacement_m=displacement, status=status, reason=reason)
 
 
 def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
@@ -271,49 +248,73 @@ def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
     return replace(step, status="refused", reason=reason)
 
 
-def _with_bands(test: BendingTest, model: IdentifiedModel, bent: tuple[Equilibrium, ...]) -> PredictedStep:
-    """Force and shape of an equilibrium with standard deviations to first order."""
-    (by,) = derivatives(test, bent, ["ordinates", "pre_curvature"])
-    (step,) = bent
+def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> PredictedStep:
+    """Force and shape of the last equilibrium of a path with standard deviations to first order."""
+    step, by = path[-1], derivatives(test, path, ["ordinates", "pre_curvature"])[-1]
+    law = model.factor_of_test()
+    causes = _by_causes(test, model, path)
 
-    def std(columns: Array) -> Array:
-        return np.asarray(np.linalg.norm(columns @ model.factor, axis=-1))
+    def std(name: str) -> Array:
+        columns = getattr(by, name) @ law
+        for rows, changes in causes:
+            columns = columns + changes[name] @ rows
+        return np.asarray(np.linalg.norm(columns, axis=-1))
 
     return PredictedStep(
         displacement_m=0.0,
         status="predicted",
         chord_m=step.chord,
         force_N=step.force,
-        force_std_N=float(std(by.force)),
+        force_std_N=float(std("force")),
         kappa_max_per_m=float(step.kappa.max()),
         s_m=step.s.tolist(),
         x_m=step.x.tolist(),
-        x_std_m=std(by.x).tolist(),
+        x_std_m=std("x").tolist(),
         y_m=step.y.tolist(),
-        y_std_m=std(by.y).tolist(),
+        y_std_m=std("y").tolist(),
         theta_rad=step.theta.tolist(),
-        theta_std_rad=std(by.theta).tolist(),
+        theta_std_rad=std("theta").tolist(),
         kappa_per_m=step.kappa.tolist(),
-        kappa_std_per_m=std(by.kappa).tolist(),
+        kappa_std_per_m=std("kappa").tolist(),
     )
 
 
-def _joint_factor(curve: Visited, K0: float, std: float) -> Array:
-    """Factor of the joint covariance of f along the curve and K0, (n + 1, r); see the module.
+def _by_causes(
+    test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]
+) -> list[tuple[Array, dict[str, Array]]]:
+    """For every form of a cause its rows of the factor (q, r), and what moves by name, (..., q) per unit."""
+    found = []
+    displacements = [test.zero_chord - step.chord for step in path]
+    for place, form in enumerate(model.forms):
+        rows, columns = [], []
+        for row, std in enumerate(form.std):
+            moved = form.moved(row, DIFFERENCE * std)
+            other = replace(model, forms=(*model.forms[:place], moved, *model.forms[place + 1 :]))
+            there = _again(test, other, displacements, path)
+            if std > 0.0 and there is not None:
+                rows.append(form.factor[row])
+                columns.append(_difference(path[-1], there, DIFFERENCE * std))
+        if rows:
+            found.append((np.array(rows), {name: np.stack([c[name] for c in columns], axis=-1) for name in BANDED}))
+    return found
 
-    Without a factor of f its errors are taken as one common factor on the whole curve: the widest band of a force.
-    """
-    F = curve.factor if curve.factor.shape[1] else curve.tangent_std[:, None]
-    rise = cumulative_trapezoid(F, curve.kappa, axis=0, initial=0)
-    rise -= np.array([np.interp(K0, curve.kappa, column) for column in rise.T])  # int_{K0}^{K} of each column
-    f0 = float(np.interp(K0, curve.kappa, curve.tangent))
-    linked = (np.sum(rise**2, axis=1) + (f0 * std) ** 2 - curve.moment_std**2) / (2.0 * f0)
-    size = RESOLVED * np.linalg.norm(rise, axis=1).max()
-    link = np.linalg.solve(rise.T @ rise / size**2 + np.eye(F.shape[1]), rise.T @ linked / size**2)
-    length = float(np.linalg.norm(link))
-    link *= min(1.0, std / length) if length > 0.0 else 0.0  # a correlation of one at most
-    own = np.sqrt(max(std**2 - float(link @ link), 0.0))
-    return np.block([[F, np.zeros((len(F), 1))], [link[None, :], np.array([[own]])]])
+
+BANDED = ("force", "x", "y", "theta", "kappa")
+"""What of an equilibrium has a band."""
+
+
+def _again(
+    test: BendingTest, model: IdentifiedModel, displacements: list[float], path: tuple[Equilibrium, ...]
+) -> Equilibrium | None:
+    """Last step of the same test of another cable; None where it has no equilibrium."""
+    other = model.bending_test(test.length, elements=path[0].rod.edges.size - 2)
+    other = replace(other, zero=test.zero)
+    step = simulate(other, displacements, branch="up", starts=path)[-1]
+    return step if step.good else None
+
+
+def _difference(here: Equilibrium, there: Equilibrium, by: float) -> dict[str, Array]:
+    return {name: (np.asarray(getattr(there, name)) - np.asarray(getattr(here, name))) / by for name in BANDED}
 
 
 def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
@@ -324,13 +325,30 @@ def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
         found.append(Finding("predict/balance", "warning", message))
     diagnosis = result.diagnosis
     if diagnosis is not None and diagnosis.causes:
-        names = ", ".join(cause.name for cause in diagnosis.causes)
-        message = (
-            f"The diagnosis found {names}. The prediction is of the ideal test of the cable itself: what belongs to "
-            "the rig is left out rightly, what belongs to the cable (friction, set, variation along it) is missing."
-        )
-        found.append(Finding("predict/cause", "warning", message))
+        found.extend(_about_causes(diagnosis.causes, model))
     if diagnosis is not None and diagnosis.verdict == "unexplained":
         message = "The model leaves a misfit that no known cause removes; bands do not contain it."
         found.append(Finding("predict/unexplained", "warning", message))
+    return found
+
+
+def _about_causes(causes: list[CausePart], model: IdentifiedModel) -> list[Finding]:
+    """Which causes are in the prediction, which are not, and what other names one may have."""
+    held = {form.cause.name for form in model.forms}
+    inside = [cause for cause in causes if cause.name in held]
+    rest = [cause.name for cause in causes if cause.name not in held]
+    found = []
+    if inside:
+        names = ", ".join(spoken(cause.name) for cause in inside)
+        message = f"The prediction contains what the diagnosis found in the cable: {names}."
+        if model.remembers:
+            message += " The steps are one test in the order given, from the mounted cable on."
+        others = [name for cause in inside for name in cause.class_ if name != cause.name]
+        if others:
+            message += f" The data could not tell it from {', '.join(spoken(name) for name in others)}."
+        found.append(Finding("predict/cause", "warning" if others else "info", message))
+    if rest:
+        names = ", ".join(spoken(name) for name in rest)
+        message = f"The prediction is of an ideal test; the diagnosis found besides, and it leaves out: {names}."
+        found.append(Finding("predict/left-out", "info", message))
     return found
