@@ -205,22 +205,44 @@ def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> P
         if use_lens
         else _least_squares(views, with_lens.x * (np.arange(len(with_lens.x)) > 0), middle, radius)
     )
-    homography = np.append(fit.x[1:9], 1.0).reshape(3, 3) @ np.array(
+    homography, lens = _plane_parts(fit.x, middle, radius)
+    source = f"lens k1 = {k1:+.4f} ± {k1_std:.4f} at half the diagonal" if use_lens else "no lens term needed"
+    plane = PlaneMap(homography, lens if use_lens else None)
+    return PlaneFit(plane, fit.rms, _scale_std(with_lens, middle, radius), None, source)
+
+
+def _plane_parts(x: Array, middle: Array, radius: float) -> tuple[Array, Lens]:
+    """Homography from pixels and lens, of the parameters of `_least_squares`."""
+    homography = np.append(x[1:9], 1.0).reshape(3, 3) @ np.array(
         [[1 / radius, 0, -middle[0] / radius], [0, 1 / radius, -middle[1] / radius], [0, 0, 1]]
     )
     camera = np.array([[radius, 0.0, middle[0]], [0.0, radius, middle[1]], [0.0, 0.0, 1.0]])
-    lens = Lens(camera, np.array([k1, 0.0, 0.0, 0.0, 0.0])) if use_lens else None
-    spread = float(np.hypot(*np.ptp(views[0].uv, axis=0)))
-    source = f"lens k1 = {k1:+.4f} ± {k1_std:.4f} at half the diagonal" if use_lens else "no lens term needed"
-    return PlaneFit(PlaneMap(homography, lens), fit.rms, fit.rms * np.sqrt(8.0 / fit.count) / spread, None, source)
+    return homography, Lens(camera, np.array([x[0], 0.0, 0.0, 0.0, 0.0]))
+
+
+def _scale_std(fit: _Solution, middle: Array, radius: float) -> float:
+    """Relative standard deviation of the scale in the middle of the picture, by all parameters, the lens among them.
+
+    A board that leaves the middle out, or that hardly tells the lens, tells the scale there by extrapolation: also
+    where the lens term is left out for that.
+    """
+
+    def logarithm(x: Array) -> float:
+        return float(np.log(PlaneMap(*_plane_parts(x, middle, radius)).local_scale(middle[None])[0]))
+
+    steps = 1e-4 * fit.unit * np.eye(len(fit.x))
+    slope = np.array([(logarithm(fit.x + step) - logarithm(fit.x - step)) / 2e-4 for step in steps])
+    return float(np.sqrt(slope @ fit.covariance @ slope))
 
 
 @dataclass(frozen=True)
 class _Solution:
+    """Parameters ``x``, their covariance in units of ``unit``, rms of the residuals in px and their number."""
+
     x: Array
+    unit: Array
     covariance: Array
     rms: float
-    count: int
 
 
 def _start(views: list[BoardView], middle: Array, radius: float) -> tuple[Array, list[Array]]:
@@ -287,7 +309,7 @@ def _least_squares(
     rms = float(np.sqrt(error @ error / spare))
     covariance = np.zeros((len(start), len(start)))
     covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * rms**2
-    return _Solution(full(found.x), covariance, rms, len(error))
+    return _Solution(full(found.x), scale, covariance, rms)
 
 
 def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:

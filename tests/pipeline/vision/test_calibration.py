@@ -142,6 +142,24 @@ def test_several_photos_in_the_plane_share_one_fit() -> None:
     assert errors[1] < 0.5 * errors[0]
 
 
+def test_scale_by_one_photo_is_as_sure_as_it_says() -> None:
+    scores = []
+    for seed in range(20):
+        rng = np.random.default_rng([8, seed])
+        tilt = np.sin(np.radians(rng.uniform(-2.0, 2.0, 2))) / 0.4
+        camera = Camera(1200, 620, 5_400.0, k1=float(rng.choice([-0.01, 0.0, 0.01])), perspective_per_m=tuple(tilt))
+        board = ChessBoard(int(rng.integers(7, 15)), 7, SQUARE, (0.02, 0.02), (0.0, 0.0, rng.uniform(-0.05, 0.05)))
+        fit = fit_views(views_of(camera, [board], float(rng.uniform(0.05, 0.2)), seed), STAGE)
+        middle = 0.5 * np.array([camera.width, camera.height])
+        about = middle + np.array([[2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]])
+        x, y = camera.plane(about[:, 0], about[:, 1])
+        area = abs((x[0] - x[1]) * (y[2] - y[3]) - (x[2] - x[3]) * (y[0] - y[1])) / 16.0
+        scores.append((fit.plane.local_scale(middle[None])[0] * np.sqrt(area) - 1.0) / fit.scale_std)
+    # True stds give 0.7 to 1.3 rms; smaller where a lens term is left out rightly, and counted all the same.
+    assert 0.3 < np.sqrt(np.mean(np.square(scores))) < 1.4
+    assert np.max(np.abs(scores)) < 3.5
+
+
 def test_ten_positions_give_the_lens_and_the_camera_distance() -> None:
     camera = Camera(2000, 1200, 5_000.0, k1=-0.02, distance_m=0.45)
     rng = np.random.default_rng(5)
