@@ -124,6 +124,9 @@ class MeasuredTest:
         Common to all photos: every length on the photos may be off by this factor.
     axis_std : m
         Of each coordinate of a bearing axis, common to all photos: what is found as the axis is off the pin by this.
+    axis_outward_std : m
+        Beyond that, of both axes away from each other along the chord, common to all photos: what marks an axis lies
+        higher than the cable, and the higher a thing, the farther from the middle of the picture it is seen.
     steps : tuple of MeasuredStep
         In the order of the test.
     moving : str
@@ -139,3 +142,4 @@ class MeasuredTest:
     moving: str = "left"
     picture_half_diagonal: float | None = None
     axis_std: float = 0.0
+    axis_outward_std: float = 0.0

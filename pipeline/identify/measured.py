@@ -43,6 +43,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
         length_std=settings.length_std_relative * specimen.length_m,
         scale_std=traces.scale.std_relative,
         axis_std=settings.axis_std_m,
+        axis_outward_std=outward_std(specimen, settings),
         steps=steps,
         moving=specimen.rig.moving_bearing,
         picture_half_diagonal=float(max(diagonals)) if diagonals else None,
@@ -65,6 +66,18 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         hold_forces=step.forces_N if step.forces_N.size else None,
         picture_centre=None if line is None else picture_centre(line, px_per_m),
     )
+
+
+def outward_std(specimen: Specimen, settings: IdentifySettings) -> float:
+    """How far (m) each axis may be seen too far out, because covers are higher than the cable's axis.
+
+    A point by h above the plane of the scale is seen farther from the middle of the picture by h / distance; its size is
+    known, but not how high this rig's covers are. Axes that the user pointed at have no cover.
+    """
+    if specimen.rig.bearings_px is not None:
+        return 0.0
+    height = 0.5 * specimen.diameter_m + settings.cover_height_m
+    return 0.5 * specimen.length_m * height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
 def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | None:

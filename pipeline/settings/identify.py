@@ -25,6 +25,15 @@ class IdentifySettings(BaseModel):
         description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by "
         "a fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
     )
+    cover_height_m: float = Field(
+        1e-3, ge=0, description="m; top of a cover or marker above the cable's upper side: a lid and its screw"
+    )
+    usual_distance_m: float = Field(
+        1.0,
+        gt=0,
+        description="m; camera above the covers where nobody says: they are seen farther apart than their axes by "
+        "height / distance, which is not known better than to its own size",
+    )
     elements: int = Field(100, ge=20, description="of the simulated rod; at 100 its force is within 1e-4")
     blocks: int = Field(
         160, ge=20, description="independent data per photo at most; one per correlation length of the midline's error"

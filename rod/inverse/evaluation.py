@@ -137,9 +137,9 @@ def _imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Ar
         by[model.index("scale")] = data.chord * model.nuisances["scale"]
         chord = data.chord * (1.0 + model.nuisance(u, "scale"))
         for part, sign in (("left_along", 1.0), ("right_along", -1.0)):
-            for name in model.pose_names(part, data.step.step):
-                by[model.index(name)] = sign * model.nuisances[name]
-                chord += sign * model.nuisance(u, name)
+            for name, c in model.pose_terms(part, data.step.step):
+                by[model.index(name)] += sign * c * model.nuisances[name]
+                chord += sign * c * model.nuisance(u, name)
         return chord, by
     moved = data.step.displacement or 0.0
     if model.zero is None:
@@ -202,10 +202,10 @@ def _step_fit(model: FitModel, u: Array, data: StepData, shape: Simulated, impos
         pose = Pose(*model.pose(u, step), model.nuisance(u, "scale"))
         found = distance(data.midline, shape, pose, chord)
         by = found.by_model @ chain
-        names = (*(model.pose_names(part, step) for part in POSE), ("scale",))
-        for moved_by, column in zip(names, found.by_pose.T, strict=True):
-            for name in moved_by:
-                by[:, model.index(name)] += column * model.nuisances[name]
+        terms = (*(model.pose_terms(part, step) for part in POSE), (("scale", 1.0),))
+        for moved_by, column in zip(terms, found.by_pose.T, strict=True):
+            for name, c in moved_by:
+                by[:, model.index(name)] += c * column * model.nuisances[name]
         photo = (found.value, by, found.s)
     return StepFit(data, shape, chord, photo, force, gap)
 

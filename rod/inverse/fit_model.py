@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 
 POSE = ("left_along", "left_across", "right_along", "right_across")
 
+OUTWARD = {"left_along": -1.0, "right_along": 1.0}
+"""Where both axes go when they are seen farther apart than they are."""
+
 NO_ERROR = 1e-7
 """Relative standard deviation of a length for which none is stated: below any photo's resolution."""
 
@@ -113,13 +116,13 @@ class FitModel:
 
     def pose(self, u: Array, step: int) -> tuple[float, float, float, float]:
         """Positions of the bearing axes on the photo of a step in the order of `POSE`, m."""
-        parts = [sum(self.nuisance(u, name) for name in self.pose_names(part, step)) for part in POSE]
+        parts = [sum(c * self.nuisance(u, name) for name, c in self.pose_terms(part, step)) for part in POSE]
         return parts[0], parts[1], parts[2], parts[3]
 
-    def pose_names(self, part: str, step: int) -> tuple[str, ...]:
-        """Nuisances that add up to one of `POSE` on the photo of a step."""
-        own = f"{part}/{step}"
-        return (own, part) if part in self.nuisances else (own,)
+    def pose_terms(self, part: str, step: int) -> tuple[tuple[str, float], ...]:
+        """Nuisances, each with its factor, that add up to one of `POSE` on the photo of a step."""
+        common = ((part, 1.0), ("outward", OUTWARD.get(part, 0.0)))
+        return ((f"{part}/{step}", 1.0), *((name, c) for name, c in common if c and name in self.nuisances))
 
     def cable_length(self, u: Array) -> float:
         """Length of the cable, m."""
@@ -210,6 +213,8 @@ def fit_model(
         nuisances["zero"] = zero[1]
     if test.axis_std > 0.0:
         nuisances |= dict.fromkeys(POSE, test.axis_std)
+    if test.axis_outward_std > 0.0:
+        nuisances["outward"] = test.axis_outward_std
     for d in data:
         if d.midline is not None:
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}

@@ -158,6 +158,15 @@ def moved_axes(test, left, right):
     return replace(test, steps=tuple(steps))
 
 
+def parted_axes(test, outward):
+    """The test with both bearing axes found too far from each other, each by `outward` (m), on every photo."""
+    steps = []
+    for step in test.steps:
+        shifted = {"x": step.shape.x + outward, "section_x": step.shape.section_x + outward}
+        steps.append(replace(step, chord=step.chord + 2 * outward, shape=replace(step.shape, **shifted)))
+    return replace(test, steps=tuple(steps))
+
+
 def random_cable(rng, *, law=StickSlip):
     """Law, length and chords of a random test: EI from 1e-5 to 1 N m^2, EI0/EI1 from 1 to 6, three to eight steps."""
     length = rng.uniform(0.15, 0.25)
