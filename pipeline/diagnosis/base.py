@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 AXES = ("left_along", "left_across", "right_along", "right_across")
 
+EXACT = 1e-7
+"""Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
+
 
 @dataclass(frozen=True, eq=False)
 class Base:
@@ -85,7 +88,7 @@ class Base:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the errors of the bearing axes."""
-        return AXES if self.axis_std > 0.0 else ()
+        return AXES if self.axis_std > 0.0 or self.axis_outward_std > 0.0 else ()
 
     @property
     def observed(self) -> tuple[str, ...]:
@@ -123,7 +126,8 @@ class Base:
     def _axis_rows(self) -> Array:
         """Prior of the axes' errors (4, 4): each its own, and along the chord a common one that parts both axes."""
         outward = np.array([-1.0, 0.0, 1.0, 0.0])[:, None]
-        covariance = self.axis_std**2 * np.eye(4) + self.axis_outward_std**2 * outward @ outward.T
+        own = max(self.axis_std, EXACT * self.length)
+        covariance = own**2 * np.eye(4) + self.axis_outward_std**2 * outward @ outward.T
         return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
     @property
@@ -209,8 +213,8 @@ def start(
         knots=place_knots(0.0, reach, knots) if knots > 2 else np.linspace(0.0, reach, knots),
         stiffness=float(1.0 / slope),
         length=test.length,
-        scale_std=max(test.scale_std, 1e-7),
-        length_std=max(test.length_std / test.length, 1e-7),
+        scale_std=max(test.scale_std, EXACT),
+        length_std=max(test.length_std / test.length, EXACT),
         elements=elements,
         roughness=smoothness,
         first=float(rest),

@@ -71,8 +71,8 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
 def outward_std(specimen: Specimen, settings: IdentifySettings) -> float:
     """How far (m) each axis may be seen too far out, because covers are higher than the cable's axis.
 
-    A point by h above the plane of the scale is seen farther from the middle of the picture by h / distance; its size is
-    known, but not how high this rig's covers are. Axes that the user pointed at have no cover.
+    A point by h above the plane of the scale is seen farther from the middle of the picture by h / distance of the way;
+    how high the covers of this rig are nobody says. Axes that the user pointed at have no cover.
     """
     if specimen.rig.bearings_px is not None:
         return 0.0
