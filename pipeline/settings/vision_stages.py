@@ -32,6 +32,11 @@ class CalibrationSettings(StageSettings):
     cover_diameter_std: float = Field(
         0.004, gt=0, description="relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit"
     )
+    cover_height_std: float = Field(
+        0.003,
+        ge=0,
+        description="relative; covers and their travel look larger than the cable below them: 3 mm seen from a metre",
+    )
     length_scale_std: float = Field(
         0.005, gt=0, description="relative; 1 mm on 200 mm: how well the length between the axes is known"
     )

@@ -55,7 +55,7 @@ def from_found(
     """
     if not found:
         return None
-    estimates = [_by_travel(found, displacements), _by_covers(found, specimen, settings)]
+    estimates = [_by_travel(found, displacements, settings), _by_covers(found, specimen, settings)]
     known = [estimate for estimate in estimates if estimate is not None]
     precise = [scale for scale in known if scale.std_relative < settings.max_scale_std]
     if precise:
@@ -77,7 +77,7 @@ def chords_px(found: list[RoughCable]) -> Array:
     return np.array([np.hypot(*np.subtract(cable.right.center_px, cable.left.center_px)) for cable in found])
 
 
-def _by_travel(found: list[RoughCable], displacements: Array) -> Scale | None:
+def _by_travel(found: list[RoughCable], displacements: Array, settings: CalibrationSettings) -> Scale | None:
     """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one."""
     known = np.isfinite(displacements)
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
@@ -92,7 +92,8 @@ def _by_travel(found: list[RoughCable], displacements: Array) -> Scale | None:
     std = spread / float(np.sqrt(travel @ travel))
     if slope <= 0:
         return None
-    return Scale(slope, std / slope, "travel of the moving bearing against the displacement log")
+    std_relative = float(np.hypot(std / slope, settings.cover_height_std))
+    return Scale(slope, std_relative, "travel of the moving bearing against the displacement log")
 
 
 def cover_radii_px(found: list[RoughCable]) -> Array:
@@ -112,7 +113,8 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
         return None
     # what light does to the rims is common to all photos: it does not show in their scatter
     rims = float(np.median([std / radius for radius, std in _radii(found)]))
-    std = float(np.linalg.norm([settings.cover_diameter_std, np.std(radii) / np.mean(radii), rims]))
+    sources = (settings.cover_diameter_std, settings.cover_height_std, np.std(radii) / np.mean(radii), rims)
+    std = float(np.linalg.norm(sources))
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
 
 
@@ -128,7 +130,7 @@ def check_scale(
     local = _local_scale(calibration, found)
     for other, code in (
         (_by_covers(found, specimen, settings), "scale/covers"),
-        (_by_travel_on_plane(calibration, found, displacements), "scale/displacement"),
+        (_by_travel_on_plane(calibration, found, displacements, settings), "scale/displacement"),
     ):
         if other is None or other.source == calibration.scale.source:
             continue
@@ -148,9 +150,11 @@ def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
     return float(np.median(calibration.plane.local_scale(axes))) if len(axes) else calibration.scale.px_per_m
 
 
-def _by_travel_on_plane(calibration: Calibration, found: list[RoughCable], displacements: Array) -> Scale | None:
+def _by_travel_on_plane(
+    calibration: Calibration, found: list[RoughCable], displacements: Array, settings: CalibrationSettings
+) -> Scale | None:
     """As `_by_travel`, with chords in m: the slope is then the ratio of true scale to the scale used."""
-    estimate = _by_travel(found, displacements)
+    estimate = _by_travel(found, displacements, settings)
     known = np.isfinite(displacements)
     if estimate is None:
         return None

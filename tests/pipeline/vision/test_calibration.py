@@ -233,11 +233,17 @@ def test_scale_by_travel_against_the_log() -> None:
     scale, travel = 9_500.0, np.array([0.0, 0.004, 0.008, 0.012])
     rng = np.random.default_rng(2)
     cables = [found(200 + scale * d + 0.02 * rng.standard_normal(), 1900.0) for d in travel]
-    calibration = from_found(specimen(marker_m=None), cables, travel, STAGE)
+    flat = STAGE.model_copy(update={"cover_height_std": 0.0})
+    calibration = from_found(specimen(marker_m=None), cables, travel, flat)
     assert calibration is not None
     assert "displacement log" in calibration.scale.source
-    assert abs(calibration.scale.px_per_m - scale) < 3.0 * calibration.scale.std_relative * scale
-    assert calibration.scale.std_relative < 1e-3
+    std = calibration.scale.std_relative
+    assert abs(calibration.scale.px_per_m - scale) < 3.0 * std * scale
+    assert std < 1e-3
+    # covers move nearer to the camera than the cable does
+    high = from_found(specimen(marker_m=None), cables, travel, STAGE)
+    assert high is not None
+    assert high.scale.std_relative == pytest.approx(np.hypot(std, STAGE.cover_height_std))
 
 
 def test_scale_by_covers_where_nothing_moved() -> None:

@@ -21,6 +21,7 @@ from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, S
 from pipeline.vision.render.sheath import Sheath
 
 SETTINGS = VisionSettings()
+FLAT = VisionSettings.model_validate({"calibration": {"cover_height_std": 0.0}})  # as the covers of these scenes are
 SCALE, LENGTH, DIAMETER, COVER = 5_500.0, 0.17, 0.0046, 0.012
 
 
@@ -91,7 +92,7 @@ def test_chords_and_lengths_of_a_series_are_true(tmp_path: Path) -> None:
 
 
 def test_scale_follows_from_the_displacement_log(tmp_path: Path) -> None:
-    traces = trace_series(series(tmp_path, scale_error=None), SETTINGS)
+    traces = trace_series(series(tmp_path, scale_error=None), FLAT)
     assert "displacement log" in traces.scale.source
     assert abs(traces.scale.px_per_m / SCALE - 1) < 4 * traces.scale.std_relative < 0.01
     assert [f.code for f in traces.findings if f.level == "info"] == ["scale/source"]
@@ -156,7 +157,7 @@ def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
 def test_covers_of_a_diameter_nobody_gave_are_found(tmp_path: Path, diameter: float, scale_error: float | None) -> None:
     rig = RigSpec("left", None)
     specimen = series(tmp_path, given=rig, cover_m=diameter, scale_error=scale_error)
-    traces = trace_series(specimen, SETTINGS)
+    traces = trace_series(specimen, FLAT)
     assert "rig/covers-found" in {finding.code for finding in traces.findings}
     assert not codes(traces)
     for line, curve in zip(lines(traces), CURVES, strict=True):
