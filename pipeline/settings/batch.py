@@ -32,7 +32,7 @@ class BatchSettings(BaseModel):
     )
     reports: bool = Field(
         True,
-        description="draw report.html and report.pdf of every specimen, over half of its time on three photos; "
+        description="draw report.html and report.pdf of every specimen, about half of its time on three photos; "
         "without, the same run with them draws what is missing and measures nothing again",
     )
     memory_per_worker_gb: float = Field(
