@@ -200,7 +200,7 @@ class CauseForm(Part):
     amount: float = Field(description="in the cause's unit")
     std: float
     at: float = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
-    width: float = Field(0.0, description="of a spot, in shares of the length; or which zero")
+    width: float = Field(0.0, description="of a spot, in shares of the length")
     tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
     factor: list[Floats] = Field(
         [],
