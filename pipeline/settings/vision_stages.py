@@ -218,9 +218,7 @@ class SegmentationSettings(StageSettings):
         0.2, gt=0, description="widths; beyond it the spreads of both edges overlap in the middle"
     )
     search_margin_share: float = Field(
-        0.12,
-        gt=0,
-        description="share of the cable's extent; a step moves the bow by less, else the whole photo is searched",
+        0.12, gt=0, description="share of the cable's extent; a step moves the bow by less, else all is searched"
     )
     joint_angle_deg: float = Field(
         30.0,
@@ -248,9 +246,7 @@ class BearingSettings(StageSettings):
         description="radii; half range along a ray in which the rim is searched around the first guess",
     )
     ring_width: float = Field(
-        0.05,
-        gt=0,
-        description="radii; standard deviation of the ring that seeks centres: as well as the radius is known",
+        0.05, gt=0, description="radii; std of the ring that seeks centres: as well as the radius is known"
     )
     near_radii: float = Field(
         0.045, gt=0, description="radii; half range in which edges are sought at last: a bevel is twice as far away"
@@ -297,9 +293,7 @@ class BearingSettings(StageSettings):
         0.16, gt=0, lt=0.5, description="radii; how far a rim that is not sure may lie off the centre: half a bevel"
     )
     sure_center_radii: float = Field(
-        0.004,
-        gt=0,
-        description="radii; a centre with a wider std is not sure: shadow or bevel took part of the rim",
+        0.004, gt=0, description="radii; a centre with a wider std is not sure: shadow or bevel took part of the rim"
     )
     certain_center_px: float = Field(
         0.05,
