@@ -144,7 +144,8 @@ def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings
         expected = Radius(float(distance[at]), 1.0 / float(distance[at]))  # to a pixel, by the mean of all rays
         ring = fit_circle(photo, center, expected, settings, on_cover=True)
         slope[np.abs(distance - distance[at]) < max(4.0, 2.0 * settings.near_radii * radius)] = 0.0
-        if ring is None or ring.rim < settings.sure_rim or ring.radius > settings.ring_range[1] * radius:
+        within = ring is not None and settings.ring_range[0] <= ring.radius / radius <= settings.ring_range[1]
+        if ring is None or not within or ring.rim < settings.sure_rim:
             continue
         if np.hypot(*(np.array(ring.center) - center)) < settings.same_axis_radii * radius:
             found.append(ring)
