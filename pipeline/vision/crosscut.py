@@ -125,7 +125,9 @@ def _texture(grey: Array, ground: Array, offset_widths: Array, light: float, *, 
     beside = (np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7)
     values = grey[:, beside] if shaded else grey[:, beside] - ground[:, None]
     # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
-    values = np.abs(values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="nearest"))
+    # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
+    values = values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="reflect")
+    values = np.abs(values - np.median(values, axis=0))
     right = offset_widths[beside] > 0.0
     sides = (values[:, right], values[:, ~right]) if shaded else (values,)
     return _MAD_TO_STD * min(float(np.median(side)) for side in sides)

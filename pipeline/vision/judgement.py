@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.records import Finding, Rejected
+from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
 from pipeline.vision.backdrop import Standout
@@ -63,18 +63,33 @@ def _disturbance(cut: CrossCut, standout: Standout, cable: Cable, stage: Segment
     if len(width) < stage.sure_edges_share * len(cut.width):
         return cut.texture
     off = abs(float(np.median(width)) - 1.0)
-    scatter = _MAD_TO_STD * float(np.median(np.abs(width - np.median(width))))
-    sure = off < stage.sure_width_off and scatter < stage.sure_width_scatter
+    sure = off < stage.sure_width_off and _scatter(width) < stage.sure_width_scatter
     return stage.sure_texture_weight * cut.texture if sure else cut.texture
+
+
+def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage: SegmentationSettings) -> CrossCut:
+    """Cross-cuts along a path (cells); where their width is not constant, those of edges a known diameter apart."""
+    if cable.diameter_px is None:
+        return cut_across(standout, path, reading.width, stage)
+    if not reading.banded:
+        cut = cut_across(standout, path, reading.width, stage, known=True)
+        width = cut.width[np.isfinite(cut.width)]
+        if len(width) and _scatter(width) < stage.sure_width_scatter * float(np.median(width)):
+            return cut
+    return cut_across(standout, path, reading.width, by_diameter(stage), known=True, shaded=reading.banded)
+
+
+def _scatter(values: Array) -> float:
+    """Robust standard deviation about the median."""
+    return _MAD_TO_STD * float(np.median(np.abs(values - np.median(values))))
 
 
 def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
 ) -> RoughCable | Rejected:
     """One strip: is it the cable? The checks run from what misleads most to what misleads least."""
-    known = cable.diameter_px is not None
-    stage = by_diameter(settings.segmentation) if reading.banded else settings.segmentation
-    cut = cut_across(standout, strip.path, reading.width, stage, known=known, shaded=reading.banded)
+    stage = settings.segmentation
+    cut = _cut(standout, strip.path, reading, cable, stage)
     ratio = cut.contrast / _disturbance(cut, standout, cable, stage)
     faint = ratio < stage.min_contrast_to_noise
     # Beside a crossing lies more cable, which is no texture; what hardly stands out shows no crossing either.
@@ -96,7 +111,7 @@ def judge_strip(
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
-    cut = cut_across(standout, path, reading.width, stage, known=known, shaded=reading.banded)
+    cut = _cut(standout, path, reading, cable, stage)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, cable, settings)
 
@@ -205,7 +220,7 @@ def _check_width(
             width_px=median,
             diameter_px=cable.diameter_px,
         )
-    scatter = _MAD_TO_STD * float(np.median(np.abs(widths - median))) / median
+    scatter = _scatter(widths) / median
     if scatter > stage.max_width_scatter:
         return refused(
             photo,
@@ -245,7 +260,7 @@ def _assemble(
     if unsharp is not None:
         return unsharp
     finite = cut.width[np.isfinite(cut.width)]
-    scatter = _MAD_TO_STD * float(np.median(np.abs(finite - np.median(finite)))) / float(np.median(finite))
+    scatter = _scatter(finite) / float(np.median(finite))
     return RoughCable(
         image=photo.name,
         path_px=path,
