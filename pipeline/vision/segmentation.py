@@ -64,7 +64,7 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
     leaving: list[Array] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
-            return _nothing(photo, standout, readings[0]) if first is None else first
+            return _nothing(photo, standout, readings[0], known=wanted.width is not None) if first is None else first
         outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
         if isinstance(outcome, RoughCable):
             return first if first is not None and _is_part(outcome, leaving) else outcome
@@ -135,17 +135,22 @@ def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wa
     return Wanted(width, least, most, across_objects=cable.bearings.cover_radius(1.0) is None)
 
 
-def _nothing(photo: Photo, standout: Standout, reading: Reading) -> Rejected:
-    """Say whether nothing is there or too little of it stands out."""
-    longest = reading.longest * standout.reduction
-    return refused(
-        photo,
-        "photo/contrast",
-        f"no strip of the cable's width stands out of the ground over a sufficient length: at {reading.level:.1f} "
-        f"times its noise the longest piece is {longest:.0f} px; a ground of another brightness or colour helps",
-        contrast_to_noise=reading.level,
-        longest_px=longest,
+def _nothing(photo: Photo, standout: Standout, reading: Reading, *, known: bool) -> Rejected:
+    """Say whether nothing is there or too little of it stands out; ``known`` if the cable's width is."""
+    longest, width = reading.longest * standout.reduction, reading.width * standout.reduction
+    found = {"contrast_to_noise": reading.level, "longest_px": longest}
+    if not known:
+        text = (
+            f"no strip of the cable's width stands out of the ground over a sufficient length: at {reading.level:.1f} "
+            f"times its noise the longest piece is {longest:.0f} px; a ground of another brightness or colour helps"
+        )
+        return refused(photo, "photo/contrast", text, **found)
+    text = (
+        f"no strip of the cable's width, {width:.0f} px, stands out of the ground over a sufficient length: at "
+        f"{reading.level:.1f} times its noise the longest piece is {longest:.0f} px; if that is not the cable's width, "
+        "scale or diameter is wrong, else a ground of another brightness or colour helps"
     )
+    return refused(photo, "photo/contrast", text, width_px=width, **found)
 
 
 def _surroundings(near: RoughCable, photo: Photo, stage: SegmentationSettings) -> Window:
