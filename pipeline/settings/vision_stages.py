@@ -128,7 +128,7 @@ class SegmentationSettings(StageSettings):
         1.25, gt=1, description="ratio to the known length; longer strips are rails and edges of the table"
     )
     rival_share: float = Field(
-        0.5, gt=0, lt=1, description="share of the longest strip's length from which another strip is a rival"
+        0.5, gt=0, lt=1, description="share of the longest strip's length, and of the best contrast, of another rival"
     )
     min_branch_widths: float = Field(
         2.5,

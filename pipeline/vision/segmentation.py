@@ -95,7 +95,10 @@ def _weigh(
         least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
         rivals = [strip for strip in reading.strips if strip.length >= least]
         outcomes = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in rivals]
-        accepted = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, RoughCable)]
+        contrasts = [outcome.contrast if isinstance(outcome, RoughCable) else 0.0 for outcome in outcomes]
+        # a shadow that lies apart from the cable is as long and fainter
+        faintest = settings.segmentation.rival_share * max(contrasts, default=0.0)
+        accepted = [k for k, contrast in enumerate(contrasts) if contrast > 0.0 and contrast >= faintest]
         area = reading.longest * reading.width
         chosen = accepted[0] if accepted else 0
         outcome = outcomes[chosen]
