@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.profile import spot_between
 from pipeline.diagnosis.fit import Extension, Fit, Term, fit, whole_residual
 from pipeline.diagnosis.observation import Observation
 from pipeline.diagnosis.pairs import pair_gains
@@ -119,6 +120,7 @@ def refit_one(
     if suspicion.causes[cause].combines:
         for setting, one in best.items():
             best[setting] = _with_more_forms(observation, one, setting, suspicion, settings, hopeless)
+            best[setting] = _as_one_spot(observation, best[setting], settings)
     return explanation_of((cause,), base, min(best.values(), key=_cost), suspicion)
 
 
@@ -262,6 +264,34 @@ def _with_more_forms(
             break
         best = _without_needless_forms(observation, added, settings)
     return best
+
+
+def _as_one_spot(observation: Observation, best: Fit, settings: DiagnosisSettings) -> Fit:
+    """One spot in the place of several forms along the cable, where it explains the data as well.
+
+    A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
+    not: what they add up to tells where the spot is.
+    """
+    terms, extension = best.extension.terms, best.extension
+    if len(terms) < 2 or any(term.cause is not terms[0].cause for term in terms):
+        return best
+    whole = spot_between(extension.base_model(best.vector), extension.model(best.vector))
+    if whole is None:
+        return best
+    variant, amount, stiffer = whole
+    extension = Extension(extension.base, extension.facts, (Term(terms[0].cause, variant),))
+    start = extension.start(best.vector, (amount,))
+    start[: len(extension.base.knots)] += np.log1p(stiffer)
+    one = fit(
+        observation,
+        extension,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=best.run,
+    )
+    dropped = len(terms) - 1
+    return one if one.run.prediction is not None and one.chi2 < best.chi2 + settings.shape_gain * dropped else best
 
 
 def _without_needless_forms(observation: Observation, best: Fit, settings: DiagnosisSettings) -> Fit:

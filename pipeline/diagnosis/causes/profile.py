@@ -58,6 +58,42 @@ def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> 
     return np.asarray(deviation / np.max(np.abs(deviation)))
 
 
+def spot_between(uniform: Model, varying: Model) -> tuple[Variant, float, float] | None:
+    """The one spot that looks most like what varies along the cable.
+
+    Parameters
+    ----------
+    uniform, varying : Model
+        The same cable without and with forms of one of the causes of this module.
+
+    Returns
+    -------
+    (Variant, float, float) or None
+        Form, amount, and by how much (relative) the cable beside the spot is stiffer. None if nothing varies.
+    """
+    before, after = uniform.bending.rod.section, varying.bending.rod.section
+    relative = after.profile is not None
+    change = np.asarray(after.profile - 1.0 if relative else after.pre_curvature - before.pre_curvature)
+    if before.profile is not None or change.ndim == 0 or not np.ptp(change) > 0.0:
+        return None
+    position = position_of(varying)
+    weight = np.sin(np.pi * position)  # where no moment is, no stiffness shows
+    kind = forms()[-1]
+    best: tuple[float, Variant, Array] | None = None
+    for at in np.linspace(*kind.at_range, 48):
+        for width in np.geomspace(*kind.width_range, 12):
+            spot = replace(kind, at=float(at), width=float(width))
+            columns = np.column_stack([np.ones_like(position), profile(spot, position, from_beside=relative)])
+            found = np.linalg.lstsq(weight[:, None] * columns, weight * change, rcond=None)[0]
+            left = float(np.sum((weight * (change - columns @ found)) ** 2))
+            if best is None or left < best[0]:
+                best = left, spot, np.asarray(found)
+    if best is None or not best[2][0] > -1.0:
+        return None
+    beside, amount = (float(value) for value in best[2])
+    return (best[1], amount / (1.0 + beside), beside) if relative else (best[1], amount, 0.0)
+
+
 def position_of(model: Model) -> Array:
     """Relative position 0..1 of the joints on the free cable."""
     return np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))

@@ -11,6 +11,7 @@ from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis import explain
 from pipeline.diagnosis.base import start
 from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.causes.profile import spot_between
 from pipeline.diagnosis.prediction import facts_of
 from pipeline.diagnosis.simulation import run
 
@@ -155,3 +156,18 @@ def test_a_file_a_family():
     """The catalogue stays a set of small files: no file of causes above 300 lines."""
     folder = Path(__file__).parents[3] / "pipeline" / "diagnosis" / "causes"
     assert all(len(path.read_text().splitlines()) <= 300 for path in folder.glob("*.py"))
+
+
+@pytest.mark.parametrize(("name", "amount"), [("stiffness_varying", -0.29), ("pre_curvature_varying", 1.4)])
+def test_several_forms_that_add_up_to_one_spot_are_told_as_it(bench, name, amount):
+    """0.6 of a spot and 0.4 of it again."""
+    facts, model, _ = bench
+    cause = BY_NAME[name]
+    spot = replace(cause.variants(facts)[-1], at=0.405, width=0.06)
+    parts = cause.apply(cause.apply(model, 0.6 * amount, spot, facts), 0.4 * amount, spot, facts)
+    variant, size, stiffer = spot_between(model, parts)
+    assert variant.at == pytest.approx(0.405, abs=0.01)  # half a step of the search
+    assert variant.width == pytest.approx(0.06, rel=0.13)
+    assert size == pytest.approx(amount, rel=0.1)
+    assert stiffer == pytest.approx(0.0, abs=0.01)
+    assert spot_between(model, model) is None
