@@ -129,14 +129,22 @@ def _members(
 
 def _refitted(bench: Workbench, settings: DiagnosisSettings) -> list[Explanation]:
     """All suspects refitted that remove anything, the best first."""
-    suspects = candidates(bench.suspicion, settings, any_sign="mounted" not in bench.facts.branch)
+    loading_only = "mounted" not in bench.facts.branch
+    suspects = candidates(bench.suspicion, settings, any_sign=loading_only)
     found = _explanations(bench, suspects, settings)
-    if max((e.gain for e in found), default=0.0) < CONFIRMED * bench.largest**2:
+    best = max(found, key=lambda e: e.gain, default=None)
+    if best is None or best.gain < CONFIRMED * bench.largest**2 or (loading_only and not _foreseen(bench, best)):
         # A base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit.
         others = [k for k in range(len(bench.suspicion.causes)) if k not in suspects and bench.suspicion.of(k).size]
         found = [*found, *_explanations(bench, others, settings)]
         found = [e for e in found if e.gain >= CONFIRMED * bench.limit**2]
     return sorted(found, key=lambda e: -e.gain)
+
+
+def _foreseen(bench: Workbench, found: Explanation) -> bool:
+    """Whether a score of admissible sign announced what a refit found, or it was found in another valley."""
+    announced = max(float(bench.suspicion.statistic[bench.suspicion.of(k)].max()) for k in found.causes)
+    return announced**2 >= CONFIRMED * min(found.gain, bench.limit**2)
 
 
 CONFIRMED = 0.5

@@ -1,8 +1,13 @@
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from pipeline.diagnosis.diagnose import _refitted
 from pipeline.diagnosis.score import score
 from pipeline.diagnosis.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
+from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def weigh(gains, **kind):
@@ -77,3 +82,31 @@ def test_stated_probabilities_are_true_for_twins():
 )
 def test_word(facts, word):
     assert decide(**facts) == word
+
+
+@pytest.mark.parametrize(
+    ("branch", "announced", "others"),
+    [("loading", 0.0, True), ("loading", 8.0, False), ("mounted", 0.0, False)],
+    ids=["another valley", "announced", "K0 is known"],
+)
+def test_a_cause_that_no_score_announced_is_not_refitted_alone(monkeypatch, branch, announced, others):
+    """Without the force-free photo it was found in another valley of K0, where other causes fit as well."""
+    tried = []
+
+    def explanations(bench, causes, settings):
+        tried.append(causes)
+        return [SimpleNamespace(causes=(0,), gain=50.0)] if 0 in causes else []
+
+    suspicion = SimpleNamespace(
+        causes=("friction", "offset", "nothing"),
+        of=lambda k: np.arange(k, min(k + 1, 2)),
+        statistic=np.array([announced, 2.0]),
+    )
+    bench = SimpleNamespace(
+        suspicion=suspicion, facts=SimpleNamespace(branch=(branch, "loading")), largest=6.0, limit=3.5
+    )
+    room = sys.modules[_refitted.__module__]  # its package names a function as the module
+    monkeypatch.setattr(room, "candidates", lambda *_, any_sign: [0])
+    monkeypatch.setattr(room, "_explanations", explanations)
+    _refitted(bench, DiagnosisSettings())
+    assert tried == ([[0], [1]] if others else [[0]])
