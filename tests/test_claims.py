@@ -61,8 +61,8 @@ def test_both_ways_find_the_characteristic(benches, truths):
         assert rms_relative(curve, truth) < 0.01
         kappa, tangent, std = (np.array(v) for v in (curve.kappa_per_m, curve.tangent_Nm2, curve.tangent_std_Nm2))
         covered = np.abs(tangent - stiffness(truth, kappa)) < 1.96 * std
-        # one curve counts for about three independent points: 0.7 is missed by chance once in a hundred curves
-        assert np.mean(covered[curve.supported]) > 0.7
+        # one curve counts for about three independent points: with one of them outside two thirds would be left
+        assert np.mean(covered[curve.supported]) > 0.8
     assert result.agreement.compatible
     low, high = result.inverse.supported_per_m
     reached = max(max(step["kappa"]) for step in truth["steps"])
