@@ -181,17 +181,19 @@ def fit_terms(
     for start in starts:
         if best is not None and best.converged and best.chi2 >= hopeless:
             break
-        found = fit(
-            observation,
-            extension,
-            start,
-            iterations=settings.iterations,
-            tolerance=settings.tolerance,
-            near=base.run,
-        )
+        found = _fit_from(observation, extension, start, base, settings)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
     return best
+
+
+def _fit_from(
+    observation: Observation, extension: Extension, start: Array, near: Fit, settings: DiagnosisSettings
+) -> Fit:
+    """A refit as the settings ask for it, its equilibria sought from those of a fitted neighbour."""
+    return fit(
+        observation, extension, start, iterations=settings.iterations, tolerance=settings.tolerance, near=near.run
+    )
 
 
 def _linear_start(
@@ -282,14 +284,7 @@ def _as_one_spot(observation: Observation, best: Fit, settings: DiagnosisSetting
     extension = Extension(extension.base, extension.facts, (Term(terms[0].cause, variant),))
     start = extension.start(best.vector, (amount,))
     start[: len(extension.base.knots)] += np.log1p(stiffer)
-    one = fit(
-        observation,
-        extension,
-        start,
-        iterations=settings.iterations,
-        tolerance=settings.tolerance,
-        near=best.run,
-    )
+    one = _fit_from(observation, extension, start, best, settings)
     dropped = len(terms) - 1
     return one if one.run.prediction is not None and one.chi2 < best.chi2 + settings.shape_gain * dropped else best
 
@@ -301,13 +296,12 @@ def _without_needless_forms(observation: Observation, best: Fit, settings: Diagn
     """
     while len(own := _forms_of_last_cause(best)) > 1:
         shorter = [
-            fit(
+            _fit_from(
                 observation,
                 replace(best.extension, terms=tuple(t for k, t in enumerate(best.extension.terms) if k != dropped)),
                 np.delete(best.vector, range(at, at + 1 + len(best.extension.terms[dropped].variant.tuned))),
-                iterations=settings.iterations,
-                tolerance=settings.tolerance,
-                near=best.run,
+                best,
+                settings,
             )
             for dropped, at in enumerate(best.extension.owners)
             if dropped in own
