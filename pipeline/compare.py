@@ -162,7 +162,7 @@ def _log_curve(curve: Visited) -> LogCurve:
 def _mean(first: LogCurve, second: LogCurve, grid: Array, bands: Array) -> Difference:
     """Geometric mean stiffness over the range; the test is that of the logarithms."""
     log_a, log_b = float(np.mean(first.log_on(grid))), float(np.mean(second.log_on(grid)))
-    tested = _difference(log_a, log_b, float(np.sqrt(max(np.mean(bands), 0.0))))
+    tested = _difference(log_a, log_b, float(np.sqrt(max(float(np.mean(bands)), 0.0))))
     a, b = float(np.exp(log_a)), float(np.exp(log_b))
     return Difference(a, b, b - a, tested.std * float(np.sqrt(a * b)), tested.p_value)
 

@@ -17,8 +17,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from pipeline.errors import InputError
 from pipeline.rounding import rounded
 
-SCHEMA = "cablebend/result/1"
-
 Floats = list[float]
 
 
@@ -309,7 +307,7 @@ class FindingPart(Part):
 class Result(Part):
     """Everything measured on one specimen."""
 
-    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = SCHEMA
+    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = "cablebend/result/1"
     status: Literal["measured", "partial", "failed"]
     headline: str = ""
     specimen: SpecimenPart

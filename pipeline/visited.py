@@ -65,21 +65,21 @@ def visited(method: str, curve: Curve | None) -> Visited | None:
     keep = np.flatnonzero(curve.supported)
     if keep.size < 2:
         return None
-    rows = curve.tangent_factor_Nm2
-    factor = np.asarray(rows, dtype=np.float64)[keep] if rows else np.zeros((keep.size, 0))
-    fields = (
-        np.asarray(values, dtype=np.float64)[keep]
-        for values in (
-            curve.kappa_per_m,
-            curve.moment_Nm,
-            curve.moment_std_Nm,
-            curve.tangent_Nm2,
-            curve.tangent_std_Nm2,
-            curve.secant_Nm2,
-            curve.secant_std_Nm2,
-        )
+
+    def kept(values: list[float] | list[list[float]]) -> Array:
+        return np.asarray(values, dtype=np.float64)[keep]
+
+    return Visited(
+        method=method,
+        kappa=kept(curve.kappa_per_m),
+        moment=kept(curve.moment_Nm),
+        moment_std=kept(curve.moment_std_Nm),
+        tangent=kept(curve.tangent_Nm2),
+        tangent_std=kept(curve.tangent_std_Nm2),
+        secant=kept(curve.secant_Nm2),
+        secant_std=kept(curve.secant_std_Nm2),
+        factor=kept(curve.tangent_factor_Nm2) if curve.tangent_factor_Nm2 else np.zeros((keep.size, 0)),
     )
-    return Visited(method, *fields, factor)
 
 
 def curves(result: Result) -> dict[str, Visited]:

@@ -143,16 +143,22 @@ def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> 
     return tally
 
 
+class _LogFile(logging.FileHandler):
+    """A log on a disk that may be full."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Lose the line: the default prints a traceback for every one."""
+
+
 @contextmanager
 def _log(store: Store) -> Iterator[logging.Logger]:
     """A log file beside the results, one line a specimen, appended to by each run."""
     log = logging.Logger("cablebend.batch")  # not registered: no other logger of the process is touched
     try:
-        handler = logging.FileHandler(store.out / LOG_NAME, encoding="utf-8", errors="backslashreplace")
+        handler = _LogFile(store.out / LOG_NAME, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise store.unwritable(error) from error
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
-    handler.handleError = lambda record: None  # a full disk: the default prints a traceback for every line
     log.addHandler(handler)
     try:
         yield log

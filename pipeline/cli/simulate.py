@@ -46,7 +46,10 @@ def simulate(
     steps: int,
     step_mm: float,
     seed: int,
-    **cable: float,
+    EI0: float,
+    EI1: float,
+    kc: float,
+    K0: float,
 ) -> None:
     """Bend a virtual cable, photograph it, and write a specimen FOLDER; the truth goes beside it, not into it."""
     from pipeline.simulate import Experiment, protocol, simulate_specimen
@@ -59,7 +62,10 @@ def simulate(
             displacements_m=protocol(plan, steps, step_mm * 1e-3),
             effects=effects,
             seed=seed,
-            **cable,
+            EI0=EI0,
+            EI1=EI1,
+            kc=kc,
+            K0=K0,
         )
         written = simulate_specimen(folder, experiment)
     except ValueError as error:

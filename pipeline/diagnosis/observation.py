@@ -109,10 +109,13 @@ class Observation:
         """Sections of all photos, one after the other."""
         parts = [photo.sections for photo in self.photos]
         ends = np.cumsum([0, *(len(part.s) for part in parts)])
+        none = np.zeros(0)  # without photos
         return _Places(
-            np.repeat([photo.step for photo in self.photos], np.diff(ends)).astype(int),
-            *(np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)]) for name in ("s", "x", "y")),
-            tuple(slice(low, high) for low, high in pairwise(ends.tolist())),
+            step=np.repeat([photo.step for photo in self.photos], np.diff(ends)).astype(int),
+            s=np.concatenate([none, *(part.s for part in parts)]),
+            x=np.concatenate([none, *(part.x for part in parts)]),
+            y=np.concatenate([none, *(part.y for part in parts)]),
+            of_photo=tuple(slice(low, high) for low, high in pairwise(ends.tolist())),
         )
 
 

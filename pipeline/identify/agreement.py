@@ -97,10 +97,9 @@ def difference_covariance(
     first, second = log_curve(one).contraction(grid), log_curve(two).contraction(grid)
     short = first @ one.shortfall @ laws[0] - second @ two.shortfall @ laws[1]
     total: Array = short @ short.T
+    ways = (first, one), (-second, two)
     for source in one.gains | two.gains:
-        moved = first @ one.gains[source] if source in one.gains else 0.0
-        if source in two.gains:
-            moved = moved - second @ two.gains[source]
+        moved = np.sum([onto @ law.gains[source] for onto, law in ways if source in law.gains], axis=0)
         total = total + moved @ source_covariance(test, source, moved.shape[1]) @ moved.T
     return total
 

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -26,6 +26,9 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 
 from pipeline.report.ruling import FONT, Ruling, rule, text_width
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
 
 # A figure of its own, or a part of a page.
 Area = Figure | SubFigure
@@ -54,7 +57,7 @@ ONE_ROW, TWO_ROWS = 22.0, 38.0
 # Between the labels of an axis and both its sides, in px.
 LABEL_GAP = 10.0
 
-STYLE: dict[str, Any] = {
+STYLE: dict[RcKeyType, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cablebend",
     "font.family": FONT,
@@ -185,20 +188,18 @@ def plot_area(
 
 def label_width(labels: Iterable[str], *, most: float) -> float:
     """Room in px that labels of an axis need, at most so much: names differ in length from language to language."""
-    return min(most, STYLE["font.size"] * max(map(text_width, labels), default=0.0) + LABEL_GAP)
+    return min(most, float(STYLE["font.size"]) * max(map(text_width, labels), default=0.0) + LABEL_GAP)
 
 
 def finish(axes: Axes, *, x: str | Ruling, y: str | Ruling, decimal: str, legend: int = 0) -> Axes:
     """Rule the axes with names, units and the reader's number format, put the legend above; their limits are final."""
     axes.apply_aspect()
-    for side, given in (("bottom", x), ("left", y)):
-        rule(axes, side, Ruling(given) if isinstance(given, str) else given, decimal=decimal)
+    rule(axes, "bottom", Ruling(x) if isinstance(x, str) else x, decimal=decimal)
+    rule(axes, "left", Ruling(y) if isinstance(y, str) else y, decimal=decimal)
     if legend:
-        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.1}
-        many = (
-            {"handlelength": 1.1, "columnspacing": 0.9, "handletextpad": 0.4} if legend > 4 else {"columnspacing": 1.4}
-        )
-        axes.legend(ncols=legend, **place, **many)
+        many: dict[str, float] = {"handlelength": 1.1, "columnspacing": 0.9, "handletextpad": 0.4}
+        spacing = many if legend > 4 else {"columnspacing": 1.4}
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), borderaxespad=0.1, ncols=legend, **spacing)
     return axes
 
 

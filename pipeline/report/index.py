@@ -16,6 +16,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipeline.report.document import asset, environment, palette_css, write_report
 from pipeline.report.figures import band_width
@@ -81,13 +82,20 @@ def _thinned(curve: Visited | None, points: int) -> Visited | None:
     if curve is None or curve.kappa.size <= points:
         return curve
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
-    fields = (curve.moment, curve.moment_std, curve.tangent, curve.tangent_std, curve.secant, curve.secant_std)
-    factor = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
+
+    def onto(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.interp(grid, curve.kappa, values)
+
     return Visited(
-        curve.method,
-        grid,
-        *(np.interp(grid, curve.kappa, values) for values in fields),
-        np.column_stack(factor) if factor else np.zeros((points, 0)),
+        method=curve.method,
+        kappa=grid,
+        moment=onto(curve.moment),
+        moment_std=onto(curve.moment_std),
+        tangent=onto(curve.tangent),
+        tangent_std=onto(curve.tangent_std),
+        secant=onto(curve.secant),
+        secant_std=onto(curve.secant_std),
+        factor=np.column_stack([np.zeros((points, 0)), *map(onto, curve.factor.T)]),
     )
 
 

@@ -94,7 +94,7 @@ def write_paper(folder: Path) -> Paper:
 
 def numbers(paper: Paper) -> dict[str, Any]:
     """The contract's ``paper.json``, with more beside it."""
-    table = {reading: _row(paper.experiments[reading, False]) for reading in READINGS}
+    table: dict[str, Any] = {reading: _row(paper.experiments[reading, False]) for reading in READINGS}
     table |= {f"{reading}_from_length": _row(paper.experiments[reading, True]) for reading in READINGS}
     causes, together = paper.causes[:-1], paper.causes[-1]
     return {

@@ -63,8 +63,8 @@ def draw_difference(cause: Difference, figure: Area) -> Axes:
     """Fig. 7: both ways with one cause of disagreement, and the rms of their difference."""
     axes = plot_area(figure, top=TWO_ROWS)
     axes.plot(cause.kappa, 1e3 * cause.inverse, color=LIGHT["inverse"], label="inverse problem")
-    balance = {"color": LIGHT["balance"], "ls": "--", "marker": "o", "ms": 4}
-    axes.plot(cause.kappa, 1e3 * cause.balance, label=f"balance equations ({100 * cause.rms:.0f} % rms)", **balance)
+    label = f"balance equations ({100 * cause.rms:.0f} % rms)"
+    axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)
     axes.set_ylim(bottom=0.0)
     return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=1)
 

@@ -21,12 +21,13 @@ from matplotlib.image import imread
 
 from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
-from pipeline.report.canvas import FONT, LIGHT, Area, style
+from pipeline.report.canvas import LIGHT, Area, style
 from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
 from pipeline.report.document import simulation_texts
 from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
+from pipeline.report.ruling import FONT
 from pipeline.report.words import Words
 from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result
 from pipeline.settings import ReportSettings

@@ -21,9 +21,11 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ft2font import LoadFlags
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
+from numpy.typing import NDArray
 
 from pipeline.rounding import fixed, plain
 
+Array = NDArray[np.float64]
 Side = Literal["bottom", "left", "right"]
 
 # Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.
@@ -84,14 +86,14 @@ def rule(axes: Axes, side: Side, ruling: Ruling, *, decimal: str) -> None:
     _labels(axes, side, places, frame, labels, ruling)
 
 
-def _round_places(low: float, high: float, ruling: Ruling) -> np.ndarray:
+def _round_places(low: float, high: float, ruling: Ruling) -> Array:
     """Round numbers within the limits; what rounding puts just outside counts as inside."""
-    found = MaxNLocator(ruling.most, integer=ruling.whole).tick_values(low, high)
+    found = np.asarray(MaxNLocator(ruling.most, integer=ruling.whole).tick_values(low, high))
     slack = 1e-9 * (high - low)
     return found[(found >= low - slack) & (found <= high + slack)]
 
 
-def numbers(places: np.ndarray, decimal: str) -> tuple[str, ...]:
+def numbers(places: Array, decimal: str) -> tuple[str, ...]:
     """Labels with the decimal sign of the language and a true minus, all to the same decimal place."""
     values = [float(f"{place:.6g}") for place in places]
     texts = [plain(value, 4) for value in values]
@@ -101,7 +103,7 @@ def numbers(places: np.ndarray, decimal: str) -> tuple[str, ...]:
     return tuple(fixed(value, digits, decimal) for value in values)
 
 
-def _grid(axes: Axes, side: Side, places: np.ndarray) -> None:
+def _grid(axes: Axes, side: Side, places: Array) -> None:
     """Lines through the whole frame, under the curves."""
     if side == "bottom":
         lines, over = [((place, 0.0), (place, 1.0)) for place in places], axes.get_xaxis_transform()
@@ -111,7 +113,7 @@ def _grid(axes: Axes, side: Side, places: np.ndarray) -> None:
     axes.add_collection(LineCollection(lines, transform=over, zorder=BELOW, **look), autolim=False)
 
 
-def _marks(axes: Axes, side: Side, places: np.ndarray, frame: float, length: float) -> None:
+def _marks(axes: Axes, side: Side, places: Array, frame: float, length: float) -> None:
     """Marks outside the frame."""
     out = {"bottom": (0.0, -0.5 * length), "left": (-0.5 * length, 0.0), "right": (0.5 * length, 0.0)}[side]
     edge = np.full(places.size, frame)
@@ -123,7 +125,7 @@ def _marks(axes: Axes, side: Side, places: np.ndarray, frame: float, length: flo
     axes.add_artist(line)
 
 
-def _labels(axes: Axes, side: Side, places: np.ndarray, frame: float, labels: tuple[str, ...], ruling: Ruling) -> None:
+def _labels(axes: Axes, side: Side, places: Array, frame: float, labels: tuple[str, ...], ruling: Ruling) -> None:
     """Labels beside their places and the name beyond them."""
     size = FontProperties(size=mpl.rcParams["xtick.labelsize"]).get_size_in_points()
     gap = ruling.mark + GAP
@@ -158,7 +160,7 @@ def _moved(axes: Axes, side: Side, by: tuple[float, float]) -> Any:
 
 
 def _offset(axes: Axes, by: tuple[float, float]) -> ScaledTranslation:
-    return ScaledTranslation(by[0] / 72.0, by[1] / 72.0, axes.get_figure(root=True).dpi_scale_trans)
+    return ScaledTranslation(by[0] / 72.0, by[1] / 72.0, axes.figure.dpi_scale_trans)
 
 
 def text_width(text: str) -> float:

@@ -73,7 +73,7 @@ def spot_between(uniform: Model, varying: Model) -> tuple[Variant, float, float]
     """
     before, after = uniform.bending.rod.section, varying.bending.rod.section
     relative = after.profile is not None
-    change = np.asarray(after.profile - 1.0 if relative else after.pre_curvature - before.pre_curvature)
+    change = np.asarray(after.pre_curvature - before.pre_curvature if after.profile is None else after.profile - 1.0)
     if before.profile is not None or change.ndim == 0 or not np.ptp(change) > 0.0:
         return None
     position = position_of(varying)
