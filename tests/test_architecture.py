@@ -37,6 +37,30 @@ INSIDE = {
         ("problem",),
     ],
     "rod.balance": [("compliance",), ("moment_points",), ("moment_regression",), ("graph",)],
+    "pipeline.vision": [
+        ("photo", "rough", "render"),
+        ("scale", "search"),
+        ("bearings", "centerline", "preview"),
+        ("judgement",),
+        ("segmentation",),
+        ("series",),
+    ],
+    "pipeline.vision.scale": [("plane",), ("calibration", "chord"), ("board",)],
+    "pipeline.vision.search": [
+        ("flanks", "strips", "backdrop"),
+        ("crosscut",),
+        ("bands", "closeup"),
+        ("candidates",),
+        ("ends",),
+    ],
+    "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes")],
+    "pipeline.vision.centerline": [
+        ("curvature", "smoothing", "edge_profile"),
+        ("curve_fit", "edges"),
+        ("midline",),
+        ("path",),
+        ("measurement",),
+    ],
     "pipeline.vision.render": [
         ("lens", "lighting", "sensor", "sheath"),
         ("ground",),
@@ -120,13 +144,15 @@ def test_imports_run_from_right_to_left_only(path):
 @pytest.mark.parametrize("package", INSIDE)
 def test_the_files_of_a_package_have_an_order_too(package):
     order = {name: rank for rank, names in enumerate(INSIDE[package]) for name in names}
-    for path in (ROOT / package.replace(".", "/")).glob("*.py"):
-        if path.stem == "__init__":
+    folder = ROOT / package.replace(".", "/")
+    for path in folder.rglob("*.py"):
+        here = path.relative_to(folder).with_suffix("").parts[0]
+        if here == "__init__":
             continue
         for name in imports(path):
             target = name.removeprefix(package + ".").split(".")[0]
-            if name.startswith(package + ".") and target != path.stem:
-                assert order[target] < order[path.stem], f"{path.stem} imports {name}, which is not to its left"
+            if name.startswith(package + ".") and target != here:
+                assert order[target] < order[here], f"{here} imports {name}, which is not to its left"
 
 
 STANDARD = {"__future__", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"}

@@ -14,16 +14,24 @@ import numpy as np
 from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Standout
-from pipeline.vision.bands import by_diameter
-from pipeline.vision.bearings import BearingHints, find_bearings, left_first
-from pipeline.vision.candidates import Reading, approaches_itself, branches
-from pipeline.vision.closeup import Closeup, take_closeup
-from pipeline.vision.crosscut import CrossCut, cut_across
-from pipeline.vision.ends import CableEnd, at_border, between_axes, find_end, lead_to_axes, settle_end, without_specks
+from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.strips import Strip
+from pipeline.vision.search.backdrop import Standout
+from pipeline.vision.search.bands import by_diameter
+from pipeline.vision.search.candidates import Reading, approaches_itself, branches
+from pipeline.vision.search.closeup import Closeup, take_closeup
+from pipeline.vision.search.crosscut import CrossCut, cut_across
+from pipeline.vision.search.ends import (
+    CableEnd,
+    at_border,
+    between_axes,
+    find_end,
+    lead_to_axes,
+    settle_end,
+    without_specks,
+)
+from pipeline.vision.search.strips import Strip
 
 _MAD_TO_STD = 1.4826
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision_stages import PreviewSettings
-from pipeline.vision.crosscut import path_normals
 from pipeline.vision.photo import Photo, reduce_area
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.crosscut import path_normals
 
 # Okabe and Ito's orange and sky blue (blue, green, red): told apart by colour-blind readers and on dark and bright.
 _MIDDLE, _EDGE = (0, 159, 230), (233, 180, 86)

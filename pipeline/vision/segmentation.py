@@ -16,11 +16,11 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Standout, choose_reduction, stand_out
-from pipeline.vision.candidates import Reading, Wanted, read_photo
 from pipeline.vision.judgement import Cable, judge_strip, refused
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
+from pipeline.vision.search.candidates import Reading, Wanted, read_photo
 
 Window = tuple[int, int, int, int]
 

@@ -20,16 +20,16 @@ import numpy as np
 from pipeline.records import Array, Centerline, Finding, LoadStep, Preview, Rejected, Scale, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import SeriesSettings
-from pipeline.vision.bearings import BearingHints, PixelPair
-from pipeline.vision.board import calibrate_by_board
-from pipeline.vision.calibration import Calibration, check_scale, from_found, from_number
-from pipeline.vision.centerline import measure_centerline
-from pipeline.vision.cover_size import cover_radius
+from pipeline.vision.bearings.axes import BearingHints, PixelPair
+from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
-from pipeline.vision.plane import PlaneMap
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.scale.board import calibrate_by_board
+from pipeline.vision.scale.calibration import Calibration, check_scale, from_found, from_number
+from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
 
 Found = TypeVar("Found")

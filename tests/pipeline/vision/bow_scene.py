@@ -16,12 +16,12 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline import measure_centerline
-from pipeline.vision.plane import PlaneMap
+from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import Camera, Curve, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.lighting import EVEN, Light
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.scale.plane import PlaneMap
 from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
 

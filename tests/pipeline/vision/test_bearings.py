@@ -7,15 +7,15 @@ import pytest
 from scipy.special import erfc
 
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.bearings import BearingHints, find_bearings, left_first
-from pipeline.vision.cover_size import cover_radius, visible_ends
-from pipeline.vision.covers import Radius, find_cover
-from pipeline.vision.ends import CableEnd
+from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
+from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
+from pipeline.vision.bearings.covers import Radius, find_cover
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.search.ends import CableEnd
 
 STAGE = BearingSettings()
 SCALE = 9_000.0

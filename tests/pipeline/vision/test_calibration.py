@@ -11,13 +11,13 @@ from pipeline.errors import InputError
 from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import CalibrationSettings
-from pipeline.vision.board import BoardView, calibrate_by_board, find_board, fit_views
-from pipeline.vision.calibration import check_scale, from_found, from_number
 from pipeline.vision.photo import Photo
-from pipeline.vision.plane import Lens, PlaneMap
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.scale.board import BoardView, calibrate_by_board, find_board, fit_views
+from pipeline.vision.scale.calibration import check_scale, from_found, from_number
+from pipeline.vision.scale.plane import Lens, PlaneMap
 
 STAGE = CalibrationSettings()
 SETTINGS = VisionSettings()
@@ -192,7 +192,7 @@ def test_folder_without_a_board_is_the_users_error(tmp_path: Path) -> None:
 def test_corners_that_tell_no_plane_are_the_users_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     board_photo(tmp_path, Camera(1100, 600, 5_000.0), ChessBoard(13, 7, SQUARE))
     seen = BoardView("board.png", np.mgrid[:13, :7].T.reshape(-1, 2) * SQUARE, np.full((91, 2), 300.0), (1100, 600))
-    monkeypatch.setattr("pipeline.vision.board.find_board", lambda *_: seen)
+    monkeypatch.setattr("pipeline.vision.scale.board.find_board", lambda *_: seen)
     with pytest.raises(InputError, match="no plane follows") as raised:
         calibrate_by_board(CameraSpec(calibration=tmp_path, board=BOARD), 0.005, SETTINGS)
     assert raised.value.code == "calibration/no-board"
@@ -200,7 +200,7 @@ def test_corners_that_tell_no_plane_are_the_users_error(tmp_path: Path, monkeypa
 
 def test_corners_on_one_line_are_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
     line = np.column_stack([np.arange(8) * SQUARE, np.zeros(8)])
-    monkeypatch.setattr("pipeline.vision.board._charuco", lambda *_: (line, 4_000.0 * line))
+    monkeypatch.setattr("pipeline.vision.scale.board._charuco", lambda *_: (line, 4_000.0 * line))
     photo = Photo("a.png", np.full((300, 400), 128, np.uint8), 8)
     found = find_board(photo, Board(11, 7, SQUARE, charuco=True), STAGE)
     assert isinstance(found, Rejected) and found.code == "calibration/no-corners"

@@ -10,12 +10,12 @@ from numpy.testing import assert_allclose
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline import measure_centerline
-from pipeline.vision.chord import chord_frame
-from pipeline.vision.plane import Lens, PlaneMap
+from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import render
 from pipeline.vision.render.ground import Ground
 from pipeline.vision.render.sheath import WHITE, Sheath
+from pipeline.vision.scale.chord import chord_frame
+from pipeline.vision.scale.plane import Lens, PlaneMap
 from tests.pipeline.vision.bow_scene import (
     DIAMETER,
     LENGTH,

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings import BearingHints
-from pipeline.vision.closeup import Closeup, take_closeup
+from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Curve, Scene, Sensor, Strand, render
+from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.segmentation import find_cable
 
 WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis

@@ -12,12 +12,12 @@ import pytest
 
 from pipeline.records import Centerline
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline import measure_centerline
-from pipeline.vision.closeup import take_closeup
+from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.photo import Photo
-from pipeline.vision.plane import PlaneMap
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.search.closeup import take_closeup
 from tests.pipeline.vision.bow_scene import (
     COVER,
     DIAMETER,

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.special import fresnel
 
-from pipeline.vision.curvature import PlaneCurve, make_frame
-from pipeline.vision.curve_fit import CurveFit, fit_curve, initial_curve
+from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
+from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, initial_curve
 
 LENGTH = 0.2
 

@@ -9,10 +9,10 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import PlaneCurve, make_frame
-from pipeline.vision.edge_profile import Pixels, fit_edges, fit_profiles, profile
-from pipeline.vision.edges import Ground, in_picture, search_edges, straighten
-from pipeline.vision.midline import Cover, free_of_covers
+from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
+from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
+from pipeline.vision.centerline.edges import Ground, in_picture, search_edges, straighten
+from pipeline.vision.centerline.midline import Cover, free_of_covers
 
 BLUR, DARK, STEP = 0.9, 0.2, 0.6
 ACROSS = np.arange(-8.0, 7.0)

@@ -10,15 +10,15 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings import BearingHints
-from pipeline.vision.candidates import Reading, branches
+from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.candidates import Reading, branches
+from pipeline.vision.search.strips import Strip
 from pipeline.vision.segmentation import find_cable
-from pipeline.vision.strips import Strip
 from tests.pipeline.vision.second_renderer import photograph, random_look
 
 SETTINGS = VisionSettings()

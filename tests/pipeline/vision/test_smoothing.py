@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
-from pipeline.vision.smoothing import Problem, whiten
+from pipeline.vision.centerline.smoothing import Problem, whiten
 
 N, P = 60, 9
 

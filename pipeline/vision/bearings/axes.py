@@ -14,10 +14,10 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.covers import Radius, find_cover
-from pipeline.vision.ends import CableEnd
+from pipeline.vision.bearings.covers import Radius, find_cover
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
+from pipeline.vision.search.ends import CableEnd
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
 

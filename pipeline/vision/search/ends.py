@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.backdrop import Standout
-from pipeline.vision.candidates import Reading
-from pipeline.vision.closeup import Closeup
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
-from pipeline.vision.strips import end_direction
+from pipeline.vision.search.backdrop import Standout
+from pipeline.vision.search.candidates import Reading
+from pipeline.vision.search.closeup import Closeup
+from pipeline.vision.search.strips import end_direction
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 The spline covers the whole range, the parts without points included: there the curve is continued by the penalty, with
 the uncertainty that follows from it. Gauss-Newton on the distances along the normal; each linear step is a penalised
 least-squares problem, whitened for errors with correlation ``exp(-ds/l)`` and solved by QR of the stacked
-``[R; sqrt(mu) D]`` (`pipeline.vision.smoothing`). The penalty ``int (d^k kappa / ds^k)^2 ds`` has its weight, and the
-noise its correlation length, by restricted maximum likelihood; what is left open about the weight goes into the
-covariance.
+``[R; sqrt(mu) D]`` (`pipeline.vision.centerline.smoothing`). The penalty ``int (d^k kappa / ds^k)^2 ds`` has its
+weight, and the noise its correlation length, by restricted maximum likelihood; what is left open about the weight goes
+into the covariance.
 
 Never is ``kappa`` or its slope forced at the ends: moment-free ends carry ``kappa = K0`` with a finite slope.
 ``s`` along the curve, lengths in any one unit, axes those of the points.
@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.vision.curvature import Frame, PlaneCurve
-from pipeline.vision.smoothing import Problem, Smooth
+from pipeline.vision.centerline.curvature import Frame, PlaneCurve
+from pipeline.vision.centerline.smoothing import Problem, Smooth
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def fit_curve(
     correlation_length : length, optional
         Of the errors; sought if not given.
     bias_share : float
-        Part of the penalty's bias that counts as uncertainty; see `pipeline.vision.smoothing.Problem.smooth`.
+        Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
     """
     found = _settle(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.vision.plane import PlaneMap
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.scale.plane import PlaneMap
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Image, Standout
-from pipeline.vision.bands import strips_in_bands
-from pipeline.vision.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
+from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.bands import strips_in_bands
+from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
 
 
 @dataclass(frozen=True)

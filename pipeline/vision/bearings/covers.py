@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.ends import CableEnd
+from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
+from pipeline.vision.bearings.rings import find_marks, with_rings
 from pipeline.vision.photo import Photo
-from pipeline.vision.rim import Circle, Radius, fit_circle
-from pipeline.vision.rings import find_marks, with_rings
+from pipeline.vision.search.ends import CableEnd
 
 
 def find_cover(

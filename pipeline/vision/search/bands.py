@@ -17,10 +17,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Image
-from pipeline.vision.crosscut import path_normals, smooth_path, straighten
-from pipeline.vision.flanks import find_flanks
-from pipeline.vision.strips import Mask, Strip, find_strips
+from pipeline.vision.search.backdrop import Image
+from pipeline.vision.search.crosscut import path_normals, smooth_path, straighten
+from pipeline.vision.search.flanks import find_flanks
+from pipeline.vision.search.strips import Mask, Strip, find_strips
 
 _MAD_TO_STD = 1.4826
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import PlaneCurve, make_frame
-from pipeline.vision.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.edges import Ground, in_picture, search_edges
-from pipeline.vision.midline import Cover, Sections, free_of_covers, measure_sections
+from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
+from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
+from pipeline.vision.centerline.edges import Ground, in_picture, search_edges
+from pipeline.vision.centerline.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.rough import Bearing, RoughCable
 
 

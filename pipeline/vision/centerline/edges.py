@@ -27,8 +27,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import PlaneCurve
-from pipeline.vision.edge_profile import Float32, Pixels
+from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.edge_profile import Float32, Pixels
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,9 @@ from pipeline.errors import InputError
 from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_stages import CalibrationSettings
-from pipeline.vision.calibration import Calibration
 from pipeline.vision.photo import Photo, load_photo
-from pipeline.vision.plane import Lens, PlaneMap
+from pipeline.vision.scale.calibration import Calibration
+from pipeline.vision.scale.plane import Lens, PlaneMap
 
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
 _DICTIONARIES = (

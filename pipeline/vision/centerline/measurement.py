@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.chord import ChordFrame, chord_frame
-from pipeline.vision.curve_fit import CurveFit
-from pipeline.vision.midline import Sections
-from pipeline.vision.path import fit_along, follow
-from pipeline.vision.plane import PlaneMap
+from pipeline.vision.centerline.curve_fit import CurveFit
+from pipeline.vision.centerline.midline import Sections
+from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.scale.chord import ChordFrame, chord_frame
+from pipeline.vision.scale.plane import PlaneMap
 from rod.measurement import MeasuredShape
 
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain

@@ -2,8 +2,8 @@
 
 ``camera of specimen.toml -> Calibration (plane map, scale)``; without any: the found bearings and covers give it.
 Sources, the first that is given: a number of px/mm; photos of a board in the plane of the cable
-(`pipeline.vision.board`); the travel of the moving bearing against the displacement log; the diameter of the covers;
-the length of the cable.
+(`pipeline.vision.scale.board`); the travel of the moving bearing against the displacement log; the diameter of the
+covers; the length of the cable.
 
 Standard deviations are relative and common to all photos of the specimen. SI units; scales in px/m.
 """
@@ -16,8 +16,8 @@ import numpy as np
 
 from pipeline.records import Array, Finding, Scale, Specimen
 from pipeline.settings.vision_stages import CalibrationSettings
-from pipeline.vision.plane import PlaneMap
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.scale.plane import PlaneMap
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.crosscut import path_normals
 from pipeline.vision.photo import Photo
+from pipeline.vision.search.crosscut import path_normals
 
 _MAD_TO_STD = 1.4826
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured

@@ -17,8 +17,8 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import BearingSettings
+from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.photo import Photo, reduce_area
-from pipeline.vision.rim import Circle, Radius, fit_circle
 
 
 def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSettings) -> Circle:

@@ -18,11 +18,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.settings.vision_stages import BearingSettings
-from pipeline.vision.covers import Radius, find_cover
-from pipeline.vision.ends import CableEnd
+from pipeline.vision.bearings.covers import Radius, find_cover
+from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.photo import Photo
-from pipeline.vision.rings import find_marks
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.ends import CableEnd
 
 
 def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSettings) -> float | None:

@@ -30,9 +30,9 @@ from scipy.ndimage import median_filter
 
 from pipeline.records import Array
 from pipeline.settings.vision_curve import CurveSettings
-from pipeline.vision.curvature import PlaneCurve
-from pipeline.vision.edge_profile import Profiles, fit_edges, fit_profiles
-from pipeline.vision.edges import Ground, edge_pixels, normals
+from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
+from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ unit. ``B_j`` are cubic B-splines on evenly spaced knots over the whole range.
 
 Parameters ``q = (offset, turn, c_1 .. c_J)``: displacement of the anchor (mid-range) along its normal, its angle, the
 spline. The anchor moves along its normal only, else the curve could slide along itself.
-`pipeline.vision.curve_fit` lays such curves through points.
+`pipeline.vision.centerline.curve_fit` lays such curves through points.
 """
 
 from __future__ import annotations

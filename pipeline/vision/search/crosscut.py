@@ -16,8 +16,8 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision_stages import SegmentationSettings
-from pipeline.vision.backdrop import Image, Standout
-from pipeline.vision.flanks import Flanks, find_flanks
+from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.flanks import Flanks, find_flanks
 
 _MAD_TO_STD = 1.4826
 
@@ -86,7 +86,7 @@ def cut_across(
     ``shaded`` says that a hard shadow lies on one side.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
-    of edges one width apart gives middle and width of each section (`pipeline.vision.flanks`).
+    of edges one width apart gives middle and width of each section (`pipeline.vision.search.flanks`).
     """
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
