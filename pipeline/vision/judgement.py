@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from pipeline.records import Rejected
-from pipeline.settings.vision_stages import PhotoSettings
+from pipeline.settings.vision.photo import PhotoSettings
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Preview
-from pipeline.settings.vision_stages import PreviewSettings
+from pipeline.settings.vision.photo import PreviewSettings
 from pipeline.vision.photo import Photo, reduce_area
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.crosscut import path_normals

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.judgement import Cable, judge_strip, refused
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable

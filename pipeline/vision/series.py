@@ -19,7 +19,7 @@ import numpy as np
 
 from pipeline.records import Array, Centerline, Finding, LoadStep, Preview, Rejected, Scale, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_stages import SeriesSettings
+from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.axes import BearingHints, PixelPair
 from pipeline.vision.bearings.cover_size import cover_radius
 from pipeline.vision.centerline.measurement import measure_centerline

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import Radius, find_cover
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing

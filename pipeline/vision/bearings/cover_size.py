@@ -17,7 +17,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import Radius, find_cover
 from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.photo import Photo

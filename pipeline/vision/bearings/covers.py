@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.bearings.rings import find_marks, with_rings
 from pipeline.vision.photo import Photo

@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.photo import Photo, reduce_area
 

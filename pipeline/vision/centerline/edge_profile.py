@@ -21,7 +21,7 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.settings.vision_curve import CurveSettings
+from pipeline.settings.vision.centerline import CurveSettings
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)

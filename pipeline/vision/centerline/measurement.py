@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_curve import CurveSettings
+from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow

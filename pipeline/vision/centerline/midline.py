@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pipeline.records import Array
-from pipeline.settings.vision_curve import CurveSettings
+from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals

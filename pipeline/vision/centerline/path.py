@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.records import Array, Rejected
-from pipeline.settings.vision_curve import CurveSettings
+from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges

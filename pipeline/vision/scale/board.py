@@ -26,7 +26,7 @@ from scipy.optimize import least_squares
 from pipeline.errors import InputError
 from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_stages import CalibrationSettings
+from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.scale.calibration import Calibration
 from pipeline.vision.scale.plane import Lens, PlaneMap

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.records import Array, Finding, Scale, Specimen
-from pipeline.settings.vision_stages import CalibrationSettings
+from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 

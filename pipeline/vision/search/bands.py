@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.backdrop import Image
 from pipeline.vision.search.crosscut import path_normals, smooth_path, straighten
 from pipeline.vision.search.flanks import find_flanks

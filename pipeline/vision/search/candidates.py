@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.bands import strips_in_bands
 from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.crosscut import path_normals
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import dijkstra
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
-from pipeline.settings.vision_stages import SegmentationSettings
+from pipeline.settings.vision.search import SegmentationSettings
 
 Mask = NDArray[np.uint8]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
-from pipeline.settings.vision_stages import BearingSettings
+from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
 from pipeline.vision.bearings.covers import Radius, find_cover

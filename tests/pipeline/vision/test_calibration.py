@@ -10,7 +10,7 @@ import pytest
 from pipeline.errors import InputError
 from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Specimen
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision_stages import CalibrationSettings
+from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
 from pipeline.vision.render.strand import Curve

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image, ImageOps
 
 from pipeline.records import Rejected
-from pipeline.settings.vision_stages import PhotoSettings
+from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.vision.photo import Photo, decode_photo, load_photo
 
 SETTINGS = PhotoSettings()

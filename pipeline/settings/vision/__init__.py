@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from pipeline.settings.vision_curve import CurveSettings
-from pipeline.settings.vision_stages import (
-    BearingSettings,
-    CalibrationSettings,
-    PhotoSettings,
-    PreviewSettings,
-    SegmentationSettings,
-    SeriesSettings,
-)
+from pipeline.settings.vision.bearings import BearingSettings
+from pipeline.settings.vision.centerline import CurveSettings
+from pipeline.settings.vision.photo import PhotoSettings, PreviewSettings
+from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.settings.vision.series import SeriesSettings
+from pipeline.settings.vision.stage import StageSettings
 
 
-class VisionSettings(BaseModel):
-    """Thresholds of ``vision``, by stage: photo, calibration, segmentation, bearings, series, preview."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+class VisionSettings(StageSettings):
+    """Thresholds of ``vision``, by stage: photo, calibration, segmentation, bearings, curve, series, preview."""
 
     photo: PhotoSettings = Field(default_factory=PhotoSettings)
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.vision.stage import StageSettings
 
 
-class CurveSettings(BaseModel):
+class CurveSettings(StageSettings):
     """Edges of the cable, midline, curvature spline and the figures that forbid a measurement."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     search_radii: float = Field(
         0.35,

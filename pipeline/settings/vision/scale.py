@@ -1,0 +1,50 @@
+"""Settings of scale and plane of the photos: unit in the name, reason in the description."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pipeline.settings.vision.stage import StageSettings
+
+
+class CalibrationSettings(StageSettings):
+    """Scale and plane of the photos."""
+
+    given_scale_std: float = Field(
+        0.001, gt=0, description="relative; a scale bar read on a photo: one pixel in a thousand"
+    )
+    cover_diameter_std: float = Field(
+        0.004, gt=0, description="relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit"
+    )
+    cover_height_std: float = Field(
+        0.003,
+        ge=0,
+        description="relative; covers and their travel look larger than the cable below them: 3 mm seen from a metre",
+    )
+    length_scale_std: float = Field(
+        0.005, gt=0, description="relative; 1 mm on 200 mm: how well the length between the axes is known"
+    )
+    max_scale_std: float = Field(
+        0.01, gt=0, description="relative; a source of scale worse than that is no better than the cable's length"
+    )
+    board_std: float = Field(
+        3e-4, gt=0, description="relative; a printed board measured with a ruler: 0.1 mm on 300 mm"
+    )
+    board_search_px: int = Field(
+        2000, ge=500, description="px; long side at which the board is searched, corners are refined at full resolution"
+    )
+    lens_photos: int = Field(10, ge=3, description="photos; from so many on they may show the board in any position")
+    lens_sigmas: float = Field(3.0, gt=0, description="sigmas; a weaker lens term adds more error than it removes")
+    max_board_rms_px: float = Field(0.5, gt=0, description="px; real boards reach 0.12 to 0.16 px, bent ones do not")
+    one_plane_ratio: float = Field(
+        1.5,
+        gt=1,
+        description="ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it",
+    )
+    usual_distance_m: float = Field(
+        0.4, gt=0, description="m; camera above the cable where nobody says: half the height of a bench stand"
+    )
+    check_sigmas: float = Field(3.0, gt=0, description="sigmas; one false finding in 400 checks")
+    check_floor: float = Field(
+        0.005, gt=0, description="relative; smaller deviations change the stiffness by less than one percent"
+    )
