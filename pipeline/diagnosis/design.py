@@ -28,6 +28,7 @@ from pipeline.diagnosis.twins import between_causes, cosines, nearest
 from pipeline.diagnosis.workbench import Workbench, scored
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.characteristic import MomentCurve
 from rod.inverse.knots import place_knots
 from rod.laws import StickSlip
 
@@ -45,6 +46,8 @@ class Plan:
         f_EI at rest and far from it; equal for a linear cable.
     transition : 1/m
         Curvature change over which one goes over into the other.
+    law : MomentCurve or None
+        In the place of these three.
     pre_curvature : 1/m
     displacements : tuple of m
         Loading steps from the mounted position.
@@ -66,6 +69,7 @@ class Plan:
     stiffness: float = 0.018
     stiffness_bent: float = 0.008
     transition: float = 4.5
+    law: MomentCurve | None = None
     pre_curvature: float = 2.0
     displacements: tuple[float, ...] = (0.0046, 0.0092, 0.0138)
     mounted: bool = True
@@ -187,7 +191,7 @@ def planned_bench(plan: Plan, settings: DiagnosisSettings) -> Workbench:
 
 def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
     """The planned test made without noise, its base model fitted and all causes scored."""
-    law = StickSlip(plan.stiffness, plan.stiffness_bent, plan.transition)
+    law = plan.law or StickSlip(plan.stiffness, plan.stiffness_bent, plan.transition)
     base = Base(
         knots=place_knots(0.0, 1.3 * facts.curvature_scale, settings.knots),
         stiffness=plan.stiffness_bent,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.base import start
+from pipeline.diagnosis.design import Plan, planned_bench
 from pipeline.diagnosis.faults import faults_of_input
 from pipeline.diagnosis.fit import Extension, Fit, fit
 from pipeline.diagnosis.heldout import measured_gain
@@ -21,6 +22,8 @@ from pipeline.diagnosis.search import suspect
 from pipeline.diagnosis.workbench import Workbench
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
+from rod.characteristic import Characteristic
 from rod.measurement import MeasuredTest
 
 
@@ -49,6 +52,19 @@ class Discovery:
     added: int
     rivals: dict[str, float]
     gain: GainPart | None
+
+
+def papers_test(settings: DiagnosisSettings | None = None) -> MeasuredTest:
+    """The paper's virtual experiment (Table 1, tangent reading) as it would be measured, without noise."""
+    plan = Plan(
+        length=TABLE_1["length"],
+        stiffness_bent=TABLE_1_ORDINATES[-1],
+        law=Characteristic.from_ordinates(TABLE_1_KNOTS, TABLE_1_ORDINATES),
+        pre_curvature=TABLE_1["pre_curvature"],
+        displacements=tuple(k * TABLE_1["step"] for k in (1, 2, 3)),
+        mounted=False,
+    )
+    return planned_bench(plan, settings or DiagnosisSettings()).test
 
 
 def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) -> list[Discovery]:

@@ -23,6 +23,9 @@ def test_numbers_have_the_contracts_names(folder):
     assert len(numbers["inverse"]["history"]) == numbers["inverse"]["iterations"] + 1
     assert numbers["inverse"]["pre_curvature_per_m"] == pytest.approx(2.0)
     assert numbers["forced_straight"]["ordinates_Nm2"][0] < 0.0
+    steps = numbers["rediscovery"]
+    assert [step["cause"] for step in steps] == ["nonlinear_stiffness", "pre_curvature"]
+    assert steps[1]["heldout_excess_removed"] > 0.99  # without noise nothing but the model's own grid is left
     assert sum(row["share"] for row in numbers["disagreement"] if row["share"] is not None) == pytest.approx(1.0)
 
 
