@@ -23,7 +23,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from pipeline.records import Rejected
 from pipeline.settings.vision.photo import PhotoSettings
 
-Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+Pixels = NDArray[np.uint8 | np.uint16]
 
 # EXIF orientation -> OpenCV operations that turn the stored picture into the displayed one
 _ROTATIONS = {3: cv2.ROTATE_180, 6: cv2.ROTATE_90_CLOCKWISE, 8: cv2.ROTATE_90_COUNTERCLOCKWISE}
@@ -149,8 +149,12 @@ def reduce_area(pixels: Pixels, size: tuple[int, int]) -> Pixels:
         and pixels.shape[0] >= 2 * size[1]
         and not (pixels.shape[0] % 2 or pixels.shape[1] % 2)
     ):
-        pixels = cv2.resize(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2), interpolation=cv2.INTER_AREA)
-    return pixels if pixels.shape[1::-1] == size else cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+        pixels = _mean_over(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2))
+    return pixels if pixels.shape[1::-1] == size else _mean_over(pixels, size)
+
+
+def _mean_over(pixels: Pixels, size: tuple[int, int]) -> Pixels:
+    return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), pixels.dtype)
 
 
 def _refused(name: str, code: str, reason: str, **figure: float) -> Rejected:
@@ -213,15 +217,16 @@ def _start_of_scan(data: bytes) -> int | None:
 
 def _decode(data: bytes, header: _Header) -> Pixels | None:
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
-        pixels = None
+        picture = None
     # IMREAD_UNCHANGED leaves jpg and png as stored; the tif decoder of OpenCV turns them itself.
     orientation = 1 if header.kind == "tif" else header.orientation
-    if pixels is None:
+    if picture is None:
         return _decode_by_pillow(data)
-    if pixels.dtype not in (np.uint8, np.uint16):
+    if picture.dtype not in (np.uint8, np.uint16):
         return None
+    pixels: Pixels = np.asarray(picture, np.uint8 if picture.dtype == np.uint8 else np.uint16)
     if pixels.ndim == 3:
         pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else _without_alpha(pixels)
     return _turn(pixels, orientation)
@@ -251,9 +256,10 @@ def _decode_by_pillow(data: bytes) -> Pixels | None:
 def _turn(pixels: Pixels, orientation: int) -> Pixels:
     if orientation in _MIRRORED:
         axis, rotation = _MIRRORED[orientation]
-        pixels = cv2.flip(pixels, axis)
-        return pixels if rotation is None else cv2.rotate(pixels, rotation)
-    return cv2.rotate(pixels, _ROTATIONS[orientation]) if orientation in _ROTATIONS else pixels
+        pixels = np.asarray(cv2.flip(pixels, axis), pixels.dtype)
+    else:
+        rotation = _ROTATIONS.get(orientation)
+    return pixels if rotation is None else np.asarray(cv2.rotate(pixels, rotation), pixels.dtype)
 
 
 def _bit_depth(pixels: Pixels) -> int:

@@ -27,9 +27,11 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
     factor = max(1.0, max(photo.size) / settings.long_side_px)
     size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
     small = reduce_area(photo.pixels, size)
-    if small.dtype != np.uint8:
-        small = np.clip(small.astype(np.float32) * np.float32(255.0 / photo.full_scale), 0, 255).astype(np.uint8)
-    return Preview(_jpeg(small, settings), size[0], size[1], photo.size[0] / size[0])
+    if small.dtype == np.uint8:
+        shown = np.asarray(small, np.uint8)
+    else:
+        shown = np.clip(small.astype(np.float32) * np.float32(255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    return Preview(_jpeg(shown, settings), size[0], size[1], photo.size[0] / size[0])
 
 
 def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: PreviewSettings) -> Preview:
@@ -49,8 +51,8 @@ def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSet
     across = np.linspace(-half, half, settings.strip_height_px)
     grid = points[None, :, :] + across[:, None, None] * normal[None, :, :] - np.array(rough.origin_px)
     u, v = (grid[..., axis].astype(np.float32) for axis in (0, 1))
-    strip = cv2.remap(rough.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    picture = cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR)
+    strip = np.asarray(cv2.remap(rough.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    picture = np.asarray(cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR), np.uint8)
     zoom = (settings.strip_height_px - 1) / (2.0 * half)
     middle = 0.5 * (settings.strip_height_px - 1)
     picture[round(middle), ::2] = _MIDDLE
@@ -64,7 +66,8 @@ def _stretched(strip: NDArray[np.float32], line: Centerline, s: Array, along: Ar
     part = strip[:, seen] if seen.any() else strip
     low, high = np.percentile(part, (0.5, 99.5))
     scaled = (strip - low) * (255.0 / max(float(high - low), 1e-6))
-    return np.clip(scaled, 0, 255).astype(np.uint8)
+    levels: NDArray[np.uint8] = np.clip(scaled, 0, 255).astype(np.uint8)
+    return levels
 
 
 def _jpeg(picture: NDArray[np.uint8], settings: PreviewSettings) -> bytes:

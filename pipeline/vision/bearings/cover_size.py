@@ -18,7 +18,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.bearings.covers import Radius, find_cover
+from pipeline.vision.bearings.covers import find_cover
+from pipeline.vision.bearings.rim import Radius
 from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable

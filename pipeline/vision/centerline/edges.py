@@ -50,7 +50,9 @@ def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Float32
     across = normals(angle)
     from_corner = (where - ground.origin_px).astype(np.float32)
     u, v = (from_corner[:, k, None] + np.outer(across[:, k], t).astype(np.float32) for k in (0, 1))
-    return cv2.remap(ground.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"))
+    outside = float("nan")
+    grey = cv2.remap(ground.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
+    return np.asarray(grey, np.float32)
 
 
 def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:

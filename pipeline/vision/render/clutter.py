@@ -211,7 +211,7 @@ def board_layer(board: ChessBoard, camera: Camera, light: Light, channels: int, 
     Lens and pixel act as a Gaussian that is the same in all directions, so the blurred board is the product of two
     blurred square waves, exactly where the board is locally flat; a pixel counts with its variance 1/12.
     """
-    back = np.linalg.inv(board.homography(camera))
+    back = np.asarray(np.linalg.inv(board.homography(camera)), np.float64)
     v, u = (a.ravel() for a in np.indices((camera.height, camera.width), dtype=np.float64))
     a, b = _on_board(back, camera, u, v)
     sigma = sqrt(blur_px**2 + 1.0 / 12.0) / camera.px_per_m

@@ -125,7 +125,8 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
     """Corners of the board on a photo, sub-pixel; rejected with ``calibration/no-corners`` if it is not there."""
     grey = _grey8(photo)
     factor = max(1, round(max(photo.size) / settings.board_search_px))
-    small = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
+    reduced = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
+    small = np.asarray(reduced, np.uint8)
     found = _charuco(small, board) if board.charuco else _chessboard(small, board)
     # corners on one line tell no plane, however many there are
     if found is None or len(found[0]) < 6 or not _spread(found[0], 0.25 * board.square_m):
@@ -137,8 +138,9 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
         uv = uv * factor + 0.5 * (factor - 1)
         criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-4)
         start = np.ascontiguousarray(uv.reshape(-1, 1, 2), np.float32)
-        uv = cv2.cornerSubPix(grey, start, (3 * factor, 3 * factor), (-1, -1), criteria).reshape(-1, 2)
-    return BoardView(photo.name, points, np.asarray(uv, np.float64), photo.size)
+        corners = cv2.cornerSubPix(grey, start, (3 * factor, 3 * factor), (-1, -1), criteria)
+        uv = np.asarray(corners.reshape(-1, 2), np.float64)
+    return BoardView(photo.name, points, uv, photo.size)
 
 
 def _spread(points: Array, least: float) -> bool:
@@ -150,8 +152,9 @@ def _spread(points: Array, least: float) -> bool:
 def _grey8(photo: Photo) -> NDArray[np.uint8]:
     pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
     if pixels.dtype == np.uint8:
-        return pixels
-    return np.clip(pixels * (255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+        return np.asarray(pixels, np.uint8)
+    levels: NDArray[np.uint8] = np.clip(pixels * (255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    return levels
 
 
 def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | None:
@@ -174,8 +177,8 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | Non
         pattern = cv2.aruco.CharucoBoard(size, board.square_m, marker, dictionary)
         corners, ids, _, _ = cv2.aruco.CharucoDetector(pattern).detectBoard(grey)
         if ids is not None and (best is None or len(ids) > len(best[0])):
-            points = pattern.getChessboardCorners()[np.ravel(ids), :2]
-            best = np.asarray(points, np.float64), np.asarray(corners, np.float64).reshape(-1, 2)
+            points = np.asarray(pattern.getChessboardCorners(), np.float64)[np.ravel(ids), :2]
+            best = points, np.asarray(corners, np.float64).reshape(-1, 2)
         if best is not None and len(best[0]) > 0.5 * board.columns * board.rows:
             break
     return best
@@ -287,7 +290,7 @@ def _least_squares(
     def full(q: Array) -> Array:
         x = start / scale
         x[free] = q
-        return x * scale
+        return np.asarray(x * scale)
 
     def residual(q: Array) -> Array:
         x = full(q)
@@ -308,7 +311,8 @@ def _least_squares(
     spare = max(len(error) - len(found.x), 1)
     rms = float(np.sqrt(error @ error / spare))
     covariance = np.zeros((len(start), len(start)))
-    covariance[np.ix_(free, free)] = np.linalg.pinv(found.jac.T @ found.jac) * rms**2
+    slopes = np.asarray(found.jac)
+    covariance[np.ix_(free, free)] = np.linalg.pinv(slopes.T @ slopes) * rms**2
     return _Solution(full(found.x), scale, covariance, rms)
 
 
@@ -324,7 +328,7 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     # k2 and the tangential terms run wild outside the board unless the corners really show them.
     drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
     rms, camera, distortion, turns, shifts = fits[1] if drop > settings.lens_sigmas**2 * 3 else fits[0]
-    lens = Lens(np.asarray(camera), np.ravel(distortion)[:5])
+    lens = Lens(np.asarray(camera, np.float64), np.asarray(distortion, np.float64).ravel()[:5])
     ideal = lens.undistort(views[0].uv)
     homography = _homography(ideal, views[0].board_m)
     rotation, _ = cv2.Rodrigues(turns[0])

@@ -10,6 +10,7 @@ Standard deviations are relative and common to all photos of the specimen. SI un
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,8 +114,8 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
         return None
     # what light does to the rims is common to all photos: it does not show in their scatter
     rims = float(np.median([std / radius for radius, std in _radii(found)]))
-    sources = (settings.cover_diameter_std, settings.cover_height_std, np.std(radii) / np.mean(radii), rims)
-    std = float(np.linalg.norm(sources))
+    scatter = float(np.std(radii) / np.mean(radii))
+    std = math.hypot(settings.cover_diameter_std, settings.cover_height_std, scatter, rims)
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
 
 

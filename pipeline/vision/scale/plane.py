@@ -33,7 +33,7 @@ class Lens:
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
         shown_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
         shown_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-        return np.column_stack([shown_x, shown_y, np.ones_like(x)]) @ self.camera.T[:, :2]
+        return np.asarray(np.column_stack([shown_x, shown_y, np.ones_like(x)]) @ self.camera.T[:, :2])
 
     def undistort(self, uv: Array) -> Array:
         """Inverse of `distort`, by fixed-point steps.
@@ -51,7 +51,7 @@ class Lens:
 
     def _rays(self, uv: Array) -> Array:
         homogeneous = np.column_stack([uv, np.ones(len(uv))])
-        return np.linalg.solve(self.camera, homogeneous.T).T[:, :2]
+        return np.asarray(np.linalg.solve(self.camera, homogeneous.T).T[:, :2], np.float64)
 
 
 def _project(matrix: Array, points: Array) -> Array:
@@ -80,12 +80,13 @@ class PlaneMap:
 
     def to_plane(self, uv: Array) -> Array:
         """Points ``(n, 2)`` in m of photo pixels ``(n, 2)``."""
-        uv = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
         return _project(self.homography, uv if self.lens is None else self.lens.undistort(uv))
 
     def to_pixels(self, xy: Array) -> Array:
         """Photo pixels ``(n, 2)`` of points ``(n, 2)`` in m; inverse of `to_plane`."""
-        uv = _project(np.linalg.inv(self.homography), np.atleast_2d(np.asarray(xy, dtype=np.float64)))
+        back = np.asarray(np.linalg.inv(self.homography), np.float64)
+        uv = _project(back, np.asarray(xy, dtype=np.float64).reshape(-1, 2))
         return uv if self.lens is None else self.lens.distort(uv)
 
     def jacobian(self, uv: Array) -> Array:
@@ -93,7 +94,7 @@ class PlaneMap:
 
         The map is smooth over hundreds of pixels, so a step of one pixel leaves a relative error below 1e-6.
         """
-        uv = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
         columns = [(self.to_plane(uv + step) - self.to_plane(uv - step)) / 2.0 for step in np.eye(2)]
         return np.stack(columns, axis=-1)
 

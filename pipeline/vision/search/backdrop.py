@@ -51,7 +51,7 @@ class Standout:
         white = cv2.transform(self.residual, whitener.astype(np.float32)) if len(whitener) > 1 else None
         if white is None:
             return np.abs(self.residual[..., 0]) * np.float32(whitener[0, 0])
-        return np.sqrt(np.einsum("ijc,ijc->ij", white, white))
+        return np.asarray(np.sqrt(np.einsum("ijc,ijc->ij", white, white)), np.float32)
 
     def along(self, weights: Array) -> Image:
         """Picture ``(h, w)``: residual along one colour projection, in standard deviations of the ground."""
@@ -120,7 +120,7 @@ def _robust_fit(terms: Array, values: Array) -> Array:
         spread = _MAD_TO_STD * float(np.median(np.abs(residual))) + 1e-6
         weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
         normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
-        coefficients = np.linalg.solve(normal, terms.T @ (weight * values))
+        coefficients[:] = np.linalg.solve(normal, terms.T @ (weight * values))
     return coefficients
 
 

@@ -221,7 +221,7 @@ def _split_by_highlight(reading: Reading) -> float | None:
         return None
     side = reading.strips[0]
     others = np.vstack([strip.path for strip in reading.strips[1:]])
-    apart, _ = cKDTree(others).query(side.path)
+    apart = np.asarray(cKDTree(others).query(side.path)[0])
     beside = apart[apart < 4.0 * side.width]
     if len(beside) < 0.6 * len(apart):
         return None

@@ -116,7 +116,7 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
     for side in (-0.5, 0.5):
         points = (centre[:, None, :] + (side * width + offsets)[None, :, None] * across[:, None, :]).astype(np.float32)
         profile = cv2.remap(grey, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        spreads.append(_spread_of_groups(profile, offsets))
+        spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets))
     along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
     return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
 

@@ -116,7 +116,7 @@ def cut_across(
     )
 
 
-def _texture(grey: Array, ground: Array, offset_widths: Array, light: float, *, shaded: bool) -> float:
+def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, shaded: bool) -> float:
     """Scatter of the ground ``(n, m)`` beside the cable about what changes along it over less than ``light`` rows.
 
     A shadow runs along the cable: it is no texture, and what texture does along the path it does across, too. The
@@ -133,7 +133,7 @@ def _texture(grey: Array, ground: Array, offset_widths: Array, light: float, *, 
     return _MAD_TO_STD * min(float(np.median(side)) for side in sides)
 
 
-def _core_level(relief: Array, offsets: Array, flanks: Flanks) -> Array:
+def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:
     """Median of each section ``(n,)`` over the core of the cable."""
     spacing = float(offsets[1] - offsets[0])
     half = int(0.35 * flanks.width / spacing)
@@ -151,18 +151,18 @@ def straighten(
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
     u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
     v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
-    straight = cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    straight = np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
     rows = round(len(path) / max(1, int(width / settings.cells_across)))
     columns = len(offsets) // max(1, int(0.5 * width / settings.cells_across))
     if (columns, rows) != (len(offsets), len(path)):
-        straight = cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA)
+        straight = np.asarray(cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
     place, offset = _centres(len(path), rows), _centres(len(offsets), columns)
     return straight.reshape(rows, columns, -1), place, np.interp(offset, np.arange(len(offsets)), offsets)
 
 
 def _centres(many: int, few: int) -> Array:
     """Places of ``few`` means of equal size among ``many`` points."""
-    return (np.arange(few) + 0.5) * (many / few) - 0.5
+    return np.asarray((np.arange(few) + 0.5) * (many / few) - 0.5)
 
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:

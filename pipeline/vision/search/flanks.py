@@ -82,10 +82,11 @@ def find_flanks(
 
 def _pooled(values: Array, std: float) -> Array:
     """Gaussian mean over neighbouring sections."""
-    return cv2.GaussianBlur(values, (1, 2 * round(4.0 * std) + 1), 1.0, sigmaY=std, borderType=cv2.BORDER_REPLICATE)
+    kernel = (1, 2 * round(4.0 * std) + 1)
+    return np.asarray(cv2.GaussianBlur(values, kernel, 1.0, sigmaY=std, borderType=cv2.BORDER_REPLICATE), values.dtype)
 
 
-def _pair_score(rise: Array, fall: Array, columns: Array, widths: Array) -> Array:
+def _pair_score(rise: Array, fall: Array, columns: NDArray[np.intp], widths: Array) -> Array:
     """Strength ``(n, w, k)`` of pairs of edges about ``columns`` ``(k,)``, for each of ``widths`` ``(w,)`` in columns.
 
     The weaker edge counts twice.

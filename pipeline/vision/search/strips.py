@@ -54,8 +54,7 @@ class Strip:
 
 def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSettings) -> Mask:
     """Mask of what stands out, closed over highlights and filled where writing leaves holes."""
-    mask = above.astype(np.uint8)
-    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(settings.closing_widths * width))
+    mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(settings.closing_widths * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
@@ -64,14 +63,14 @@ def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSet
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
-    return cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
+    return _morphology(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
 
 
 def thick_part(mask: Mask, least: float) -> Mask:
     """Things at least so many cells wide: clamps, covers, the holder."""
     disc = _disc(least)
     if len(disc) <= _LARGE_DISC:
-        return cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc)
+        return _morphology(mask, cv2.MORPH_OPEN, disc)
     # The same by distances, whose time does not grow with the disc.
     radius = len(disc) // 2
     core = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius
@@ -90,7 +89,7 @@ def find_strips(
     ratios: tuple[float, float] | None = None,
 ) -> list[Strip]:
     """Strips of about the given width (cells), longest first; ``ratios`` are their least and greatest width to it."""
-    grown = cv2.dilate(thick, _disc(3.0))
+    grown = _morphology(thick, cv2.MORPH_DILATE, _disc(3.0))
     thin = mask & (1 - grown)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
@@ -202,9 +201,9 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     if len(vu) < 3:
         return None
     graph = _skeleton_graph(skeleton, vu)
-    start = int(np.argmax(np.where(np.isfinite(d := dijkstra(graph, indices=0)), d, -1.0)))
-    reach, before = dijkstra(graph, indices=start, return_predecessors=True)
-    node = int(np.argmax(np.where(np.isfinite(reach), reach, -1.0)))
+    start = _farthest(dijkstra(graph, indices=[0])[0])
+    reach, before = (of_start[0] for of_start in dijkstra(graph, indices=[start], return_predecessors=True))
+    node = _farthest(reach)
     nodes = []
     while node >= 0:
         nodes.append(node)
@@ -218,7 +217,12 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     return Strip(path, median, scatter, _longest_branch(skeleton, vu[nodes], width))
 
 
-def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_matrix:
+def _farthest(reach: Array) -> int:
+    """Node with the longest way to it, among those that can be reached."""
+    return int(np.argmax(np.where(np.isfinite(reach), reach, -1.0)))
+
+
+def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_matrix[np.float64]:
     index = np.full(skeleton.shape, -1)
     index[tuple(vu.T)] = np.arange(len(vu))
     rows, columns, weights = [], [], []
@@ -238,9 +242,9 @@ def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_ma
 
 def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], width: float) -> float:
     """Number of skeleton cells in the longest piece farther than a width from the path."""
-    near = np.zeros(skeleton.shape, np.uint8)
-    near[tuple(path_vu.T)] = 1
-    near = cv2.dilate(near, _disc(2.0 * width))
+    path = np.zeros(skeleton.shape, np.uint8)
+    path[tuple(path_vu.T)] = 1
+    near = _morphology(path, cv2.MORPH_DILATE, _disc(2.0 * width))
     rest = (skeleton & (near == 0)).astype(np.uint8)
     count, _, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
     return float(stats[1:, cv2.CC_STAT_AREA].max()) if count > 1 else 0.0
@@ -248,4 +252,8 @@ def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], widt
 
 def _disc(diameter: float) -> Mask:
     size = max(1, round(diameter)) | 1
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+
+def _morphology(mask: Mask, kind: int, disc: Mask) -> Mask:
+    return np.asarray(cv2.morphologyEx(mask, kind, disc), np.uint8)
