@@ -124,9 +124,11 @@ class MeasuredTest:
         Common to all photos: every length on the photos may be off by this factor.
     axis_std : m
         Of each coordinate of a bearing axis, common to all photos: what is found as the axis is off the pin by this.
-    axis_outward_std : m
-        Beyond that, of both axes away from each other along the chord, common to all photos: what marks an axis lies
-        higher than the cable, and the higher a thing, the farther from the middle of the picture it is seen.
+    axis_parallax_std : relative
+        Common to all photos: what marks an axis lies by a height h above the cable and is seen farther from the foot of
+        the camera than it is by h / distance of the way.
+    camera_foot_std : m
+        Of the camera's foot, either coordinate, about the centre of the picture.
     steps : tuple of MeasuredStep
         In the order of the test.
     moving : str
@@ -142,4 +144,5 @@ class MeasuredTest:
     moving: str = "left"
     picture_half_diagonal: float | None = None
     axis_std: float = 0.0
-    axis_outward_std: float = 0.0
+    axis_parallax_std: float = 0.0
+    camera_foot_std: float = 0.0

@@ -28,7 +28,7 @@ from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
 
-AXES = ("left_along", "left_across", "right_along", "right_across")
+AXES = ("left_along", "left_across", "right_along", "right_across", "parallax")
 
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
@@ -50,8 +50,8 @@ class Base:
         Prior knowledge.
     axis_std : m
         Prior knowledge of each coordinate of the axes, common to all photos; 0 if they are exact.
-    axis_outward_std : m
-        Of what parts both axes along the chord beyond that (`rod.measurement.MeasuredTest`).
+    axis_parallax_std, camera_foot_std : relative, m
+        Of what is seen above the cable beyond that (`rod.measurement.MeasuredTest`).
     elements : int
     roughness : float
         tau of the prior on the law.
@@ -75,7 +75,8 @@ class Base:
     first: float = 0.0
     straight: bool = False
     axis_std: float = 0.0
-    axis_outward_std: float = 0.0
+    axis_parallax_std: float = 0.0
+    camera_foot_std: float = 0.0
     rest_slope: float = 1.0
     places: Array | None = None
 
@@ -88,7 +89,7 @@ class Base:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the errors of the bearing axes."""
-        return AXES if self.axis_std > 0.0 or self.axis_outward_std > 0.0 else ()
+        return AXES if self.axis_std > 0.0 or self.axis_parallax_std > 0.0 else ()
 
     @property
     def observed(self) -> tuple[str, ...]:
@@ -96,9 +97,9 @@ class Base:
         return (*self.axes, "scale")
 
     def axis_errors(self, vector: Array) -> Array:
-        """Errors (4,) of the axes in the order of `AXES`, m."""
+        """Errors (5,) of the axes in the order of `AXES`, m and relative."""
         first = self.names.index("scale") - len(self.axes)
-        return np.asarray(vector[first : first + 4]) if self.axes else np.zeros(4)
+        return np.asarray(vector[first : first + len(AXES)]) if self.axes else np.zeros(len(AXES))
 
     @property
     def pre_curvature_index(self) -> int | None:
@@ -124,10 +125,11 @@ class Base:
         return np.array(rows)
 
     def _axis_rows(self) -> Array:
-        """Prior of the axes' errors (4, 4): each its own, and along the chord a common one that parts both axes."""
-        outward = np.array([-1.0, 0.0, 1.0, 0.0])[:, None]
+        """Prior of the axes' errors (5, 5): each its own, what the camera's foot moves alike, and the parallax."""
         own = max(self.axis_std, EXACT * self.length)
-        covariance = own**2 * np.eye(4) + self.axis_outward_std**2 * outward @ outward.T
+        alike = np.tile(np.eye(2), (2, 2))
+        covariance = np.diag([own**2] * 4 + [max(self.axis_parallax_std, EXACT) ** 2])
+        covariance[:4, :4] += (self.axis_parallax_std * self.camera_foot_std) ** 2 * alike
         return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
     @property
@@ -220,5 +222,6 @@ def start(
         first=float(rest),
         straight=straight,
         axis_std=test.axis_std,
-        axis_outward_std=test.axis_outward_std,
+        axis_parallax_std=test.axis_parallax_std,
+        camera_foot_std=test.camera_foot_std,
     )

@@ -43,7 +43,8 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
         length_std=settings.length_std_relative * specimen.length_m,
         scale_std=traces.scale.std_relative,
         axis_std=settings.axis_std_m,
-        axis_outward_std=outward_std(specimen, settings),
+        axis_parallax_std=parallax_std(specimen, settings),
+        camera_foot_std=settings.camera_foot_std_m,
         steps=steps,
         moving=specimen.rig.moving_bearing,
         picture_half_diagonal=float(max(diagonals)) if diagonals else None,
@@ -68,16 +69,16 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
     )
 
 
-def outward_std(specimen: Specimen, settings: IdentifySettings) -> float:
-    """How far (m) each axis may be seen too far out, because covers are higher than the cable's axis.
+def parallax_std(specimen: Specimen, settings: IdentifySettings) -> float:
+    """By which part of the way the axes may be seen too far from the camera's foot: covers are higher than the cable.
 
-    A point by h above the plane of the scale is seen farther from the middle of the picture by h / distance of the way;
-    how high the covers of this rig are nobody says. Axes that the user pointed at have no cover.
+    A point by h above the plane of the scale is seen farther out by h / distance; how high the covers of this rig are
+    nobody says. Axes that the user pointed at have no cover.
     """
     if specimen.rig.bearings_px is not None:
         return 0.0
     height = 0.5 * specimen.diameter_m + settings.cover_height_m
-    return 0.5 * specimen.length_m * height / (specimen.camera.distance_m or settings.usual_distance_m)
+    return height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
 def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | None:

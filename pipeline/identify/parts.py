@@ -221,7 +221,7 @@ def _photos(way: Estimate) -> dict[int, PhotoResidual]:
 
 
 def _pose(model: FitModel, u: Array, fit: StepFit) -> Pose:
-    return Pose(*model.pose(u, fit.data.step.step), model.nuisance(u, "scale"))
+    return Pose(*model.pose(u, fit.data), model.nuisance(u, "scale"))
 
 
 def _photo(model: FitModel, u: Array, fit: StepFit, shape: MeasuredShape) -> PhotoResidual:

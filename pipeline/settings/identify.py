@@ -34,6 +34,12 @@ class IdentifySettings(BaseModel):
         description="m; camera above the covers where nobody says: they are seen farther apart than their axes by "
         "height / distance, which is not known better than to its own size",
     )
+    camera_foot_std_m: float = Field(
+        0.05,
+        ge=0,
+        description="m; of the point below the camera about the picture's middle: 3 degrees off plumb at a metre, or a "
+        "photo that was cut",
+    )
     elements: int = Field(100, ge=20, description="of the simulated rod; at 100 its force is within 1e-4")
     blocks: int = Field(
         160, ge=20, description="independent data per photo at most; one per correlation length of the midline's error"

@@ -144,7 +144,8 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
         return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
     basis = compliance_basis(float(m.min()), float(m.max()), unit=slope, coefficients=options.coefficients)
     floor = options.floor * slope * (basis.high - basis.low)
-    common = CommonErrors(test.scale_std, test.axis_std, test.axis_std)
+    beside = test.axis_parallax_std * test.camera_foot_std
+    common = CommonErrors(test.scale_std, test.axis_std, test.axis_std, beside, test.axis_parallax_std)
     model = MomentModel(data, basis, common, floor, options.roughness)
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa.mean())
@@ -228,7 +229,7 @@ def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source,
     """Response of log(tangent) to every source of error: the estimate moves by -response J^T W d(residual)."""
     # With the normal matrix A and a common error e of prior variance 1 the law is off by (A^-1 (A - 1) e) = -A^-1 e.
     common = -by_log @ found.posterior.covariance[:, model.common]
-    gains: dict[Source, Array] = {("scale", -1): common[:, :1], ("axes", -1): common[:, 1:]}
+    gains: dict[Source, Array] = {(name, -1): common[:, [i]] for i, name in enumerate(CommonErrors._fields)}
     for data, row in zip(model.data, found.rows, strict=True):
         response = -by_log @ found.posterior.covariance @ model.columns(data, row).T
         for name, columns in row.by_source.items():

@@ -2,9 +2,9 @@
 
 One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
 (Eq. 13). The residual against a compliance curve, ``rho = K - K0 - excess(m)``, is moved by the parameters of the
-smooth curve (through K and y together), by the force, and by what all photos have in common: their scale and the
-errors of the bearing axes across the chord (`CommonErrors`). What each photo adds to the errors of the axes is part of
-the covariance of its curve: it shifts and turns the whole chord frame.
+smooth curve (through K and y together), by the force, and by what all photos have in common: their scale, the errors
+of the bearing axes across the chord, and that the axes are seen above the cable (`CommonErrors`). What each photo adds
+to the errors of the axes is part of the covariance of its curve: it shifts and turns the whole chord frame.
 
 Axes and signs: chord frame of `rod.measurement`; SI units.
 """
@@ -24,14 +24,18 @@ Array = NDArray[np.float64]
 
 
 class CommonErrors(NamedTuple):
-    """What is wrong on all photos alike: ``true y = (1 + scale) y + left_across (1 - x/chord) + right_across x/chord``.
+    """What is wrong on all photos alike, in the signs of the chord frame.
 
-    ``scale`` is relative, the axes in m; signs as in the chord frame. Along the chord the axes move no moment.
+    ``true y = (1 + scale) y + left_across (1 - x/chord) + right_across x/chord + foot_across - parallax centre`` with
+    the y of the picture's centre (`rod.measurement`). ``scale`` and ``parallax`` are relative, the others in m. Along
+    the chord the axes move no moment.
     """
 
     scale: float
-    left_across: float
-    right_across: float
+    left_across: float = 0.0
+    right_across: float = 0.0
+    foot_across: float = 0.0
+    parallax: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,8 @@ class MomentPoints:
     y : (n,) m
     along : (n,)
         Place on the chord, x / chord.
+    centre : m
+        y of the picture's centre; zero where that is not known.
     force, force_std : N
         Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
     by_curve_kappa : (n, p) 1/m, by_curve_y : (n, p) m
@@ -60,6 +66,7 @@ class MomentPoints:
     kappa: Array
     y: Array
     along: Array
+    centre: float
     force: float
     force_std: float
     by_curve_kappa: Array
@@ -74,7 +81,7 @@ class MomentPoints:
     def true_moment(self, errors: CommonErrors) -> Array:
         """Bending moment P y with the common errors taken back, N m."""
         lift = errors.left_across * (1.0 - self.along) + errors.right_across * self.along
-        return self.force * (self.y * (1.0 + errors.scale) + lift)
+        return self.force * (self.y * (1.0 + errors.scale) + lift + errors.foot_across - errors.parallax * self.centre)
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,7 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
         kappa=shape.kappa[at],
         y=shape.y[at],
         along=shape.x[at] / chord,
+        centre=0.0 if step.picture_centre is None else step.picture_centre[1],
         force=0.0 if mounted else step.force,
         force_std=0.0 if mounted else step.force_std,
         by_curve_kappa=shape.basis_kappa[at],
@@ -166,6 +174,8 @@ def residual(
             -(kappa + c * data.moment),
             -stiff * (1.0 - data.along[:, None]),
             -stiff * data.along[:, None],
+            -stiff,
+            stiff * data.centre,
         ]
     )
     informative = m.size - floor**2 * float(np.sum(whitener**2))

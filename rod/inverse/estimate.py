@@ -172,7 +172,7 @@ def _source(name: str) -> Source | None:
     """Source of error of a nuisance; None for what a photo adds across the chord, which is an error of its curve."""
     part, _, step = name.partition("/")
     if part.endswith("_across"):
-        return None if step else ("axes", -1)
+        return None if step else (part, -1)
     return ("along", int(step or -1)) if part.endswith("_along") else (part, -1)
 
 

@@ -137,7 +137,7 @@ def _imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Ar
         by[model.index("scale")] = data.chord * model.nuisances["scale"]
         chord = data.chord * (1.0 + model.nuisance(u, "scale"))
         for part, sign in (("left_along", 1.0), ("right_along", -1.0)):
-            for name, c in model.pose_terms(part, data.step.step):
+            for name, c in model.pose_terms(part, data):
                 by[model.index(name)] += sign * c * model.nuisances[name]
                 chord += sign * c * model.nuisance(u, name)
         return chord, by
@@ -198,11 +198,10 @@ def _step_fit(model: FitModel, u: Array, data: StepData, shape: Simulated, impos
     force = None if data.at_rest else (data.step.force - shape.force, -shape.force_by @ chain)
     photo = None
     if data.midline is not None:
-        step = data.step.step
-        pose = Pose(*model.pose(u, step), model.nuisance(u, "scale"))
+        pose = Pose(*model.pose(u, data), model.nuisance(u, "scale"))
         found = distance(data.midline, shape, pose, chord)
         by = found.by_model @ chain
-        terms = (*(model.pose_terms(part, step) for part in POSE), (("scale", 1.0),))
+        terms = (*(model.pose_terms(part, data) for part in POSE), (("scale", 1.0),))
         for moved_by, column in zip(terms, found.by_pose.T, strict=True):
             for name, c in moved_by:
                 by[:, model.index(name)] += c * column * model.nuisances[name]

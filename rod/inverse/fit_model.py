@@ -6,7 +6,8 @@ Unknowns u, all of order one:
     k0     K0 times the length
     then, in units of their prior standard deviations, the nuisances: the cable's ``length``, the common ``scale`` of
     the photos, the ``zero`` of displacement (only where a step has no photo), and the position of both bearing axes,
-    along and across the chord: what all photos have in common, and what each photo adds
+    along and across the chord: what all photos have in common, what each photo adds, and the ``parallax`` of axes seen
+    on covers above the plane of the scale: away from the camera's foot by one part of the way to it
 
 Signs and units: `rod.measurement`; SI.
 """
@@ -28,8 +29,13 @@ Array = NDArray[np.float64]
 
 POSE = ("left_along", "left_across", "right_along", "right_across")
 
-OUTWARD = {"left_along": -1.0, "right_along": 1.0}
-"""Where both axes go when they are seen farther apart than they are."""
+FOOT = {
+    "left_along": "foot_along",
+    "right_along": "foot_along",
+    "left_across": "foot_across",
+    "right_across": "foot_across",
+}
+"""What moves both axes alike when the camera's foot is not in the middle of the picture."""
 
 NO_ERROR = 1e-7
 """Relative standard deviation of a length for which none is stated: below any photo's resolution."""
@@ -59,6 +65,15 @@ class StepData:
     def at_rest(self) -> bool:
         """Whether the cable is free of force: the mounted step."""
         return self.step.branch == "mounted"
+
+    def from_foot(self, part: str) -> float:
+        """Coordinate `part` (one of `POSE`) of a bearing axis, counted from the middle of the picture, m."""
+        chord = self.chord or 0.0
+        along, across = self.step.picture_centre or (0.5 * chord, 0.0)
+        side, _, direction = part.partition("_")
+        if direction == "across":
+            return -across
+        return (chord if side == "right" else 0.0) - along
 
 
 @dataclass(frozen=True)
@@ -114,15 +129,15 @@ class FitModel:
         """A nuisance in its own unit."""
         return float(u[self.index(name)]) * self.nuisances[name]
 
-    def pose(self, u: Array, step: int) -> tuple[float, float, float, float]:
+    def pose(self, u: Array, data: StepData) -> tuple[float, float, float, float]:
         """Positions of the bearing axes on the photo of a step in the order of `POSE`, m."""
-        parts = [sum(c * self.nuisance(u, name) for name, c in self.pose_terms(part, step)) for part in POSE]
+        parts = [sum(c * self.nuisance(u, name) for name, c in self.pose_terms(part, data)) for part in POSE]
         return parts[0], parts[1], parts[2], parts[3]
 
-    def pose_terms(self, part: str, step: int) -> tuple[tuple[str, float], ...]:
+    def pose_terms(self, part: str, data: StepData) -> tuple[tuple[str, float], ...]:
         """Nuisances, each with its factor, that add up to one of `POSE` on the photo of a step."""
-        common = ((part, 1.0), ("outward", OUTWARD.get(part, 0.0)))
-        return ((f"{part}/{step}", 1.0), *((name, c) for name, c in common if c and name in self.nuisances))
+        common = ((part, 1.0), (FOOT[part], 1.0), ("parallax", data.from_foot(part)))
+        return ((f"{part}/{data.step.step}", 1.0), *((name, c) for name, c in common if name in self.nuisances))
 
     def cable_length(self, u: Array) -> float:
         """Length of the cable, m."""
@@ -213,8 +228,9 @@ def fit_model(
         nuisances["zero"] = zero[1]
     if test.axis_std > 0.0:
         nuisances |= dict.fromkeys(POSE, test.axis_std)
-    if test.axis_outward_std > 0.0:
-        nuisances["outward"] = test.axis_outward_std
+    if test.axis_parallax_std > 0.0:
+        beside = max(test.axis_parallax_std * test.camera_foot_std, NO_ERROR * test.length)
+        nuisances |= {"parallax": test.axis_parallax_std, "foot_along": beside, "foot_across": beside}
     for d in data:
         if d.midline is not None:
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}

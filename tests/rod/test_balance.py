@@ -9,7 +9,7 @@ from rod.balance import BalanceOptions, BalanceOutcome, balance
 from rod.balance.moment_points import moment_points, pointwise_graph
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import StickSlip, bent_by_bvp, equilibrium, force_free
-from tests.rod.virtual_photo import Camera, bending_test, moved_axes, record, stretched
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -75,11 +75,16 @@ def test_band_is_true_to_the_gains():
 
 
 def test_common_errors_move_the_estimate_as_told():
-    """A scale wrong by 0.1 %, and each axis by its standard deviation of 50 um, on all photos alike."""
-    test = replace(measured(), axis_std=5e-5)
+    """On all photos: a scale wrong by 0.1 %, each axis by its standard deviation of 50 um, covers above the cable."""
+    steps = tuple(replace(step, picture_centre=(0.1, 0.05)) for step in measured().steps)
+    test = replace(measured(), steps=steps, axis_std=5e-5, axis_parallax_std=2e-3, camera_foot_std=0.025)
     graph = law_of(test)
-    left, right = graph.gains["axes", -1].T
+    left, right, foot, parallax = (
+        graph.gains[source, -1][:, 0] for source in ("left_across", "right_across", "foot_across", "parallax")
+    )
     cases = [
+        (moved_axes(test, 5e-5, 5e-5), foot),
+        (parted_axes(test, 2e-3, (0.1, 0.05)), parallax),
         (stretched(test, 1.001), graph.gains["scale", -1][:, 0] * -1e-3 / test.scale_std),
         (moved_axes(test, 5e-5, 0.0), left),
         (moved_axes(test, 0.0, 5e-5), right),

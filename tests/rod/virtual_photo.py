@@ -158,12 +158,18 @@ def moved_axes(test, left, right):
     return replace(test, steps=tuple(steps))
 
 
-def parted_axes(test, outward):
-    """The test with both bearing axes found too far from each other, each by `outward` (m), on every photo."""
+def parted_axes(test, parallax, foot):
+    """The test with both bearing axes found farther from `foot` ((x, y) m, chord frame) by that part of the way."""
     steps = []
     for step in test.steps:
-        shifted = {"x": step.shape.x + outward, "section_x": step.shape.section_x + outward}
-        steps.append(replace(step, chord=step.chord + 2 * outward, shape=replace(step.shape, **shifted)))
+        shape, (dx, dy) = step.shape, parallax * np.asarray(foot)
+        seen = {
+            "x": shape.x + dx,
+            "section_x": shape.section_x + dx,
+            "y": shape.y + dy,
+            "section_y": shape.section_y + dy,
+        }
+        steps.append(replace(step, chord=step.chord * (1.0 + parallax), shape=replace(shape, **seen)))
     return replace(test, steps=tuple(steps))
 
 

@@ -72,15 +72,17 @@ def scaled(error: float) -> Observer:
 def axes_off(errors: Array) -> Observer:
     """Observer that takes the bearing axes at (left along, left across, right along, right across) (4,) m off them.
 
-    The chord frame is laid through what is taken for the axes.
+    A fifth number is the part of their way from the centre of the picture by which both are seen farther out. The chord
+    frame is laid through what is taken for the axes.
     """
-    left_along, left_across, right_along, right_across = errors
+    parallax = errors[4]
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
-        span = prediction.chord + right_along - left_along
-        rise = right_across - left_across
+        left = errors[:2] - parallax * facts.picture_centre
+        span = (1.0 + parallax) * prediction.chord + errors[2] - errors[0]
+        rise = errors[3] - errors[1]
         roll = np.arctan2(rise, span)[:, None]
-        rel_x, rel_y = prediction.x - left_along, prediction.y - left_across
+        rel_x, rel_y = prediction.x - left[:, :1], prediction.y - left[:, 1:]
         return replace(
             prediction,
             chord=np.hypot(span, rise),

@@ -76,7 +76,10 @@ def test_a_steep_law_gets_the_control_points_it_asks_for():
 
 @pytest.mark.parametrize("protocol", [THREE, SIX], ids=["three", "six"])
 def test_covers_above_the_cable_are_no_cause(protocol):
-    """Axes seen 0.17 mm too far out were two causes with certainty: rigid ends of 8 mm and a rig that gives way."""
-    test = parted_axes(hidden_test(Cable(), protocol, largest=LARGEST, seed=9), 1.7e-4)
-    part, _ = diagnose(replace(test, axis_outward_std=2.5e-4), None, SETTINGS)
+    """Axes seen 0.3 mm too far apart were two causes with certainty: rigid ends of 8 mm and a rig that gives way.
+
+    Held to be the same on every photo they were a lens: the chord that grows shorter shows less of it.
+    """
+    test = parted_axes(hidden_test(Cable(), protocol, largest=LARGEST, seed=9), 3e-3, (0.08, 0.06))
+    part, _ = diagnose(replace(test, axis_parallax_std=4e-3, camera_foot_std=0.05), None, SETTINGS)
     assert part.verdict == "adequate", part.headline

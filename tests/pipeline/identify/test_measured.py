@@ -77,12 +77,12 @@ def test_steps_and_photos_meet_by_name(specimen, traces, measured):
 
 
 def test_covers_stand_above_the_cable_unless_the_axes_were_pointed_at(specimen, traces):
-    def outward(**changed):
-        return measured_test(replace(specimen, **changed), traces, IdentifySettings()).axis_outward_std
+    def parallax(**changed):
+        return measured_test(replace(specimen, **changed), traces, IdentifySettings()).axis_parallax_std
 
-    assert outward() == pytest.approx(0.1 * 3e-3)  # 2 mm and a lid of 1 mm, seen from the usual metre
-    assert outward(camera=CameraSpec(PX_PER_M, distance_m=0.5)) == pytest.approx(0.1 * 6e-3)
-    assert outward(rig=RigSpec("right", bearings_px=((300, 600), (2500, 600)))) == 0.0
+    assert parallax() == pytest.approx(3e-3)  # 2 mm and a lid of 1 mm, seen from the usual metre
+    assert parallax(camera=CameraSpec(PX_PER_M, distance_m=0.5)) == pytest.approx(6e-3)
+    assert parallax(rig=RigSpec("right", bearings_px=((300, 600), (2500, 600)))) == 0.0
 
 
 def test_a_rejected_photo_leaves_the_force(specimen, traces):
