@@ -43,6 +43,7 @@ INSIDE = {
         ("bearings", "centerline", "preview"),
         ("judgement",),
         ("segmentation",),
+        ("shots",),
         ("series",),
     ],
     "pipeline.vision.scale": [("plane",), ("calibration", "chord"), ("board",)],
@@ -53,7 +54,7 @@ INSIDE = {
         ("candidates",),
         ("ends",),
     ],
-    "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes")],
+    "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes", "steady")],
     "pipeline.vision.centerline": [
         ("curvature", "smoothing", "edge_profile"),
         ("curve_fit", "edges"),

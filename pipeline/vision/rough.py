@@ -32,6 +32,8 @@ class Bearing:
     kind : str
         ``cover``: centre of the round cover; ``given``: pixels of the user; ``end``: visible end of the cable;
         ``clamp``: the cable disappears in a larger object there.
+    rim : float or None
+        Share of the cover's rim that was seen.
     """
 
     center_px: tuple[float, float]
@@ -39,6 +41,7 @@ class Bearing:
     radius_px: float | None = None
     radius_std_px: float | None = None
     kind: AxisKind = "cover"
+    rim: float | None = None
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,12 @@ class BearingSettings(StageSettings):
     same_axis_radii: float = Field(
         0.03, gt=0, description="radii; a ring farther off was not turned on the axis: a sticker, a hole beside it"
     )
+    expected_reach_radii: float = Field(
+        2.5,
+        gt=1,
+        description="radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is"
+        " one away, an end led astray by the cover's shadow two",
+    )
     same_radius: float = Field(
         0.04, gt=0, lt=1, description="relative; covers of one rig are turned alike, light and blur move a rim less"
     )

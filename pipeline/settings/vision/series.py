@@ -16,6 +16,12 @@ class SeriesSettings(StageSettings):
     max_fixed_shift_m: float = Field(
         2e-4, gt=0, description="m; the fixed bearing may rock by its play; more means that camera or frame moved"
     )
+    least_steady: int = Field(
+        3, ge=3, description="photos; of two that differ nothing tells which one shows the fixed bearing in its place"
+    )
+    steady_share: float = Field(
+        0.6, gt=0.5, le=1, description="of the photos; so many show the fixed bearing in one place, or the camera moved"
+    )
     max_length_spread: float = Field(
         0.005, gt=0, description="relative; a cable's length is constant, tracing repeats within a tenth of this"
     )

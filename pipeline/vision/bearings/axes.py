@@ -14,7 +14,8 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.bearings.covers import Radius, find_cover
+from pipeline.vision.bearings.covers import find_again, find_cover
+from pipeline.vision.bearings.rim import Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
@@ -34,11 +35,14 @@ class BearingHints:
         Their diameter in diameters of the cable, where the scale is not known.
     given_px : pair of (u, v) or None
         Axes by the user.
+    seen : tuple of Bearing
+        Covers of a neighbouring photo, where they are to be expected on this one.
     """
 
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
+    seen: tuple[Bearing, ...] = ()
 
     def cover_radius(self, width_px: float) -> float | None:
         """Expected radius of a cover in px; None if there are no covers."""
@@ -57,7 +61,11 @@ def find_bearings(
     if radius is None:
         return _visible_end(ends[0], width_px, settings), _visible_end(ends[1], width_px, settings)
     std = settings.radius_std if hints.cover_px is not None else settings.radius_std_by_cable
-    circles = [find_cover(photo, end, Radius(radius, std), width_px, settings) for end in ends]
+    expected = Radius(radius, std)
+    circles = [
+        find_again(photo, end, hints.seen, expected, settings) or find_cover(photo, end, expected, width_px, settings)
+        for end in ends
+    ]
     first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
     return first, second
 

@@ -21,6 +21,7 @@ from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.bearings.rings import find_marks, with_rings
 from pipeline.vision.photo import Photo
+from pipeline.vision.rough import Bearing
 from pipeline.vision.search.ends import CableEnd
 
 
@@ -77,6 +78,39 @@ def find_cover(
     return _by_marks(photo, end, radius, partial, settings)
 
 
+def find_again(
+    photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius, settings: BearingSettings
+) -> Circle | None:
+    """The cover at the end of a cable where other photos of the series let it be expected.
+
+    Parameters
+    ----------
+    photo : Photo
+    end : CableEnd
+    seen : tuple of Bearing
+        Covers of other photos, where they should be on this one.
+    radius : Radius
+        As in `find_cover`.
+    settings : BearingSettings
+
+    Returns
+    -------
+    Circle or None
+        None unless a cover of the same radius is seen all round where one is expected.
+    """
+    for cover in seen:
+        near = np.hypot(*np.subtract(cover.center_px, end.place)) <= settings.expected_reach_radii * radius.px
+        if cover.radius_px is None or not near or (cover.rim or 0.0) < settings.sure_rim:
+            continue
+        found = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
+        most = settings.same_radius * cover.radius_px
+        if found is None or found.rim < settings.sure_rim or found.radius_std > most:
+            continue
+        if abs(found.radius - cover.radius_px) <= most:
+            return with_rings(photo, found, radius, settings)
+    return None
+
+
 def _by_marks(
     photo: Photo, end: CableEnd, radius: Radius, partial: Circle | None, settings: BearingSettings
 ) -> Circle | None:
@@ -109,7 +143,7 @@ def _best_circle(
     photo: Photo,
     window: _Window,
     radius: Radius,
-    votes: Array,
+    votes: NDArray[np.floating],
     softness: float,
     settings: BearingSettings,
 ) -> Circle | None:

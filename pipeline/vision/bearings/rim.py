@@ -42,7 +42,7 @@ class Circle:
 
     def as_bearing(self) -> Bearing:
         """The bearing axis under this cover."""
-        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover")
+        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", self.rim)
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,8 @@ def _radial_slopes(
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32)
     part *= np.float32(1.0 / photo.full_scale)
     u, v = (np.outer(ray[:, k], distance).astype(np.float32) + np.float32(parameters[k] - low[k]) for k in (0, 1))
-    profile = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*u.shape, -1)
-    slope = _smoothed_slope(profile, pooled_rays * softness, 2.0 * softness)
+    profile = np.asarray(cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    slope = _smoothed_slope(profile.reshape(*u.shape, -1), pooled_rays * softness, 2.0 * softness)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
     outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
@@ -188,7 +188,8 @@ def _smoothed_slope(profile: NDArray[np.float32], across: float, along: float) -
     over, beside = (cv2.getGaussianKernel(2 * int(4.0 * std + 0.5) + 1, std, cv2.CV_32F) for std in (across, along))
     wrap = len(over) // 2
     around = np.concatenate([slope[-wrap:], slope, slope[:wrap]])
-    return cv2.sepFilter2D(around, -1, beside, over, borderType=cv2.BORDER_REFLECT)[wrap:-wrap].reshape(profile.shape)
+    pooled = np.asarray(cv2.sepFilter2D(around, -1, beside, over, borderType=cv2.BORDER_REFLECT), np.float32)
+    return pooled[wrap:-wrap].reshape(profile.shape)
 
 
 def _best_shift(

@@ -16,9 +16,13 @@ from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import series as series_module
+from pipeline.vision import shots as shots_module
 from pipeline.vision import trace_photo, trace_series
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
+from pipeline.vision.rough import RoughCable
 
 SETTINGS = VisionSettings()
 FLAT = VisionSettings.model_validate({"calibration": {"cover_height_std": 0.0}})  # as the covers of these scenes are
@@ -143,6 +147,33 @@ def test_camera_that_moved_is_a_finding(tmp_path: Path) -> None:
     assert all(line.chord_std_m == pytest.approx(1.22e-3, rel=0.05) for line in lines(traces))
 
 
+@pytest.mark.parametrize("always", [False, True])
+def test_other_photos_tell_where_the_fixed_cover_stands(
+    always: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the last photo a shadow is taken for the cover: it is searched again, and refused if that does not help."""
+    sound = shots_module.find_cable
+
+    def misled(
+        photo: Photo, settings: VisionSettings, *, cable: Cable | None = None, near: RoughCable | None = None
+    ) -> RoughCable | Rejected:
+        found = sound(photo, settings, cable=cable, near=near)
+        if photo.name != "step_02.png" or isinstance(found, Rejected) or (near is None and not always):
+            return found
+        (u, v), part = found.right.center_px, SETTINGS.bearings.min_rim
+        return replace(found, right=replace(found.right, center_px=(u + 30.0, v + 20.0), rim=part))
+
+    monkeypatch.setattr(shots_module, "find_cable", misled)
+    traces = trace_series(series(tmp_path), SETTINGS)
+    assert [isinstance(photo, Rejected) for photo in traces.photos] == [False, False, always]
+    assert {photo.code for photo in traces.photos if isinstance(photo, Rejected)} <= {"photo/bearing"}
+    for line, curve in zip(traces.photos, CURVES, strict=True):
+        if isinstance(line, Centerline):
+            assert line.chord_m == pytest.approx(curve.chord, abs=5 * line.chord_std_m)  # as without the shadow
+            assert line.chord_std_m < 2e-5
+    assert not codes(traces)
+
+
 def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
     camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022))
     (u0, u1), (v0, v1) = camera.project(np.array([0.0, CURVES[0].chord]), np.zeros(2))
@@ -259,7 +290,8 @@ def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data
 def test_photo_that_breaks_the_program_costs_that_photo_alone(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sound, calls = getattr(series_module, stage), []
+    module = shots_module if stage == "find_cable" else series_module
+    sound, calls = getattr(module, stage), []
 
     def broken(*args: object, **named: object) -> object:
         calls.append(args)
@@ -267,7 +299,7 @@ def test_photo_that_breaks_the_program_costs_that_photo_alone(
             raise np.linalg.LinAlgError("Singular matrix")
         return sound(*args, **named)
 
-    monkeypatch.setattr(series_module, stage, broken)
+    monkeypatch.setattr(module, stage, broken)
     first, second, third = trace_series(series(tmp_path), SETTINGS).photos
     assert isinstance(first, Centerline) and isinstance(third, Centerline)
     assert isinstance(second, Rejected) and second.code == "photo/program-error"

@@ -1,0 +1,118 @@
+"""What the photos of a series tell of each other's bearings: one stands still, the other goes where the log says.
+
+``near photo, travel -> covers to be expected`` before a photo is searched; ``all photos -> the fixed axis -> photos on
+which another thing was taken for its cover`` after all were. The photos are of one camera position; px.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.records import Array, Side
+from pipeline.settings.vision.series import SeriesSettings
+from pipeline.vision.rough import Bearing, RoughCable
+
+Pair = tuple[tuple[float, float], tuple[float, float]]
+
+
+def moved_axes(axes: Pair, moving: Side, travel_px: float) -> Pair:
+    """Left and right axis after the moving bearing went along the chord toward the fixed one."""
+    left, right = np.array(axes[0], float), np.array(axes[1], float)
+    along = (right - left) / np.hypot(*(right - left))
+    if moving == "left":
+        left = left + travel_px * along
+    else:
+        right = right - travel_px * along
+    return (float(left[0]), float(left[1])), (float(right[0]), float(right[1]))
+
+
+def expected_covers(near: RoughCable, moving: Side, travel_px: float) -> tuple[Bearing, ...]:
+    """Covers of a photo taken ``travel_px`` of the moving bearing after the photo ``near``.
+
+    Both where they were, for the log may name the other bearing, and the moving one where the travel puts it (nowhere
+    if that is not known, NaN).
+    """
+    covers = (near.left, near.right)
+    if not np.isfinite(travel_px):
+        return covers
+    places = moved_axes((near.left.center_px, near.right.center_px), moving, travel_px)
+    side = 0 if moving == "left" else 1
+    return (*covers, replace(covers[side], center_px=places[side]))
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """The fixed bearing over the photos of a series.
+
+    Attributes
+    ----------
+    side : str
+        Of the photos.
+    cover : Bearing
+        As most photos show it.
+    astray : tuple of int
+        Photos on which something else was taken for it.
+    """
+
+    side: Side
+    cover: Bearing
+    astray: tuple[int, ...]
+
+
+def fixed_cover(found: Sequence[RoughCable], limit_px: float, settings: SeriesSettings) -> Fixed | None:
+    """The cover that stands still on most photos; None where none does (to ``limit_px``), or the axes are no covers."""
+    if len(found) < settings.least_steady or any(axis.kind != "cover" for c in found for axis in (c.left, c.right)):
+        return None
+    off = np.stack([_off_middle(found, side) for side in _SIDES])
+    steady = off <= limit_px
+    side = int(np.argmax(steady.sum(axis=1)))
+    if steady[side].sum() < max(settings.least_steady - 1, settings.steady_share * len(found)):
+        return None
+    group = [_axis(cable, _SIDES[side]) for cable, still in zip(found, steady[side], strict=True) if still]
+    middle = np.median([axis.center_px for axis in group], axis=0)
+    surest = min(group, key=lambda axis: axis.std_px)
+    cover = replace(surest, center_px=(float(middle[0]), float(middle[1])))
+    return Fixed(_SIDES[side], cover, tuple(int(k) for k in np.flatnonzero(~steady[side])))
+
+
+def wandering_px(found: Sequence[RoughCable], px_per_m: float, settings: SeriesSettings) -> float:
+    """What the fixed axis wanders beyond its play, rms of a coordinate; 0 if it stands still."""
+    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
+    if len(found) < 2 or any(cable.left.kind == "given" for cable in found):
+        return 0.0
+    steps = np.hypot(*np.ptp(axes, axis=0).T)
+    if float(steps.min()) <= settings.max_fixed_shift_m * px_per_m:
+        return 0.0
+    return float(np.sqrt(np.mean(np.var(axes[:, int(np.argmin(steps))], axis=0))))
+
+
+def at_least(cable: RoughCable, std_px: float) -> RoughCable:
+    """The cable with axes no surer than ``std_px``."""
+    left, right = (replace(axis, std_px=max(axis.std_px, std_px)) for axis in (cable.left, cable.right))
+    return replace(cable, left=left, right=right)
+
+
+def apart_px(cable: RoughCable, fixed: Fixed) -> float:
+    """Distance of what was taken for the fixed cover from where it stands."""
+    return float(np.hypot(*np.subtract(_axis(cable, fixed.side).center_px, fixed.cover.center_px)))
+
+
+def is_sure(cable: RoughCable, side: Side, sure_rim: float) -> bool:
+    """True if the cover was seen all round, so that it stands where it was found."""
+    return (_axis(cable, side).rim or 0.0) >= sure_rim
+
+
+_SIDES: tuple[Side, Side] = ("left", "right")
+
+
+def _axis(cable: RoughCable, side: Side) -> Bearing:
+    return cable.left if side == "left" else cable.right
+
+
+def _off_middle(found: Sequence[RoughCable], side: Side) -> Array:
+    """Distance of each photo's axis from the median of all."""
+    places = np.array([_axis(cable, side).center_px for cable in found])
+    return np.asarray(np.hypot(*(places - np.median(places, axis=0)).T))

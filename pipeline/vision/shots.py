@@ -1,0 +1,188 @@
+"""The cable and its bearings on every photo of a specimen: what one photo tells is used on the next.
+
+``photo, what the neighbour photo shows -> cable and covers`` - and where the photos disagree about the bearing that
+stands still, those in the minority are searched again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import cv2
+import numpy as np
+
+from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.bearings.steady import apart_px, expected_covers, fixed_cover, is_sure, moved_axes
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import Photo, load_photo
+from pipeline.vision.preview import reduce_photo
+from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.scale.calibration import Calibration
+from pipeline.vision.segmentation import find_cable
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One photo of the series: its step, and the cable found on it or the reason why not."""
+
+    step: LoadStep
+    found: RoughCable | Rejected
+    preview: Preview | None
+
+
+def find_cables(
+    specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
+) -> tuple[list[Shot], tuple[Finding, ...]]:
+    """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
+    shots = _find_all(specimen, calibration, settings)
+    found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
+    if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
+        return shots, ()
+    if calibration is not None:
+        lengths = [shot.found.length_px for shot in found if isinstance(shot.found, RoughCable)]
+        ratio = float(np.median(lengths)) / (calibration.scale.px_per_m * specimen.length_m)
+        if abs(ratio - 1.0) <= settings.series.max_length_deviation:
+            return shots, ()
+    ends = [found[0], found[-1]] if len(found) > 1 else found
+    radius = cover_radius(_with_photos(specimen, ends, settings), settings.bearings)
+    if radius is None:
+        return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
+    text = (
+        f"bearing_marker_mm is not given; round covers {2 * radius:.0f} px across are seen where the cable ends, their "
+        "centres are taken for the bearing axes."
+    )
+    again = _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
+    return again, (Finding("rig/covers-found", "info", text),)
+
+
+def _with_axes_shown(shot: Shot) -> Shot:
+    """Refuse a cable that vanishes under something: without a scale its length cannot show where the axis is."""
+    cable = shot.found
+    if isinstance(cable, Rejected):
+        return shot
+    clamps = [axis.center_px for axis in (cable.left, cable.right) if axis.kind == "clamp"]
+    if not clamps:
+        return shot
+    reason = (
+        f"{cable.image}: the cable vanishes under something at ({clamps[0][0]:.0f}, {clamps[0][1]:.0f}) px that is no "
+        "round cover, and without a scale nothing tells where the bearing axis is; give scale_px_per_mm, "
+        "bearing_marker_mm or bearings_px."
+    )
+    return replace(shot, found=Rejected(cable.image, "photo/bearing", reason))
+
+
+def _with_photos(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Iterator[tuple[Photo, RoughCable]]:
+    """The photos once more: they are not kept, a series of them would not fit into memory."""
+    for shot in shots:
+        photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+        if isinstance(photo, Photo) and isinstance(shot.found, RoughCable):
+            yield photo, shot.found
+
+
+def _find_all(
+    specimen: Specimen, calibration: Calibration | None, settings: VisionSettings, *, cover_px: float | None = None
+) -> list[Shot]:
+    """Find the cable on all photos; ``cover_px`` is the diameter of covers seen on them (px)."""
+    shots: list[Shot] = []
+    near: RoughCable | None = None
+    first: LoadStep | None = None
+    last = specimen.steps[0]
+    for step in specimen.steps:
+        path = None if step.image is None else specimen.images.get(step.image)
+        if step.image is None or path is None:
+            continue
+        first = step if first is None else first
+        photo = load_photo(path, settings.photo, name=step.image)
+        if isinstance(photo, Rejected):
+            shots.append(Shot(step, photo, None))
+            continue
+        cable = _expected(specimen, calibration, step.displacement_m - first.displacement_m)
+        if cover_px is not None:
+            cable = replace(cable, bearings=BearingHints(cover_px=cover_px))
+        if near is not None:
+            travel = np.nan if calibration is None else step.displacement_m - last.displacement_m
+            scale = 1.0 if calibration is None else calibration.scale.px_per_m
+            seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
+            cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
+        found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near))
+        if isinstance(found, RoughCable):
+            near, last = found, step
+        shots.append(Shot(step, found, reduce_photo(photo, settings.preview)))
+    return shots
+
+
+def _expected(specimen: Specimen, calibration: Calibration | None, travel: float) -> Cable:
+    """What is known of the cable on a photo taken ``travel`` (m) of the moving bearing after the first photo."""
+    rig = specimen.rig
+    if calibration is None:
+        widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
+        # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
+        given = rig.bearings_px if travel == 0.0 and widths is None else None
+        return Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
+    scale = calibration.scale.px_per_m
+    cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
+    given = None
+    if rig.bearings_px is not None and cover is None:
+        given = moved_axes(rig.bearings_px, rig.moving_bearing, travel * scale)
+    return Cable(specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=cover, given_px=given))
+
+
+def guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
+    """The outcome of work on one photo; numbers nobody foresaw cost that photo, not the specimen."""
+    try:
+        return work()
+    except (ArithmeticError, LookupError, ValueError, cv2.error) as error:
+        told = " ".join(str(error).split())[:200]
+        reason = f"{image}: the tracing failed ({type(error).__name__}: {told}); please report it."
+        return Rejected(image, "photo/program-error", reason)
+
+
+def with_fixed_cover(
+    specimen: Specimen, shots: list[Shot], calibration: Calibration, settings: VisionSettings
+) -> list[Shot]:
+    """Photos on which something else was taken for the fixed bearing's cover: searched again where it stands.
+
+    A photo that shows it in neither place is refused, unless what was found is a cover all round: the camera moved.
+    """
+    there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
+    found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
+    limit = settings.series.max_fixed_shift_m * calibration.scale.px_per_m
+    fixed = fixed_cover(found, limit, settings.series)
+    if fixed is None:
+        return shots
+    settled = list(shots)
+    for k, cable in ((there[i], found[i]) for i in fixed.astray):
+        again = _find_beside(specimen, shots[k], fixed.cover, calibration, settings)
+        if isinstance(again, RoughCable) and apart_px(again, fixed) <= limit:
+            settled[k] = replace(shots[k], found=again)
+        elif not is_sure(cable, fixed.side, settings.bearings.sure_rim):
+            apart = 1e3 * apart_px(cable, fixed) / calibration.scale.px_per_m
+            reason = (
+                f"{cable.image}: what was taken for the fixed ({fixed.side}) bearing's cover lies {apart:.1f} mm from "
+                "where the other photos show it, and too little of its rim is seen to tell that the camera moved."
+            )
+            settled[k] = replace(shots[k], found=Rejected(cable.image, "photo/bearing", reason))
+    return settled
+
+
+def _find_beside(
+    specimen: Specimen, shot: Shot, cover: Bearing, calibration: Calibration, settings: VisionSettings
+) -> RoughCable | Rejected:
+    """The cable on a photo once more, with a cover known."""
+    photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+    if isinstance(photo, Rejected):
+        return photo
+    scale = calibration.scale.px_per_m
+    diameter = None if cover.radius_px is None else 2.0 * cover.radius_px
+    cable = Cable(
+        specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=diameter, seen=(cover,))
+    )
+    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable))
