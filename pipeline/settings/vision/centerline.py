@@ -195,3 +195,15 @@ class CurveSettings(StageSettings):
         description="of the radius; a centerline that misses a cover's axis by more follows a flank, a shadow or a"
         " stripe: those missed by 0.85 and more, a cable sits in its bearing by a tenth",
     )
+    axis_play_widths: float = Field(
+        0.02,
+        gt=0,
+        description="widths; how far a cable sits beside its bearing's axis: 0.1 mm on 5 mm, the play of a sheath in a"
+        " bore made for it",
+    )
+    outward_std: float = Field(
+        0.003,
+        ge=0,
+        description="relative; covers look farther from the middle of the picture than the cable below them: 3 mm seen"
+        " from a metre",
+    )

@@ -196,12 +196,18 @@ def _bow_roughness(curve: PlaneCurve, order: int) -> float:
     """``int (d^k kappa / ds^k)^2 ds`` of a half wave from end to end whose curvature varies as much as the curve's.
 
     An elastica between two bearings obeys ``kappa'' = -(P / EI) kappa``: it is no parabola, however little of the rest
-    the photo shows. A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
+    the photo shows.
     """
-    knots = curve.frame.knots
-    length = float(knots[-1] - knots[0])
+    return rms_of_bow(curve, order) ** 2 * float(np.ptp(curve.frame.knots))
+
+
+def rms_of_bow(curve: PlaneCurve, order: int) -> float:
+    """Rms of ``d^k kappa / ds^k`` of a half wave from end to end whose curvature varies as much as the curve's.
+
+    A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
+    """
     amplitude2 = float(np.var(curve.frame.values @ curve.coefficients)) / (0.5 - 4.0 / np.pi**2)
-    return amplitude2 * 0.5 * length * float((np.pi / length) ** (2 * order))
+    return float(np.sqrt(0.5 * amplitude2) * (np.pi / np.ptp(curve.frame.knots)) ** order)
 
 
 def _step_to_foot(curve: PlaneCurve, points: Array, s: Array) -> tuple[Array, Array]:

@@ -7,10 +7,9 @@ Chord frame: origin at the left bearing axis, x to the right axis, y toward the 
 ``dy/ds = sin theta``. Curvature is positive in the direction of the bow, ``kappa = -d theta / ds``, whether the photo
 is mirrored or not.
 
-Under the bearing covers nothing is seen; there the curve is continued by the spline's penalty, its uncertainty grows
-and the points are marked as not seen. That the cable passes through the bearing axis is not used, for a measured
-reason: known to 0.01 mm it leaves the error of kappa in the last 10 mm where it is (0.7 % of the maximum), and a cable
-that sits 0.1 mm beside an axis so trusted gets an error of 8 %. The distance is a figure of quality instead.
+Under the bearing covers nothing is seen; there the curve is continued to the axes as far as they are known
+(`pipeline.vision.centerline.continuation`), its uncertainty grows and the points are marked as not seen. By how much
+the curve of the seen part alone misses the axes is a figure of quality.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from pipeline.records import Array, Centerline, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.centerline import CurveSettings
+from pipeline.vision.centerline.continuation import continue_to_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
@@ -159,12 +159,16 @@ def _assemble(
     options: CurveSettings,
 ) -> Centerline:
     """Record of a fitted curve, from foot to foot of the bearing axes."""
-    feet, misses = _feet(fit, chord)
-    s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
+    misses = _feet(fit, chord)[1]
     metres = float(np.median(width / sections.width))
     light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, light_std, light_length)
     covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
+    middle, scatter = _width(width)
+    kinds = (rough.left.kind, rough.right.kind)
+    fit, covariance = continue_to_axes(fit, covariance, chord, kinds=kinds, width=middle, settings=options)
+    feet = _feet(fit, chord)[0]
+    s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
     length_std = _length_std(fit, s, normal, covariance)
@@ -193,7 +197,6 @@ def _assemble(
         systematic_length=light_length,
     )
     uv = chord.to_pixels(where)
-    middle, scatter = _width(width)
     quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
     if diameter is not None:
         quality["width_over_diameter"] = middle / diameter
