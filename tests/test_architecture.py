@@ -58,7 +58,7 @@ INSIDE = {
     "pipeline.vision.centerline": [
         ("curvature", "smoothing", "edge_profile"),
         ("curve_fit", "edges"),
-        ("midline",),
+        ("midline", "continuation"),
         ("path",),
         ("measurement",),
     ],
