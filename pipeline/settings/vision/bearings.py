@@ -102,6 +102,12 @@ class BearingSettings(StageSettings):
         lt=1,
         description="radii; how far from the rim the cable's mask may end: led straight on by a width at most",
     )
+    lost_before_rim: float = Field(
+        1.9,
+        gt=1,
+        description="radii from where a cable is lost to the centre of a cover; letters up to its rim hide 0.9 of it, a"
+        " dot of half the cover's size lies two of its own radii ahead",
+    )
     rim_tolerance: float = Field(
         0.015,
         gt=0,

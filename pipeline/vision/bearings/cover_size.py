@@ -13,12 +13,13 @@ Units: px.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.bearings.covers import find_cover
+from pipeline.vision.bearings.covers import find_rim
 from pipeline.vision.bearings.rim import Radius
 from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.photo import Photo
@@ -40,9 +41,13 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
     px or None
         None unless one radius fits both ends on every photo.
     """
-    pairs = [(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
-    for measured in (_at_end, _to_mark):
-        radii = _alike((measured(photo, end, width, settings) for photo, end, width in pairs), settings)
+    ends = [
+        _LostEnd(photo, end, 2.0 * cable.half_width_px, settings)
+        for photo, cable in seen
+        for end in visible_ends(cable)
+    ]
+    for measured in (_at_end, _to_mark, _beyond_end):
+        radii = _alike((measured(end) for end in ends), settings)
         if radii is not None:
             return float(np.median(radii))
     return None
@@ -58,8 +63,9 @@ def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[fl
     return known if known and np.ptp(known) <= settings.same_radius * np.mean(known) else None
 
 
-def _to_mark(photo: Photo, end: CableEnd, width: float, settings: BearingSettings) -> float | None:
+def _to_mark(lost: _LostEnd) -> float | None:
     """Distance (px) from the cable's end to what is turned about an axis ahead of it, as far ahead as covers reach."""
+    photo, end, width, settings = lost.photo, lost.end, lost.width_px, lost.settings
     reach = settings.mark_widths * width
     step = reach / settings.mark_cells
     ahead = np.arange(settings.cover_radii_widths[0] * width, settings.cover_radii_widths[1] * width, step)
@@ -85,17 +91,50 @@ def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     return ends[0], ends[1]
 
 
-def _at_end(photo: Photo, end: CableEnd, width_px: float, settings: BearingSettings) -> float | None:
-    """The smallest circle seen nearly all round whose rim is where the cable ends."""
-    low, high = settings.cover_radii_widths
-    # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
-    steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
-    for radius in np.geomspace(low, high, steps + 1):
-        expected = Radius(float(radius * width_px), 0.5 * settings.search_radii)
-        circle = find_cover(photo, end, expected, width_px, settings)
-        if circle is None or circle.rim < settings.sure_rim or circle.radius_std > settings.same_radius * circle.radius:
-            continue
-        ahead = float(np.hypot(*(np.array(circle.center) - end.place))) / circle.radius
-        if abs(ahead - 1.0) <= settings.end_on_rim:
-            return circle.radius
-    return None
+@dataclass
+class _LostEnd:
+    """Where a cable of some width is lost on a photo, and what is round there, sought once and as far as asked."""
+
+    photo: Photo
+    end: CableEnd
+    width_px: float
+    settings: BearingSettings
+    _known: list[tuple[float, float]] = field(default_factory=list)
+    _rest: Iterator[tuple[float, float]] | None = None
+
+    def circles(self) -> Iterator[tuple[float, float]]:
+        """Circles seen nearly all round, by size: radius, and distance of the centre from the end in radii."""
+        self._rest = self._search() if self._rest is None else self._rest
+        yield from self._known
+        for circle in self._rest:
+            self._known.append(circle)
+            yield circle
+
+    def _search(self) -> Iterator[tuple[float, float]]:
+        settings = self.settings
+        low, high = settings.cover_radii_widths
+        # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
+        steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
+        for radius in np.geomspace(low, high, steps + 1):
+            expected = Radius(float(radius * self.width_px), 0.5 * settings.search_radii)
+            circle = find_rim(self.photo, self.end, expected, self.width_px, settings)
+            if circle is None or circle.rim < settings.sure_rim:
+                continue
+            if circle.radius_std <= settings.same_radius * circle.radius:
+                ahead = np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius
+                yield circle.radius, float(ahead)
+
+
+def _at_end(lost: _LostEnd) -> float | None:
+    """The smallest circle whose rim is where the cable ends."""
+    limit = lost.settings.end_on_rim
+    return next((radius for radius, ahead in lost.circles() if abs(ahead - 1.0) <= limit), None)
+
+
+def _beyond_end(lost: _LostEnd) -> float | None:
+    """The largest circle before whose rim the cable may have been lost: letters or a shadow hide its last.
+
+    The largest, for a bevel or a dot on a cover lies as far beyond its own rim.
+    """
+    low, high = 1.0 - lost.settings.end_on_rim, lost.settings.lost_before_rim
+    return max((radius for radius, ahead in lost.circles() if low <= ahead <= high), default=None)

@@ -10,7 +10,7 @@ Units: px of the photo as displayed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -45,6 +45,14 @@ def find_cover(
     Circle or None
         None if no circle shows at least ``settings.min_rim`` of its rim.
     """
+    found = find_rim(photo, end, radius, width_px, settings)
+    if found is not None and found.rim >= settings.sure_rim:
+        return with_rings(photo, found, radius, settings)
+    return _by_marks(photo, end, radius, found, settings)
+
+
+def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings) -> Circle | None:
+    """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
     window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
     if window is None:
@@ -57,6 +65,7 @@ def find_cover(
     # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
     # a sharp rim, what is soft and round is the shadow.
     partial: Circle | None = None
+    fits = _Fits(photo, radius, settings)
     sharp, soft = (1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)
     for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
         if softness > 1.0 and partial is not None:
@@ -64,18 +73,16 @@ def find_cover(
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             votes = _votes(window, radius.px / window.reduction, on_cable, settings, sectors=sectors) * prior
-            found = _best_circle(photo, window, radius, votes, softness, settings)
+            found = _best_circle(fits, window, votes, softness)
             if found is not None and found.rim >= settings.sure_rim:
-                return with_rings(photo, found, radius, settings)
+                return found
             if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
                 partial = found
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     ahead = np.exp(-0.5 * (aside / (2.0 * settings.aside_std_radii * radius.px)) ** 2) * (along > 0.0)
     votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool), settings) * ahead
-    farther = _best_circle(photo, window, radius, votes, 1.0, settings)
-    if farther is not None and farther.rim >= settings.sure_rim:
-        return with_rings(photo, farther, radius, settings)
-    return _by_marks(photo, end, radius, partial, settings)
+    farther = _best_circle(fits, window, votes, 1.0)
+    return farther if farther is not None and farther.rim >= settings.sure_rim else partial
 
 
 def find_again(
@@ -139,25 +146,37 @@ def _by_marks(
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-def _best_circle(
-    photo: Photo,
-    window: _Window,
-    radius: Radius,
-    votes: NDArray[np.floating],
-    softness: float,
-    settings: BearingSettings,
-) -> Circle | None:
+@dataclass
+class _Fits:
+    """Circles fitted on one photo: votes counted in several ways lead to the same few centres, each is fitted once."""
+
+    photo: Photo
+    radius: Radius
+    settings: BearingSettings
+    done: list[tuple[float, Array, Circle | None]] = field(default_factory=list)
+
+    def at(self, center: Array, softness: float) -> Circle | None:
+        same = 0.5 * self.settings.search_radii * self.radius.px  # well within what a fit searches
+        for other, place, circle in self.done:
+            if other == softness and np.hypot(*(place - center)) < same:
+                return circle
+        circle = fit_circle(self.photo, center, self.radius, self.settings, softness=softness)
+        self.done.append((softness, center, circle))
+        return circle
+
+
+def _best_circle(fits: _Fits, window: _Window, votes: NDArray[np.float32], softness: float) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
-    votes = votes.copy()
+    votes, settings = votes.copy(), fits.settings
     best: Circle | None = None
     for _ in range(settings.candidates):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, settings, softness=softness)
+        circle = fits.at(window.to_pixels(np.array([u, v], float)), softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
         if best is not None and best.rim > settings.sure_rim:
             break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * fits.radius.px / window.reduction)), 0.0, cv2.FILLED)
     return best
 
 

@@ -196,8 +196,10 @@ def test_left_is_by_u_and_upper_where_the_chord_is_upright(angle_deg: float, fir
     assert left_first(np.zeros(2), np.array([np.cos(angle), np.sin(angle)]), STAGE) == first_is_left
 
 
-def ground_grey_covers(lefts: list[tuple[float, float]], right: tuple[float, float], radius: float) -> list[Photo]:
-    """Painted here: discs of the ground's grey with a thin circle on each, a soft shadow aside, a cable."""
+def painted_covers(
+    lefts: list[tuple[float, float]], right: tuple[float, float], radius: float, disc_grey: float = 150.0
+) -> list[Photo]:
+    """Painted here: discs (of the ground's grey) with a thin circle on each, a soft shadow aside, a cable."""
     rng = np.random.default_rng(8)
     v, u = np.mgrid[:220, :700].astype(float)
     photos = []
@@ -214,7 +216,7 @@ def ground_grey_covers(lefts: list[tuple[float, float]], right: tuple[float, flo
         for axis in (left, right):
             distance = np.hypot(u - axis[0], v - axis[1])
             disc, line = 0.5 * erfc((distance - radius) / np.sqrt(2.0)), np.exp(-0.5 * ((distance - 18.0) / 1.2) ** 2)
-            grey += disc * (150.0 - 30.0 * line - grey)
+            grey += disc * (disc_grey - 30.0 * line - grey)
         grey += rng.normal(0.0, 1.5, grey.shape)
         photos.append(Photo("painted", grey.clip(0, 255).astype(np.uint8), 8))
     return photos
@@ -231,7 +233,7 @@ def cable_to_the_rims(left: tuple[float, float], right: tuple[float, float], rad
 
 def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
     lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
-    photos = ground_grey_covers(lefts, right, radius)
+    photos = painted_covers(lefts, right, radius)
     seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
     found = cover_radius(seen, STAGE)
     # the radius is as good as the place where the cable vanishes
@@ -243,8 +245,16 @@ def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
             assert np.abs(np.subtract(bearing.center_px, true)).max() < 3.5 * bearing.std_px < 0.7
 
 
+def test_size_of_covers_is_told_where_letters_hide_the_last_of_the_cable() -> None:
+    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
+    photos = painted_covers(lefts, right, radius, disc_grey=215.0)
+    seen = [(photo, cable_to_the_rims(left, right, 1.6 * radius)) for photo, left in zip(photos, lefts, strict=True)]
+    found = cover_radius(seen, STAGE)
+    assert found is not None and abs(found - radius) < 0.3  # a soft shadow lies beside the rim
+
+
 def test_one_cover_without_a_screw_tells_no_size() -> None:
     left, right, radius = (90.4, 120.7), (610.3, 90.6), 36.0
-    photo = ground_grey_covers([left], right, radius)[0]
+    photo = painted_covers([left], right, radius)[0]
     photo.pixels[60:120, 580:640] = 150  # the right one's circle is gone
     assert cover_radius([(photo, cable_to_the_rims(left, right, radius))], STAGE) is None
