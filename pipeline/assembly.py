@@ -108,6 +108,7 @@ def assemble(
             px_per_mm=traces.scale.px_per_m / 1e3,
             std_relative=traces.scale.std_relative,
             source=traces.scale.source,
+            axis_parallax_std=traces.axis_parallax_std,
         ),
         photos=photos,
         steps=parts.steps,

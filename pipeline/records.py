@@ -152,7 +152,7 @@ class Centerline:
     position_std : (n,) m
         Along the normal.
     chord_m, chord_std_m : m
-        Distance of the bearing axes, std without the common scale error.
+        Distance of the bearing axes, std without what all photos share: scale and `Traces.axis_parallax_std`.
     traced_length_m, traced_length_std_m : m
         Arc length from axis to axis.
     left_px, right_px : (u, v) px
@@ -190,8 +190,20 @@ class Centerline:
 
 @dataclass(frozen=True)
 class Traces:
-    """What the vision stage makes of a specimen: one outcome per photo, in the order of the steps, and the scale."""
+    """What the vision stage makes of a specimen.
+
+    Attributes
+    ----------
+    photos : tuple of Centerline or Rejected
+        One outcome per photo, in the order of the steps.
+    scale : Scale
+    findings : tuple of Finding
+    axis_parallax_std : relative
+        Of the way from the camera's foot to a bearing axis, common to all photos: by so much the axes may be seen too
+        far out and so too far apart, because the covers that mark them lie higher than the cable's axis.
+    """
 
     photos: tuple[Centerline | Rejected, ...]
     scale: Scale
     findings: tuple[Finding, ...] = ()
+    axis_parallax_std: float = 0.0

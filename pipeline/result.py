@@ -81,11 +81,12 @@ class PhotoPart(Part):
 
 
 class ScalePart(Part):
-    """Scale of the photos and how it was cross-checked."""
+    """Scale of the photos and where it came from; `axis_parallax_std` as in `pipeline.records.Traces`."""
 
     px_per_mm: float
     std_relative: float
     source: str
+    axis_parallax_std: float = 0.0
 
 
 class StepPart(Part):

@@ -43,7 +43,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
         length_std=settings.length_std_relative * specimen.length_m,
         scale_std=traces.scale.std_relative,
         axis_std=settings.axis_std_m,
-        axis_parallax_std=parallax_std(specimen, settings),
+        axis_parallax_std=traces.axis_parallax_std,
         camera_foot_std=settings.camera_foot_std_m,
         steps=steps,
         moving=specimen.rig.moving_bearing,
@@ -67,18 +67,6 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         hold_forces=step.forces_N if step.forces_N.size else None,
         picture_centre=None if line is None else picture_centre(line, px_per_m),
     )
-
-
-def parallax_std(specimen: Specimen, settings: IdentifySettings) -> float:
-    """By which part of the way the axes may be seen too far from the camera's foot: covers are higher than the cable.
-
-    A point by h above the plane of the scale is seen farther out by h / distance; how high the covers of this rig are
-    nobody says. Axes that the user pointed at have no cover.
-    """
-    if specimen.rig.bearings_px is not None:
-        return 0.0
-    height = 0.5 * specimen.diameter_m + settings.cover_height_m
-    return height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
 def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | None:

@@ -25,6 +25,7 @@ from pipeline.report.evidence import (
     mechanics_figures,
     photo_rows,
     photo_views,
+    photos_note,
     pointer_data,
 )
 from pipeline.report.figures import force_unit, stiffness_unit
@@ -98,6 +99,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             pointer=pointer_data(result, main, words, settings),
             levels=levels,
             photos=photo_views(result, words, settings),
+            photos_note=photos_note(result, words),
             figures=mechanics_figures(result, words, settings),
             diagnosis=diagnosis,
             tables={

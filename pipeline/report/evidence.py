@@ -235,6 +235,17 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
     return rows
 
 
+def photos_note(result: Result, words: Words) -> str:
+    """What the standard deviations in the table of photos leave out, because all photos share it."""
+    scale = result.scale
+    if scale is None:
+        return ""
+    common = [words("photos_scale", percent=words.number(100.0 * scale.std_relative, 2))]
+    if scale.axis_parallax_std > 0.0:
+        common.append(words("photos_axes", percent=words.number(100.0 * scale.axis_parallax_std, 2)))
+    return " ".join(common)
+
+
 def knot_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of control points: curvature, tangent."""
     unit = figures.stiffness_unit(result, words)

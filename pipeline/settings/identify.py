@@ -25,15 +25,6 @@ class IdentifySettings(BaseModel):
         description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by "
         "a fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
     )
-    cover_height_m: float = Field(
-        1e-3, ge=0, description="m; top of a cover or marker above the cable's upper side: a lid and its screw"
-    )
-    usual_distance_m: float = Field(
-        1.0,
-        gt=0,
-        description="m; camera above the covers where nobody says: they are seen farther apart than their axes by "
-        "height / distance, which is not known better than to its own size",
-    )
     camera_foot_std_m: float = Field(
         0.05,
         ge=0,

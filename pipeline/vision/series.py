@@ -25,7 +25,13 @@ from pipeline.vision.photo import load_photo
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.board import calibrate_by_board
-from pipeline.vision.scale.calibration import Calibration, check_scale, from_found, from_number
+from pipeline.vision.scale.calibration import (
+    Calibration,
+    axis_parallax_std,
+    check_scale,
+    from_found,
+    from_number,
+)
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
 from pipeline.vision.shots import Shot, find_cables, guarded, with_fixed_cover
@@ -95,7 +101,8 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         *check_scale(specimen, calibration, found, displacements, settings.calibration),
         *_check_lengths(specimen, lines, settings.series),
     )
-    return Traces(lines, calibration.scale, findings)
+    parallax_std = axis_parallax_std(specimen, found, settings.calibration)
+    return Traces(lines, calibration.scale, findings, parallax_std)
 
 
 def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:

@@ -16,10 +16,8 @@ class CalibrationSettings(StageSettings):
     cover_diameter_std: float = Field(
         0.004, gt=0, description="relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit"
     )
-    cover_height_std: float = Field(
-        0.003,
-        ge=0,
-        description="relative; covers and their travel look larger than the cable below them: 3 mm seen from a metre",
+    cover_height_m: float = Field(
+        1e-3, ge=0, description="m; top of a cover or marker above the cable's upper side: a lid and its screw"
     )
     length_scale_std: float = Field(
         0.005, gt=0, description="relative; 1 mm on 200 mm: how well the length between the axes is known"
@@ -42,7 +40,10 @@ class CalibrationSettings(StageSettings):
         description="ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it",
     )
     usual_distance_m: float = Field(
-        0.4, gt=0, description="m; camera above the cable where nobody says: half the height of a bench stand"
+        0.8,
+        gt=0,
+        description="m; camera above the cable where nobody says; twice the standard deviations that follow from it"
+        " reach a bench stand of 0.4 m",
     )
     check_sigmas: float = Field(3.0, gt=0, description="sigmas; one false finding in 400 checks")
     check_floor: float = Field(

@@ -56,7 +56,8 @@ def from_found(
     """
     if not found:
         return None
-    estimates = [_by_travel(found, displacements, settings), _by_covers(found, specimen, settings)]
+    parallax_std = axis_parallax_std(specimen, found, settings)
+    estimates = [_by_travel(found, displacements, parallax_std), _by_covers(found, specimen, settings)]
     known = [estimate for estimate in estimates if estimate is not None]
     precise = [scale for scale in known if scale.std_relative < settings.max_scale_std]
     if precise:
@@ -73,12 +74,24 @@ def from_found(
     return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,))
 
 
+def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: CalibrationSettings) -> float:
+    """By which part of its way from the camera's foot what marks the axes may be seen too far out.
+
+    A point by h above the plane of the scale is seen farther out by h / distance; how high the covers of this rig are
+    nobody says. The cable's own end and axes that the user pointed at have no cover.
+    """
+    if all(axis.kind in ("end", "given") for cable in found for axis in (cable.left, cable.right)):
+        return 0.0
+    height = 0.5 * specimen.diameter_m + settings.cover_height_m
+    return height / (specimen.camera.distance_m or settings.usual_distance_m)
+
+
 def chords_px(found: list[RoughCable]) -> Array:
     """Distance ``(n,)`` of the bearing axes on each photo, px."""
     return np.array([np.hypot(*np.subtract(cable.right.center_px, cable.left.center_px)) for cable in found])
 
 
-def _by_travel(found: list[RoughCable], displacements: Array, settings: CalibrationSettings) -> Scale | None:
+def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float) -> Scale | None:
     """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one."""
     known = np.isfinite(displacements)
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
@@ -93,7 +106,7 @@ def _by_travel(found: list[RoughCable], displacements: Array, settings: Calibrat
     std = spread / float(np.sqrt(travel @ travel))
     if slope <= 0:
         return None
-    std_relative = float(np.hypot(std / slope, settings.cover_height_std))
+    std_relative = float(np.hypot(std / slope, parallax_std))
     return Scale(slope, std_relative, "travel of the moving bearing against the displacement log")
 
 
@@ -115,7 +128,8 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
     # what light does to the rims is common to all photos: it does not show in their scatter
     rims = float(np.median([std / radius for radius, std in _radii(found)]))
     scatter = float(np.std(radii) / np.mean(radii))
-    std = math.hypot(settings.cover_diameter_std, settings.cover_height_std, scatter, rims)
+    parallax_std = axis_parallax_std(specimen, found, settings)
+    std = math.hypot(settings.cover_diameter_std, parallax_std, scatter, rims)
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
 
 
@@ -129,9 +143,10 @@ def check_scale(
     """Hold the scale against the covers' diameter and the travel of the moving bearing; what fails is a finding."""
     findings = []
     local = _local_scale(calibration, found)
+    parallax_std = axis_parallax_std(specimen, found, settings)
     for other, code in (
         (_by_covers(found, specimen, settings), "scale/covers"),
-        (_by_travel_on_plane(calibration, found, displacements, settings), "scale/displacement"),
+        (_by_travel_on_plane(calibration, found, displacements, parallax_std), "scale/displacement"),
     ):
         if other is None or other.source == calibration.scale.source:
             continue
@@ -152,10 +167,10 @@ def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
 
 
 def _by_travel_on_plane(
-    calibration: Calibration, found: list[RoughCable], displacements: Array, settings: CalibrationSettings
+    calibration: Calibration, found: list[RoughCable], displacements: Array, parallax_std: float
 ) -> Scale | None:
     """As `_by_travel`, with chords in m: the slope is then the ratio of true scale to the scale used."""
-    estimate = _by_travel(found, displacements, settings)
+    estimate = _by_travel(found, displacements, parallax_std)
     known = np.isfinite(displacements)
     if estimate is None:
         return None

@@ -110,6 +110,14 @@ def test_centerline_lies_on_the_photo(page, full_result):
     assert [float(v) for v in first] == pytest.approx(expected, abs=0.06)  # half of the last digit written
 
 
+def test_what_all_photos_share_stands_under_their_table(page, full_result):
+    text = Page(page).text
+    assert "Common to all of them is the scale's, ± 0.04 %." in text
+    assert "too far apart, ± 0.41 %" in text
+    pointed_at = full_result.scale.model_copy(update={"axis_parallax_std": 0.0})
+    assert "too far apart" not in Page(report_html(full_result.model_copy(update={"scale": pointed_at}))).text
+
+
 def test_provenance_is_shown(page, full_result):
     text = Page(page).text
     assert full_result.provenance["command"] in text

@@ -253,7 +253,9 @@ def measured_result():
             moving_bearing="left",
             description={"type": "HV 35 mm²", "batch": "2026-11", "notes": "taken from the spool"},
         ),
-        scale=ScalePart(px_per_mm=9.5, std_relative=0.0004, source="scale_px_per_mm of specimen.toml"),
+        scale=ScalePart(
+            px_per_mm=9.5, std_relative=0.0004, source="scale_px_per_mm of specimen.toml", axis_parallax_std=0.0041
+        ),
         photos=photos,
         steps=steps,
         inverse=inverse,

@@ -16,7 +16,7 @@ from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, St
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.board import BoardView, calibrate_by_board, find_board, fit_views
-from pipeline.vision.scale.calibration import check_scale, from_found, from_number
+from pipeline.vision.scale.calibration import axis_parallax_std, check_scale, from_found, from_number
 from pipeline.vision.scale.plane import Lens, PlaneMap
 
 STAGE = CalibrationSettings()
@@ -233,7 +233,7 @@ def test_scale_by_travel_against_the_log() -> None:
     scale, travel = 9_500.0, np.array([0.0, 0.004, 0.008, 0.012])
     rng = np.random.default_rng(2)
     cables = [found(200 + scale * d + 0.02 * rng.standard_normal(), 1900.0) for d in travel]
-    flat = STAGE.model_copy(update={"cover_height_std": 0.0})
+    flat = STAGE.model_copy(update={"usual_distance_m": 1e6})
     calibration = from_found(specimen(marker_m=None), cables, travel, flat)
     assert calibration is not None
     assert "displacement log" in calibration.scale.source
@@ -243,7 +243,20 @@ def test_scale_by_travel_against_the_log() -> None:
     # covers move nearer to the camera than the cable does
     high = from_found(specimen(marker_m=None), cables, travel, STAGE)
     assert high is not None
-    assert high.scale.std_relative == pytest.approx(np.hypot(std, STAGE.cover_height_std))
+    parallax = axis_parallax_std(specimen(), cables, STAGE)
+    assert high.scale.std_relative == pytest.approx(np.hypot(std, parallax), rel=1e-4)  # what is left of it in `flat`
+
+
+def test_covers_stand_above_the_cable_unless_the_axes_were_pointed_at() -> None:
+    covers = [found(200, 1900, 57.0)]
+    assert axis_parallax_std(specimen(), covers, STAGE) == pytest.approx(
+        (2.5e-3 + 1e-3) / 0.8
+    )  # half a cable and a lid
+    near = replace(specimen(), camera=CameraSpec(distance_m=0.5))
+    assert axis_parallax_std(near, covers, STAGE) == pytest.approx(7e-3)
+    for kind in ("given", "end"):
+        seen = [replace(c, left=replace(c.left, kind=kind), right=replace(c.right, kind=kind)) for c in covers]
+        assert axis_parallax_std(specimen(), seen, STAGE) == 0.0
 
 
 def test_scale_by_covers_where_nothing_moved() -> None:

@@ -25,7 +25,8 @@ from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 
 SETTINGS = VisionSettings()
-FLAT = VisionSettings.model_validate({"calibration": {"cover_height_std": 0.0}})  # as the covers of these scenes are
+# the covers of these scenes lie in the plane: seen from so far away, any height does
+FLAT = VisionSettings.model_validate({"calibration": {"usual_distance_m": 1e6}})
 SCALE, LENGTH, DIAMETER, COVER = 5_500.0, 0.17, 0.0046, 0.012
 
 
