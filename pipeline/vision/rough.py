@@ -32,8 +32,8 @@ class Bearing:
     kind : str
         ``cover``: centre of the round cover; ``given``: pixels of the user; ``end``: visible end of the cable;
         ``clamp``: the cable disappears in a larger object there.
-    rim : float or None
-        Share of the cover's rim that was seen.
+    sure : bool
+        True for a cover that was seen all round, or with a mark on its axis: nothing else looks like that.
     """
 
     center_px: tuple[float, float]
@@ -41,7 +41,7 @@ class Bearing:
     radius_px: float | None = None
     radius_std_px: float | None = None
     kind: AxisKind = "cover"
-    rim: float | None = None
+    sure: bool = False
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ def with_fixed_cover(
         again = _find_beside(specimen, shots[k], fixed.cover, calibration, settings)
         if isinstance(again, RoughCable) and apart_px(again, fixed) <= limit:
             settled[k] = replace(shots[k], found=again)
-        elif not is_sure(cable, fixed.side, settings.bearings.sure_rim):
+        elif not is_sure(cable, fixed.side):
             apart = 1e3 * apart_px(cable, fixed) / calibration.scale.px_per_m
             reason = (
                 f"{cable.image}: what was taken for the fixed ({fixed.side}) bearing's cover lies {apart:.1f} mm from "

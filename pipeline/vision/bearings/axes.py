@@ -66,7 +66,7 @@ def find_bearings(
         find_again(photo, end, hints.seen, expected, settings) or find_cover(photo, end, expected, width_px, settings)
         for end in ends
     ]
-    first, second = (circle.as_bearing() if circle is not None else None for circle in circles)
+    first, second = (circle.as_bearing(settings.sure_rim) if circle is not None else None for circle in circles)
     return first, second
 
 

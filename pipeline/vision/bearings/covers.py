@@ -103,18 +103,19 @@ def find_again(
     Returns
     -------
     Circle or None
-        None unless a cover of the same radius is seen all round where one is expected.
+        None unless a cover of the same radius is seen where one is expected, all round or with a mark on its axis.
     """
     for cover in seen:
         near = np.hypot(*np.subtract(cover.center_px, end.place)) <= settings.expected_reach_radii * radius.px
-        if cover.radius_px is None or not near or (cover.rim or 0.0) < settings.sure_rim:
+        if cover.radius_px is None or not near or not cover.sure:
             continue
-        found = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
+        rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
         most = settings.same_radius * cover.radius_px
-        if found is None or found.rim < settings.sure_rim or found.radius_std > most:
+        if rim is None or rim.rim < settings.min_rim or max(rim.radius_std, abs(rim.radius - cover.radius_px)) > most:
             continue
-        if abs(found.radius - cover.radius_px) <= most:
-            return with_rings(photo, found, radius, settings)
+        circle = with_rings(photo, rim, radius, settings)
+        if circle.marked or circle.rim >= settings.sure_rim:
+            return circle
     return None
 
 

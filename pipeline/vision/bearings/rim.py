@@ -31,7 +31,7 @@ class Circle:
     """A fitted circle and how much of its rim was seen.
 
     ``center`` (u, v), ``radius`` and their standard deviations in px; ``rim`` is the share of directions with an edge
-    on the circle.
+    on the circle; ``marked`` says that rings turned about the same centre are seen.
     """
 
     center: tuple[float, float]
@@ -39,10 +39,12 @@ class Circle:
     std: float
     radius_std: float
     rim: float
+    marked: bool = False
 
-    def as_bearing(self) -> Bearing:
-        """The bearing axis under this cover."""
-        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", self.rim)
+    def as_bearing(self, sure_rim: float) -> Bearing:
+        """The bearing axis under this cover, sure if at least ``sure_rim`` of it or a mark is seen."""
+        sure = self.marked or self.rim >= sure_rim
+        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", sure)
 
 
 @dataclass(frozen=True)

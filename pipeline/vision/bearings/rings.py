@@ -47,7 +47,8 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     if not rings:
         return rim
     apart = max(np.hypot(*np.subtract(ring.center, rim.center)) for ring in rings)
-    sure = whole and apart < settings.same_axis_radii * expected.px
+    agree = apart < settings.same_axis_radii * expected.px
+    sure = whole and agree
     circles = [rim, *rings] if sure else rings
     weight = np.array([circle.std**-2.0 for circle in circles])
     centers = np.array([circle.center for circle in circles])
@@ -60,7 +61,7 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
         return replace(rim, center=(float(middle[0]), float(middle[1])), std=std)
     # What was taken for the rim is none, or part of one: the radius is the expected one.
     doubt = float(np.hypot(rim.radius_std, abs(rim.radius - expected.px)))
-    return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim)
+    return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim, agree)
 
 
 def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSettings) -> list[Circle]:

@@ -100,9 +100,9 @@ def apart_px(cable: RoughCable, fixed: Fixed) -> float:
     return float(np.hypot(*np.subtract(_axis(cable, fixed.side).center_px, fixed.cover.center_px)))
 
 
-def is_sure(cable: RoughCable, side: Side, sure_rim: float) -> bool:
-    """True if the cover was seen all round, so that it stands where it was found."""
-    return (_axis(cable, side).rim or 0.0) >= sure_rim
+def is_sure(cable: RoughCable, side: Side) -> bool:
+    """True if nothing else can have been taken for the cover: it stands where it was found."""
+    return _axis(cable, side).sure
 
 
 _SIDES: tuple[Side, Side] = ("left", "right")
