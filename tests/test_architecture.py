@@ -60,7 +60,7 @@ INSIDE = {
         ("curve_fit", "edges"),
         ("midline", "continuation"),
         ("path",),
-        ("measurement",),
+        ("measurement", "lay"),
     ],
     "pipeline.vision.render": [
         ("lens", "lighting", "sensor", "sheath"),

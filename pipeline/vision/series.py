@@ -19,6 +19,7 @@ from pipeline.records import Array, Centerline, Finding, Preview, Rejected, Scal
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
+from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
@@ -93,6 +94,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     shots, lines, side_findings = _measure_all(specimen, shots, calibration, settings)
     pairs = list(zip(shots, lines, strict=True))
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
+    lines = without_lay(lines, specimen.diameter_m, settings.curve)
     found, displacements = _told_by(shots, lines)
     findings = (
         *calibration.findings,

@@ -135,6 +135,15 @@ class CurveSettings(StageSettings):
         description="part of the penalty's bias that counts as uncertainty: an equilibrium is smoother than"
         " the penalty allows; with 1 the 95 % band of kappa covered 98.6 % of smooth bows, with 0 92 %, with 0.5 97 %",
     )
+    lay_pitch_widths: float = Field(
+        0.25, gt=0, description="widths; places along the cable at which the photos' midlines are held together"
+    )
+    lay_smooth_widths: float = Field(
+        1.5,
+        gt=0,
+        description="widths; standard deviation of the running mean that is left alone: of a wave four widths long, the"
+        " lay of a twisted pair, a twentieth is left, of a soft spot that long nine tenths",
+    )
     light_length_share: float = Field(
         0.25,
         gt=0,
