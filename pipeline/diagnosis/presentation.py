@@ -118,15 +118,20 @@ def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
 def named_causes(
     bench: Workbench, conclusion: Conclusion, again: Identified | None, extended: Curve | None
 ) -> list[CausePart]:
-    """One entry for each cause that was found, with its class of names, and its forms in the extended model."""
+    """One entry for each cause that was found, with its class of names, and its forms in the extended model.
+
+    Where forms add up, the size is that of the extended model, whose std allows for other forms than were found.
+    """
     parts = _named(bench, conclusion)
     if again is None or extended is None:
         return parts
     columns = len(extended.tangent_factor_Nm2[0])
-    return [
-        part.model_copy(update={"forms": forms(again.fitted, part.name, columns=columns, covariance=again.covariance)})
-        for part in parts
-    ]
+    found = []
+    for part in parts:
+        own = forms(again.fitted, part.name, columns=columns, covariance=again.covariance)
+        size, std = again.sizes.get(part.name, (part.estimate, part.std))
+        found.append(part.model_copy(update={"forms": own, "estimate": size, "std": std}))
+    return found
 
 
 def _named(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
