@@ -46,6 +46,15 @@ def rounded(value: float | None, std: float | None, *, decimal: str = ".") -> st
     return f"({inner})·10{_superscript(power)}"
 
 
+def alike(value: float, std: float | None, *, decimal: str = ".") -> str:
+    """Text of a computed number in a column beside measured ones with this standard deviation: to the same place."""
+    if std is None or not (math.isfinite(std) and std > 0.0) or not math.isfinite(value):
+        return plain(value, 5, decimal=decimal)
+    power = math.floor(math.log10(max(abs(value), std)))
+    readable = SMALLEST_FIXED <= power <= LARGEST_FIXED
+    return fixed(value, _decimals(std), decimal) if readable else plain(value, 5, decimal=decimal)
+
+
 def plain(value: float, digits: int = 3, *, decimal: str = ".", zeros: bool = False) -> str:
     """Text of a number to so many significant digits: for axes, ranges and settings, which are chosen, not measured.
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pipeline.rounding import plain, rounded
+from pipeline.rounding import alike, plain, rounded
 
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
@@ -32,6 +32,12 @@ class Unit:
         if value is None:
             return "–"
         return rounded(self.factor * value, None if std is None else self.factor * std, decimal=self.decimal)
+
+    def alike(self, value: float | None, std: float | None) -> str:
+        """A computed number in a column beside measured ones, both given in SI units, without the unit."""
+        if value is None:
+            return "–"
+        return alike(self.factor * value, None if std is None else self.factor * std, decimal=self.decimal)
 
     def plain(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number, given in SI units, with the unit."""

@@ -9,25 +9,37 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import POSITIVE, settings_options
 
 if TYPE_CHECKING:
     from pipeline.diagnosis.design import Design
 
 
 @click.command(short_help="What a planned test could see.")
-@click.option("--length-mm", default=181.0, show_default=True, help="Cable length between the bearing axes.")
-@click.option("--ei-rest", default=0.018, show_default=True, help="Expected bending stiffness at rest, N m^2.")
-@click.option("--ei-far", default=0.008, show_default=True, help="Expected bending stiffness far from rest, N m^2.")
-@click.option("--kc", default=4.5, show_default=True, help="Curvature over which one goes over into the other, 1/m.")
+@click.option(
+    "--length-mm", default=181.0, show_default=True, type=POSITIVE, help="Cable length between the bearing axes."
+)
+@click.option(
+    "--ei-rest", default=0.018, show_default=True, type=POSITIVE, help="Expected bending stiffness at rest, N m^2."
+)
+@click.option(
+    "--ei-far", default=0.008, show_default=True, type=POSITIVE, help="Expected bending stiffness far from rest, N m^2."
+)
+@click.option(
+    "--kc", default=4.5, show_default=True, type=POSITIVE,
+    help="Curvature over which one goes over into the other, 1/m.",
+)  # fmt: skip
 @click.option("--k0", default=2.0, show_default=True, help="Expected pre-curvature, 1/m.")
 @click.option("--steps", default=3, show_default=True, type=click.IntRange(1, 100), help="Loading steps.")
-@click.option("--step-mm", default=4.6, show_default=True, help="Displacement of a step.")
+@click.option("--step-mm", default=4.6, show_default=True, type=POSITIVE, help="Displacement of a step.")
 @click.option("--mounted/--no-mounted", default=True, show_default=True, help="Photograph the force-free cable.")
 @click.option("--unload/--no-unload", default=False, show_default=True, help="Measure the way back in the same steps.")
 @click.option("--photos/--no-photos", default=True, show_default=True, help="Photos, or forces alone.")
-@click.option("--px-per-mm", default=11.0, show_default=True, help="Scale of the photos.")
-@click.option("--force-noise", default=0.003, show_default=True, help="Noise of a force sample, share of the largest.")
+@click.option("--px-per-mm", default=11.0, show_default=True, type=POSITIVE, help="Scale of the photos.")
+@click.option(
+    "--force-noise", default=0.003, show_default=True, type=POSITIVE,
+    help="Noise of a force sample, share of the largest.",
+)  # fmt: skip
 @click.option("--samples", default=8, show_default=True, type=click.IntRange(1), help="Force samples in a hold.")
 @click.option("--json", "as_json", is_flag=True, help="The outlook as JSON on stdout.")
 @settings_options

@@ -10,6 +10,8 @@ import click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
 
 def settings_options(command: Command) -> Command:
     """Add ``--settings FILE`` and ``--set section.key=value``, as ``settings_file`` and ``assignments``."""

@@ -113,7 +113,7 @@ def _sentence(result: Result, words: Words) -> str:
         low=words.curvature(curve.kappa[0]),
         high=words.curvature(curve.kappa[-1]),
     )
-    rest = words.measured(*pre_curvature(result, curve))
+    rest = _together(words.measured(*pre_curvature(result, curve)))
     return f"{text} {words('answer_pre_curvature', value=rest)}"
 
 

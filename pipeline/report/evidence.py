@@ -205,7 +205,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
                 words.branch(step.branch),
                 words.number(1e3 * step.displacement_m, 5),
                 unit.number(step.force_N, step.force_std_N),
-                "–" if step.force_fit_N is None else words.number(unit.factor * step.force_fit_N, 5),
+                unit.alike(step.force_fit_N, step.force_std_N),
                 "–" if rest is None else unit.number(rest, step.force_std_N),
                 "–" if sigma is None else words.fixed(sigma, 1),
             ]

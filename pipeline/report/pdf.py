@@ -123,10 +123,10 @@ def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
         sheets = [_answer_sheet(result, words, settings)]
         if result.steps or curves(result):
             sheets.append(_mechanics_sheet(result, words, settings))
-        sheets.append(_photo_sheet(result, words, settings))
         view = diagnosis_view(result, words, settings, figures=False)
         if view is not None and view.examined and result.diagnosis is not None:
             sheets.append(_diagnosis_sheet(result, result.diagnosis, view, words, settings))
+        sheets.append(_photo_sheet(result, words, settings))
         file = io.BytesIO()
         metadata = {
             "CreationDate": None,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.rounding import plain, rounded
+from pipeline.rounding import alike, plain, rounded
 
 
 @pytest.mark.parametrize(
@@ -45,6 +45,14 @@ def test_plain_number(value, digits, text):
 
 def test_plain_number_keeps_zeros_on_request():
     assert plain(8.7, 3, zeros=True) == "8.70"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [(1.926, 0.0024, "1,9260"), (0.0, 0.0024, "0,0000"), (1.926, 0.0, "1,926"), (1.926, None, "1,926")],
+)
+def test_computed_number_in_the_column_of_a_measured_one(value, std, text):
+    assert alike(value, std, decimal=",") == text
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6))

@@ -48,14 +48,18 @@ class Page(HTMLParser):
         return re.sub(r"\s+", " ", " ".join(self.texts))
 
 
+def headline(text):
+    """The first sentence, whose quantities no line break takes apart."""
+    return re.search(r"<h1>(.*?)</h1>", text, re.DOTALL)[1].replace("\N{NO-BREAK SPACE}", " ")
+
+
 @pytest.fixture(scope="module")
 def page(full_result):
     return report_html(full_result)
 
 
 def test_the_answer_comes_first_with_its_uncertainty(page):
-    heading = re.search(r"<h1>(.*?)</h1>", page, re.DOTALL)[1]
-    heading = heading.replace("\N{NO-BREAK SPACE}", " ")
+    heading = headline(page)
     assert "falls from 20.00 ± 0.13 mN m² at κ = 2.00 1/m to 8.54 ± 0.13 mN m²" in heading
     assert "K0 = 2.004 ± 0.013 1/m" in heading
     assert page.index("<h1>") < page.index('id="characteristic"') < page.index('id="photos"') < page.index('id="data"')
@@ -148,8 +152,7 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
 def test_answer_is_that_of_the_extended_model(diagnosed):
     result = diagnosed("named")
     curve = result.diagnosis.extended
-    heading = re.search(r"<h1>(.*?)</h1>", report_html(result), re.DOTALL)[1]
-    heading = heading.replace("\N{NO-BREAK SPACE}", " ")
+    heading = headline(report_html(result))
     assert f"{1e3 * curve.tangent_Nm2[0]:.2f} ± {1e3 * curve.tangent_std_Nm2[0]:.2f}" in heading
 
 
@@ -178,7 +181,7 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
     nothing = dict.fromkeys(("inverse", "balance", "agreement")) | {"status": "failed"}
     nothing |= {"photos": refused, "steps": steps}
     page = report_html(full_result.model_copy(update=nothing), ReportSettings(language="de"))
-    heading = re.search(r"<h1>(.*?)</h1>", page, re.DOTALL)[1]
+    heading = headline(page)
     assert heading == (
         f"cable-07 wurde nicht vermessen: Keines seiner 2 Fotos war verwendbar. Das erste: {refused[0].image}: "
         "die Datei ist leer"
@@ -225,9 +228,7 @@ def test_unsupported_points_are_not_drawn(full_result):
     supported = [kappa < 6.0 for kappa in curve.kappa_per_m]
     inverse = full_result.inverse.model_copy(update={"curve": curve.model_copy(update={"supported": supported})})
     last = max(kappa for kappa in curve.kappa_per_m if kappa < 6.0)
-    heading = re.search(r"<h1>(.*?)</h1>", report_html(full_result.model_copy(update={"inverse": inverse})), re.DOTALL)[
-        1
-    ]
+    heading = headline(report_html(full_result.model_copy(update={"inverse": inverse})))
     assert f"at κ = {last:.2f} 1/m" in heading
 
 
@@ -254,7 +255,7 @@ def test_curve_without_covariance_gives_a_bound(full_result):
 
 
 def test_answer_of_an_extended_model_speaks_of_its_own_pre_curvature(diagnosed):
-    heading = re.search(r"<h1>(.*?)</h1>", report_html(diagnosed("named")), re.DOTALL)[1]
+    heading = headline(report_html(diagnosed("named")))
     assert "K0 = 2.00000 ± 0.00005 1/m" in heading  # where the moment of its own curve is zero
     assert "Before the extension: The two independent ways agree" in report_html(diagnosed("named"))
 
