@@ -90,6 +90,7 @@ def solve(
     memory: Memory | None = None,
     start: Start | Equilibrium | None = None,
     branch: Branch = "natural",
+    patient: bool = True,
 ) -> Equilibrium:
     """Equilibrium of ``rod`` under ``hold``.
 
@@ -103,6 +104,9 @@ def solve(
     start : Start or Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape.
     branch : {"natural", "opposite", "up", "down"}
+    patient : bool
+        Else, with a warm start, no path is followed where neither that nor a bowed guess leads to the equilibrium: most
+        often there is none then, and to follow a path to its end costs fifty equilibria.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def solve(
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
     side = bow_side(rod, branch)
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, start, side, branch):
+    for attempt in _attempts(system, start, side, branch, patient=patient):
         verdicts.append(attempt)
         if attempt.found:
             break
@@ -123,7 +127,9 @@ def solve(
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
-def _attempts(system: System, start: Start | Equilibrium | None, side: int, branch: Branch) -> Iterator[Trial]:
+def _attempts(
+    system: System, start: Start | Equilibrium | None, side: int, branch: Branch, *, patient: bool
+) -> Iterator[Trial]:
     """Ways to the equilibrium, the cheapest first: warm start, bowed guess, path from the force-free shape or guess."""
     first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     if first is not None:
@@ -132,6 +138,8 @@ def _attempts(system: System, start: Start | Equilibrium | None, side: int, bran
     bowed = bowed_start(system, side) if side and system.hold.tip is None else None
     if bowed is not None:
         yield judged(system, newton(system, bowed), side)
+        if first is not None and not patient:
+            return
     if first is not None:
         yield judged(system, followed(system, first), side)
     straight = not np.any(system.rod.section.pre_curvature)

@@ -115,6 +115,8 @@ def refit_one(
         setting = suspicion.terms[direction].variant.setting
         if found is not None and (setting not in best or _cost(found) < _cost(best[setting])):
             best[setting] = found
+        if found is not None and found.chi2 >= hopeless and _are_starts_only(suspicion, cause):
+            break
     if not best:
         return None
     if suspicion.causes[cause].combines:
@@ -122,6 +124,12 @@ def refit_one(
             best[setting] = _with_more_forms(observation, one, setting, suspicion, settings, hopeless)
             best[setting] = _as_one_spot(observation, best[setting], settings)
     return explanation_of((cause,), base, min(best.values(), key=_cost), suspicion)
+
+
+def _are_starts_only(suspicion: Suspicion, cause: int) -> bool:
+    """Whether the forms of a cause differ by nothing but a number that a refit tunes, and of them one acts alone."""
+    variants = [suspicion.terms[k].variant for k in suspicion.of(cause)]
+    return not suspicion.causes[cause].combines and all(v.tuned and v.setting == variants[0].setting for v in variants)
 
 
 def _cost(fitted: Fit) -> float:
@@ -178,21 +186,34 @@ def fit_terms(
         guesses = [base.extension.base.neutral(bend=bend) for bend in (shift, -shift)]
         starts += [_start(extension, guess, terms, amounts, 1.0) for guess in guesses if len(guess) == len(base.vector)]
     best: Fit | None = None
-    for start in starts:
-        if best is not None and best.converged and best.chi2 >= hopeless:
+    for count, start in enumerate(starts):
+        # beside a base model that has not settled the first start proves nothing
+        if count > (not base.converged) and best is not None and best.converged and best.chi2 >= hopeless:
             break
-        found = _fit_from(observation, extension, start, base, settings)
+        found = _fit_from(observation, extension, start, base, settings, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
     return best
 
 
 def _fit_from(
-    observation: Observation, extension: Extension, start: Array, near: Fit, settings: DiagnosisSettings
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    near: Fit,
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float = np.inf,
 ) -> Fit:
     """A refit as the settings ask for it, its equilibria sought from those of a fitted neighbour."""
     return fit(
-        observation, extension, start, iterations=settings.iterations, tolerance=settings.tolerance, near=near.run
+        observation,
+        extension,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=near.run,
+        hopeless=hopeless,
     )
 
 

@@ -240,6 +240,7 @@ def fit(
     cutoff: float = 1e-7,
     begin: Fit | None = None,
     kept: NDArray[np.bool_] | None = None,
+    hopeless: float = np.inf,
 ) -> Fit:
     """Gauss-Newton with shortened steps from ``start``.
 
@@ -260,6 +261,9 @@ def fit(
         Fit of this model to this observation, to go on from: nothing is computed anew at its vector.
     kept : (N,) bool or None
         Rows the model is fitted to; all of them are predicted.
+    hopeless : float
+        Chi-square above which the fit is of no use: it ends where the steps left, each as good as the last, would not
+        get there; as converged if whole steps are taken and the linear model promises no more either.
 
     Returns
     -------
@@ -282,11 +286,14 @@ def fit(
         state = _State(vector, base_model, here, value)
         jacobian = sensitivities(observation, extension, vector, base_model, here)
     rows = np.ones(len(state.value), dtype=bool) if kept is None else kept
-    converged, damping, crawled = False, 0.0, 0
-    for _ in range(iterations):
+    converged, damping, crawled, fall = False, 0.0, 0, np.inf
+    for left in range(iterations, 0, -1):
         scaled = _Scaled(jacobian[rows], state.value[rows], cutoff)
         if scaled.expected < tolerance:
             converged = True
+            break
+        if state.cost(rows) - left * fall > hopeless:
+            converged = damping == 0.0 and state.cost(rows) - scaled.expected > hopeless
             break
         accepted = _lower(observation, extension, state, scaled, damping, rows)
         if accepted is None:
@@ -337,7 +344,7 @@ def _lower(
         if not extension.admissible(trial):
             continue
         base_model = extension.base_model(trial)
-        there = run(extension.model(trial, of=base_model), extension.facts, near=state.here)
+        there = run(extension.model(trial, of=base_model), extension.facts, near=state.here, patient=False)
         value = whole_residual(observation, there.prediction, trial, extension.prior)
         if value is not None and np.sum(value[rows] ** 2) < state.cost(rows):
             return _State(trial, base_model, there, value), used

@@ -43,7 +43,7 @@ class Run:
     advice: str = ""
 
 
-def run(model: Model, facts: Facts, *, near: Run | None = None) -> Run:
+def run(model: Model, facts: Facts, *, near: Run | None = None, patient: bool = True) -> Run:
     """Simulate all steps and observe them.
 
     Parameters
@@ -52,11 +52,13 @@ def run(model: Model, facts: Facts, *, near: Run | None = None) -> Run:
     facts : Facts
     near : Run or None
         A run of a similar model: warm start, and no new simulation at all where only the observers differ.
+    patient : bool
+        Whether an equilibrium that is not found near those of ``near`` is sought along paths, see `rod.equilibrium`.
     """
     if near is not None and near.model.bending is model.bending and near.model.shift is model.shift:
         steps, bare = near.steps, near.bare
     else:
-        steps, bare = _simulated(model, facts, near), None
+        steps, bare = _simulated(model, facts, near, patient=patient), None
     failed = next((step for step in steps if not step.good), None)
     if failed is not None:
         return Run(model, steps, None, None, failed.outcome.advice)
@@ -101,7 +103,7 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
     return [group for group in (*groups, (pushed, "up", False)) if group[0]]
 
 
-def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibrium, ...]:
+def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -> tuple[Equilibrium, ...]:
     """Equilibria of all steps in their order; those up to the first failure where a step has none.
 
     The search for an equilibrium that does not exist costs a hundred that do, so the first failure ends it.
@@ -117,7 +119,7 @@ def _simulated(model: Model, facts: Facts, near: Run | None) -> tuple[Equilibriu
         for i in index:
             start = near.steps[i] if near is not None and usable and near.steps[i].good else last
             hold = model.bending.hold("forces", 0.0) if free else model.bending.hold("displacements", displacement[i])
-            here = solve(model.bending.rod, hold, memory=memory, start=start, branch=side)
+            here = solve(model.bending.rod, hold, memory=memory, start=start, branch=side, patient=patient)
             if not here.good:
                 return (here,)
             memory, last = here.after, here
