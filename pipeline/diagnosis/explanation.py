@@ -237,8 +237,10 @@ def _linear_start(
     trials.append(_start(extension, base.vector, added, amounts, SHARES[-1]))
     costs = []
     for trial in trials:
-        shown = run(extension.model(trial), extension.facts, near=base.run) if extension.admissible(trial) else None
-        value = whole_residual(observation, shown.prediction, trial, extension.prior) if shown else None
+        value = None
+        if extension.admissible(trial):
+            shown = run(extension.model(trial), extension.facts, near=base.run, patient=False)
+            value = whole_residual(observation, shown.prediction, trial, extension.prior)
         costs.append(np.inf if value is None else float(value @ value))
     return trials[int(np.argmin(costs))]
 
