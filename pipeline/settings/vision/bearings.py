@@ -108,6 +108,16 @@ class BearingSettings(StageSettings):
         description="radii from where a cable is lost to the centre of a cover; letters up to its rim hide 0.9 of it, a"
         " dot of half the cover's size lies two of its own radii ahead",
     )
+    lost_cable_reach: float = Field(
+        3.1, gt=1, description="radii; the same where another end shows that it is a cover: as far as it is searched"
+    )
+    inner_disc: float = Field(
+        0.82,
+        gt=0,
+        lt=1,
+        description="radii; bright middle of a cover whose rim is of the ground's look: sought between 0.72 and 0.92,"
+        " smaller ones are marks, larger ones pass for the rim",
+    )
     rim_tolerance: float = Field(
         0.015,
         gt=0,
@@ -147,6 +157,11 @@ class BearingSettings(StageSettings):
     )
     cover_margin_widths: float = Field(
         0.1, ge=0, description="widths; the blurred rim of a cover spoils the edges so far beyond its circle"
+    )
+    stroke_widths: float = Field(
+        0.25,
+        gt=0,
+        description="widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it",
     )
     cut_std_widths: float = Field(
         0.04, gt=0, description="widths; a cut with pliers is square and the path centred to about a twentieth"

@@ -46,11 +46,11 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
         for photo, cable in seen
         for end in visible_ends(cable)
     ]
-    for measured in (_at_end, _to_mark, _beyond_end):
+    for measured in (_at_end, _to_mark):
         radii = _alike((measured(end) for end in ends), settings)
         if radii is not None:
             return float(np.median(radii))
-    return None
+    return _common(ends, settings) if ends else None
 
 
 def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[float] | None:
@@ -131,10 +131,20 @@ def _at_end(lost: _LostEnd) -> float | None:
     return next((radius for radius, ahead in lost.circles() if abs(ahead - 1.0) <= limit), None)
 
 
-def _beyond_end(lost: _LostEnd) -> float | None:
-    """The largest circle before whose rim the cable may have been lost: letters or a shadow hide its last.
+def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
+    """The largest circle that is seen beyond all ends, nearly all round, wherever each was lost before it.
 
-    The largest, for a bevel or a dot on a cover lies as far beyond its own rim.
+    White bands, letters and shadows hide the last of a cable. At one end it must be lost so near that the circle is no
+    dot, which lies farther ahead; the largest, for a bevel lies on the same axis.
     """
-    low, high = 1.0 - lost.settings.end_on_rim, lost.settings.lost_before_rim
-    return max((radius for radius, ahead in lost.circles() if low <= ahead <= high), default=None)
+    for radius, _ in sorted(ends[0].circles(), reverse=True):
+        alike = [_nearest(end, radius) for end in ends]
+        ahead = [circle[1] for circle in alike if circle is not None]
+        radii = _alike((None if circle is None else circle[0] for circle in alike), settings)
+        if radii is not None and max(ahead) <= settings.lost_cable_reach and min(ahead) <= settings.lost_before_rim:
+            return float(np.median(radii))
+    return None
+
+
+def _nearest(lost: _LostEnd, radius: float) -> tuple[float, float] | None:
+    return min(lost.circles(), key=lambda circle: abs(circle[0] - radius), default=None)

@@ -48,7 +48,19 @@ def find_cover(
     found = find_rim(photo, end, radius, width_px, settings)
     if found is not None and found.rim >= settings.sure_rim:
         return with_rings(photo, found, radius, settings)
-    return _by_marks(photo, end, radius, found, settings)
+    marked = _by_marks(photo, end, radius, found, settings)
+    return marked if marked is not None else _by_inner_disc(photo, end, radius, width_px, settings)
+
+
+def _by_inner_disc(
+    photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
+) -> Circle | None:
+    """Cover with a middle that stands out, all round, of a rim that does not: the middle tells the axis."""
+    inner = Radius(settings.inner_disc * radius.px, 0.5 * settings.search_radii)
+    disc = find_rim(photo, end, inner, width_px, settings)
+    if disc is None or disc.rim < settings.sure_rim:
+        return None
+    return replace(disc, radius=radius.px, radius_std=0.1 * radius.px, marked=True)
 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings) -> Circle | None:

@@ -248,9 +248,20 @@ def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
 def test_size_of_covers_is_told_where_letters_hide_the_last_of_the_cable() -> None:
     lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
     photos = painted_covers(lefts, right, radius, disc_grey=215.0)
-    seen = [(photo, cable_to_the_rims(left, right, 1.6 * radius)) for photo, left in zip(photos, lefts, strict=True)]
+    lost = [cable_to_the_rims(left, right, 1.6 * radius) for left in lefts]
+    seen = [(photos[0], lost[0]), (photos[1], replace(lost[1], visible=(0, 77)))]  # 10 px more at one end
     found = cover_radius(seen, STAGE)
     assert found is not None and abs(found - radius) < 0.3  # a soft shadow lies beside the rim
+
+
+def test_bright_middle_tells_the_axis_of_a_cover_whose_rim_is_like_the_ground() -> None:
+    left, right, radius = (90.4, 120.7), (610.3, 90.6), 36.0
+    photo = painted_covers([left], right, STAGE.inner_disc * radius, disc_grey=215.0)[0]
+    ends = visible_ends(cable_to_the_rims(left, right, radius))
+    bearings = find_bearings(photo, ends, 28.0, BearingHints(cover_px=2.0 * radius), STAGE)
+    for bearing, true in zip(bearings, (left, right), strict=True):
+        assert bearing is not None and bearing.radius_px == radius
+        assert np.abs(np.subtract(bearing.center_px, true)).max() < 0.3  # a soft shadow lies beside the disc
 
 
 def test_one_cover_without_a_screw_tells_no_size() -> None:
