@@ -44,6 +44,7 @@ INSIDE = {
         ("judgement",),
         ("segmentation",),
         ("shots",),
+        ("picture_size",),
         ("series",),
     ],
     "pipeline.vision.scale": [("plane",), ("calibration", "chord"), ("board",)],

@@ -153,6 +153,13 @@ def reduce_area(pixels: Pixels, size: tuple[int, int]) -> Pixels:
     return pixels if pixels.shape[1::-1] == size else _mean_over(pixels, size)
 
 
+def levels(photo: Photo) -> tuple[float, float]:
+    """Darkest and brightest of the broad parts of a picture, some sixty along its long side; 0 black, 1 white."""
+    factor = max(1.0, max(photo.size) / 64.0)
+    broad = reduce_area(photo.pixels, (max(1, int(photo.size[0] / factor)), max(1, int(photo.size[1] / factor))))
+    return float(broad.min()) / photo.full_scale, float(broad.max()) / photo.full_scale
+
+
 def _mean_over(pixels: Pixels, size: tuple[int, int]) -> Pixels:
     return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), pixels.dtype)
 

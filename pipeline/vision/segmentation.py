@@ -4,8 +4,9 @@
 judged one by one (judgement) -> RoughCable``
 
 The cable is the longest strip of the right width; known bearings decide between candidates. Refused with a code:
-``photo/nothing``, ``photo/contrast``, ``photo/two-candidates``, ``photo/crossing``, ``photo/leaves-frame``,
-``photo/width`` (a mask split along a highlight, or another thing), ``photo/blur``, ``photo/bearing``.
+``photo/nothing``, ``photo/blank``, ``photo/contrast``, ``photo/two-candidates``, ``photo/crossing``,
+``photo/leaves-frame``, ``photo/width`` (a mask split along a highlight, or another thing), ``photo/blur``,
+``photo/bearing``.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision import VisionSettings
+from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.judgement import Cable, judge_strip, refused
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, read_photo
@@ -64,7 +66,11 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
     leaving: list[Array] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
-            return _nothing(photo, standout, readings[0], known=wanted.width is not None) if first is None else first
+            if first is not None:
+                return first
+            return _blank(photo, settings.photo) or _nothing(
+                photo, standout, readings[0], known=wanted.width is not None
+            )
         outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
         if isinstance(outcome, RoughCable):
             return first if first is not None and _is_part(outcome, leaving) else outcome
@@ -136,6 +142,18 @@ def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wa
         length = cable.length_px / standout.reduction
         least, most = stage.visible_share * length, stage.max_length_ratio * length
     return Wanted(width, least, most, across_objects=cable.bearings.cover_radius(1.0) is None)
+
+
+def _blank(photo: Photo, stage: PhotoSettings) -> Rejected | None:
+    """A picture of one level, such as that of a lens cap."""
+    darkest, brightest = levels(photo)
+    if brightest - darkest > stage.blank_range:
+        return None
+    text = (
+        f"the picture shows nothing: its brightness is {50 * (darkest + brightest):.0f} % everywhere; look after lens "
+        "cap, lamp and exposure"
+    )
+    return refused(photo, "photo/blank", text, brightness=0.5 * (darkest + brightest))
 
 
 def _nothing(photo: Photo, standout: Standout, reading: Reading, *, known: bool) -> Rejected:

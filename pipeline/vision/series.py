@@ -23,6 +23,7 @@ from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
+from pipeline.vision.picture_size import of_one_size
 from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.board import calibrate_by_board
@@ -84,6 +85,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     """
     calibration = _given_calibration(specimen, settings)
     shots, cover_findings = find_cables(specimen, calibration, settings)
+    shots, size_findings = of_one_size(shots, settings.series)
     if calibration is None:
         found, displacements = _told_by(shots, [shot.found for shot in shots])
         calibration = from_found(specimen, found, displacements, settings.calibration)
@@ -99,6 +101,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     findings = (
         *calibration.findings,
         *cover_findings,
+        *size_findings,
         *side_findings,
         *check_scale(specimen, calibration, found, displacements, settings.calibration),
         *_check_lengths(specimen, lines, settings.series),
@@ -192,7 +195,7 @@ def _name_sides(
     if moving != specimen.rig.moving_bearing:
         du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
         if du <= np.tan(np.radians(settings.bearings.vertical_deg)) * dv:
-            flipped = [Shot(s.step, _reversed(s.found), s.preview) for s in shots]
+            flipped = [replace(shot, found=_reversed(shot.found)) for shot in shots]
             return flipped, _fixed_moved(steps, moving, calibration, settings.series)
         text = (
             f"The {moving} bearing moves on the photos, specimen.toml says moving_bearing = "

@@ -31,11 +31,12 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Shot:
-    """One photo of the series: its step, and the cable found on it or the reason why not."""
+    """One photo of the series: its step, the cable found on it or the reason why not, and its size if it has one."""
 
     step: LoadStep
     found: RoughCable | Rejected
     preview: Preview | None
+    size: tuple[int, int] | None = None
 
 
 def find_cables(
@@ -115,7 +116,7 @@ def _find_all(
         found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near))
         if isinstance(found, RoughCable):
             near, last = found, step
-        shots.append(Shot(step, found, reduce_photo(photo, settings.preview)))
+        shots.append(Shot(step, found, reduce_photo(photo, settings.preview), photo.size))
     return shots
 
 

@@ -17,6 +17,9 @@ class PhotoSettings(StageSettings):
         800.0, gt=0, description="MB; a larger file is refused unread: 120 Mpx of 16-bit colour are 720 MB"
     )
     min_side_px: int = Field(32, ge=1, description="px; a smaller picture shows no cable of five widths and its ground")
+    blank_range: float = Field(
+        0.03, gt=0, description="of the full range; a picture whose broad parts differ by less shows nothing"
+    )
 
 
 class PreviewSettings(StageSettings):

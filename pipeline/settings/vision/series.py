@@ -25,6 +25,12 @@ class SeriesSettings(StageSettings):
     max_length_spread: float = Field(
         0.005, gt=0, description="relative; a cable's length is constant, tracing repeats within a tenth of this"
     )
+    cropped_length: float = Field(
+        0.03,
+        gt=0,
+        description="relative; of the cable's length in px on a photo of another size: it is found within a third of"
+        " that, and nobody scales a photo by less",
+    )
     max_length_deviation: float = Field(
         0.01, gt=0, description="relative; length_mm is measured to about half a percent and so is the scale"
     )

@@ -1,0 +1,62 @@
+"""Photos of one series have one size; a photo of another was cropped, or it was scaled and has a scale of its own.
+
+A photo that was cropped shows the cable as long, in px, as the others do, and is used. Turned by a quarter it has the
+same size.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.records import Finding, Rejected
+from pipeline.settings.vision.series import SeriesSettings
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.shots import Shot
+
+
+def of_one_size(shots: list[Shot], settings: SeriesSettings) -> tuple[list[Shot], tuple[Finding, ...]]:
+    """Refuse photos of another size than most that were not merely cropped.
+
+    Parameters
+    ----------
+    shots : list of Shot
+    settings : SeriesSettings
+
+    Returns
+    -------
+    list of Shot
+        Where no size is that of more than half of the photos, or none of those shows the cable, as they came.
+    tuple of Finding
+        ``photo/size`` of each photo that was cropped.
+    """
+    sizes = [tuple(sorted(shot.size)) for shot in shots if shot.size is not None]
+    usual, count = Counter(sizes).most_common(1)[0] if sizes else ((), 0)
+    lengths = [
+        shot.found.length_px
+        for shot in shots
+        if shot.size is not None and tuple(sorted(shot.size)) == usual and isinstance(shot.found, RoughCable)
+    ]
+    if 2 * count <= len(sizes) or not lengths:
+        return shots, ()
+    settled, findings = [], []
+    for shot in shots:
+        if shot.size is None or tuple(sorted(shot.size)) == usual:
+            settled.append(shot)
+            continue
+        name, size = shot.found.image, f"{shot.size[0]} x {shot.size[1]} px"
+        most = f"{usual[1]} x {usual[0]} px"
+        ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
+        if abs(ratio - 1.0) <= settings.cropped_length:
+            text = f"{name} has {size}, most photos have {most}; it was cropped, as the cable's length on it shows."
+            findings.append(Finding("photo/size", "info", text))
+            settled.append(shot)
+            continue
+        reason = (
+            f"{name}: the picture has {size}, most photos of the specimen have {most}; it was scaled or taken "
+            "otherwise, and their scale does not hold for it."
+        )
+        settled.append(replace(shot, found=Rejected(name, "photo/size", reason)))
+    return settled, tuple(findings)
