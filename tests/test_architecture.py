@@ -54,6 +54,7 @@ INSIDE = {
         ("bands", "closeup"),
         ("candidates",),
         ("ends",),
+        ("beyond",),
     ],
     "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes", "steady")],
     "pipeline.vision.centerline": [

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
@@ -19,6 +20,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.bands import by_diameter
+from pipeline.vision.search.beyond import goes_on, shaded
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across
@@ -120,7 +122,9 @@ def judge_strip(
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = _cut(standout, path, reading, cable, stage)
-    refusal = _check_width(photo, cut, standout.reduction, cable, stage)
+    refusal = _check_width(photo, cut, standout.reduction, cable, stage) or _check_ends(
+        photo, standout, cut, axes, stage
+    )
     return refusal if refusal is not None else _assemble(photo, standout, cut, axes, cable, settings)
 
 
@@ -239,6 +243,25 @@ def _check_width(
     return None
 
 
+def _check_ends(
+    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
+) -> Rejected | None:
+    """Refuse a strip that is a piece of the cable only: beyond its visible end the cable goes on."""
+    width = float(np.nanmedian(cut.width))
+    for axis, at_start in zip(axes, (True, False), strict=True):
+        if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, stage, at_start=at_start):
+            u, v = axis.center_px
+            return refused(
+                photo,
+                "photo/hidden-end",
+                f"the cable was followed to ({u:.0f}, {v:.0f}) px only and seems to go on beyond: something lies across"
+                " it or shades it there",
+                u_px=float(u),
+                v_px=float(v),
+            )
+    return None
+
+
 def _assemble(
     photo: Photo,
     standout: Standout,
@@ -249,7 +272,7 @@ def _assemble(
 ) -> RoughCable | Rejected:
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.step > stage.seen_share * cut.contrast, float(np.nanmedian(cut.width)))
+    kept = without_specks(_seen(standout, cut, stage), float(np.nanmedian(cut.width)))
     path = path[kept]
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
         path, axes = path[::-1], axes[::-1]
@@ -286,6 +309,12 @@ def _assemble(
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
         findings=tuple(_hidden_end(axis) for axis in axes if axis.kind == "clamp"),
     )
+
+
+def _seen(standout: Standout, cut: CrossCut, stage: SegmentationSettings) -> NDArray[np.bool_]:
+    """Sections on which the cable is seen: it stands out, or looks the same but for a shadow."""
+    dimmed = shaded(standout, cut, float(np.nanmedian(cut.width)), stage)
+    return (cut.step > stage.seen_share * cut.contrast) | dimmed
 
 
 def _hidden_end(axis: Bearing) -> Finding:

@@ -204,6 +204,12 @@ class CurveSettings(StageSettings):
         description="of the radius; a centerline that misses a cover's axis by more follows a flank, a shadow or a"
         " stripe: those missed by 0.85 and more, a cable sits in its bearing by a tenth",
     )
+    max_end_distance_radii: float = Field(
+        2.0,
+        gt=0,
+        description="of the radius; a curve that misses the cable's own visible end by more was led astray in a gap;"
+        " at a clamp's jaw, which the last sections feel, right ones missed by half a radius",
+    )
     axis_play_widths: float = Field(
         0.02,
         gt=0,

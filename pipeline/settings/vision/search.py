@@ -167,3 +167,21 @@ class SegmentationSettings(StageSettings):
         lt=90,
         description="degrees; over five widths a cable turns by less unless its bend radius is ten widths",
     )
+    beyond_widths: float = Field(
+        10.0, gt=0, description="widths; so far beyond a visible end more of the cable is looked for"
+    )
+    beyond_least_widths: float = Field(
+        2.5,
+        gt=0,
+        description="widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter",
+    )
+    beyond_width_off: float = Field(
+        0.15,
+        gt=0,
+        description="relative; a cable's width is constant within 5 %, where a line crosses it edges are lost",
+    )
+    beyond_contrast: tuple[float, float] = Field(
+        (0.6, 1.6),
+        description="of the strip's step by its ground's brightness; a shadow leaves it as it is, but stray light and"
+        " the camera's curve do not; covers and clamps differ by more",
+    )

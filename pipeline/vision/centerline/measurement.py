@@ -73,7 +73,7 @@ def measure_centerline(
     if refused is not None:
         return refused
     fit = _fit(sections, chord, width, breaks_m, options)
-    refused = _beside_cover(rough, fit, chord, width, options)
+    refused = _beside_axis(rough, fit, chord, width, options)
     if refused is not None:
         return refused
     return _assemble(rough, sections, chord, width, fit, diameter_m, options)
@@ -234,12 +234,24 @@ def _feet(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
     return feet, np.asarray(np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T))
 
 
-def _beside_cover(
+def _beside_axis(
     rough: RoughCable, fit: CurveFit, chord: ChordFrame, width: Array, options: CurveSettings
 ) -> Rejected | None:
-    """Refuse a curve that passes beside the axis of a cover that was found: it is not the cable's midline."""
-    found = np.array([bearing.radius_px is not None for bearing in (rough.left, rough.right)])
-    share = float((_feet(fit, chord)[1] * found).max()) / (0.5 * _width(width)[0])
+    """Refuse a curve that passes beside the axis of a cover that was found, or far beside the end that was seen."""
+    axes = (rough.left, rough.right)
+    covers = np.array([bearing.radius_px is not None for bearing in axes])
+    ends = np.array([bearing.kind in ("end", "clamp") for bearing in axes])
+    shares = _feet(fit, chord)[1] / (0.5 * _width(width)[0])
+    if (shares[ends] > options.max_end_distance_radii).any():
+        worst = float(shares[ends].max())
+        return Rejected(
+            rough.image,
+            "photo/bearing",
+            f"what was traced passes {worst:.2f} cable radii beside the cable's visible end: too little of the cable"
+            " between its ends was seen to follow it",
+            figure={"axis_distance_radii": worst},
+        )
+    share = float((shares * covers).max())
     if share <= options.max_axis_distance_radii:
         return None
     return Rejected(

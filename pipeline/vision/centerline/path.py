@@ -42,12 +42,14 @@ def fit_along(
     most = max(settings.min_intervals, round(length / (settings.knot_spacing_diameters * diameter)))
     intervals = min(most, max(settings.first_intervals, round(length / (settings.path_knot_diameters * diameter))))
 
+    guide_s = s
+
     def fit(correlation_length: float | None, iterations: int) -> CurveFit:
         frame = make_frame(0.0, length, intervals=intervals, order=settings.penalty_order, breaks=breaks)
         return fit_curve(
             points,
             std,
-            start=initial_curve(guide, s, frame),
+            start=initial_curve(guide, guide_s, frame),
             s=s,
             order=settings.penalty_order,
             longest=settings.longest_correlation_diameters * diameter,
@@ -61,6 +63,9 @@ def fit_along(
         if quick.smooth.freedom < settings.crowded_share * quick.curve.frame.size:
             break
         intervals = min(2 * intervals, most)
+        # more knots follow points with a gap among them worse than they follow the curve by fewer
+        s, guide_s = quick.s, np.linspace(0.0, length, 8 * intervals)
+        guide = quick.curve.at(guide_s)[0]
     return fit(None, 8)
 
 

@@ -38,12 +38,15 @@ class Standout:
         Grey value minus ground.
     covariance : (c, c)
         Of the ground's residual: texture and noise at this resolution.
+    picture : (h, w, c) float32
+        The reduced photo.
     """
 
     reduction: int
     offset_px: tuple[int, int]
     residual: Image
     covariance: Array
+    picture: Image
 
     def distance(self) -> Image:
         """Picture ``(h, w)``: colour distance from the ground in standard deviations of the ground."""
@@ -88,7 +91,7 @@ def stand_out(
     small = small[..., None] if small.ndim == 2 else small
     small *= np.float32(1.0 / photo.full_scale)
     residual = small - _ground(small)
-    return Standout(reduction, (u0, v0), residual, _covariance(residual, settings))
+    return Standout(reduction, (u0, v0), residual, _covariance(residual, settings), small)
 
 
 def _ground(small: Image) -> Image:

@@ -44,7 +44,7 @@ def find_end(
     width = reading.width
     trimmed = settings.trimmed_widths * width
     trimmed = trimmed if cover_radius_px is None else max(trimmed, 1.2 * cover_radius_px / standout.reduction)
-    body, outward = _body(path, width, trimmed)
+    body, outward = straight_body(path, width, trimmed)
     place, at_object = body[-1], False
     for step in np.arange(0.0, trimmed + 2.0 * width, 0.5):
         here = body[-1] + step * outward
@@ -57,7 +57,7 @@ def find_end(
     return CableEnd(standout.to_pixels(place), outward, at_object)
 
 
-def _body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
+def straight_body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
     """The path without the piece at its end that runs into a corner, and the direction in which it leaves there."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     count = int(np.searchsorted(s, s[-1] - trimmed))
@@ -84,7 +84,7 @@ def lead_to_axes(
         distance = np.hypot(*(path - center).T)
         path = path[: int(np.argmin(distance)) + 1]
         outside = np.flatnonzero(distance[: len(path)] > radius)
-        body, outward = _body(
+        body, outward = straight_body(
             path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, settings.trimmed_widths * width
         )
         steps = np.arange(1.0, max(_to_circle(body[-1], outward, center, radius), 1.0) + 1e-9)
@@ -118,9 +118,9 @@ def settle_end(
     """
     if axis.kind not in ("end", "clamp"):
         return axis, path
-    body, outward = _body(path, width, 1.5 * settings.trimmed_widths * width)
+    body, outward = straight_body(path, width, 1.5 * settings.trimmed_widths * width)
     reach = max(float((path[-1] - body[-1]) @ outward), 1.0)
-    path = _led_on(body, outward, reach, width)
+    path = led_on(body, outward, reach, width)
     settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
     if axis.kind == "clamp":
         return settled, path
@@ -130,19 +130,19 @@ def settle_end(
     points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
     u, v = (points[..., k].astype(np.float32) for k in (0, 1))
     profiles = cv2.remap(closeup.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    places = [_half_level(profile, along, width) for profile in profiles]
+    places = [_half_level(profile, along, width, settings.stroke_widths * width) for profile in profiles]
     known = np.array([place for place in places if place is not None])
     if len(known) < 5:
         return settled, path
     middle = float(np.median(known))
     # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
     std = float(np.hypot(1.4826 * np.median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
-    path = _led_on(body, outward, max(reach + middle, 1.0), width)
+    path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 
 
-def _led_on(body: Array, outward: Array, reach: float, width: float) -> Array:
-    """The body and a parabola through its last four widths, ``reach`` px onward."""
+def led_on(body: Array, outward: Array, reach: float, width: float) -> Array:
+    """The body and a parabola through its last four widths, ``reach`` onward, in the unit of the body."""
     across = np.array([-outward[1], outward[0]])
     along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
     # counted from the end: a loop may come back beside it
@@ -152,11 +152,16 @@ def _led_on(body: Array, outward: Array, reach: float, width: float) -> Array:
     return np.vstack([body, body[-1] + steps[:, None] * outward + parabola(steps)[:, None] * across])
 
 
-def _half_level(profile: Array, along: Array, width: float) -> float | None:
-    """Where the grey value leaves the cable's for the ground's; None without a clear step."""
+def _half_level(profile: Array, along: Array, width: float, stroke: float) -> float | None:
+    """Where the grey leaves the cable's for the ground's for longer than ``stroke``; None without a clear step."""
     cable, ground = np.median(profile[along < -0.6 * width]), np.median(profile[along > 0.6 * width])
     relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
-    fallen = np.flatnonzero((relief < 0.5) & (along > -0.6 * width))
+    low = relief < 0.5
+    # a stroke of print is no end: the sheath goes on beyond it
+    for start, stop in _runs(low):
+        if stop < len(low) and along[stop - 1] - along[start] < stroke:
+            low[start:stop] = False
+    fallen = np.flatnonzero(low & (along > -0.6 * width))
     if not len(fallen) or relief[i := int(fallen[0]) - 1] < 0.5:
         return None
     share = (relief[i] - 0.5) / (relief[i] - relief[i + 1])
