@@ -17,6 +17,7 @@ from pipeline.diagnosis.bootstrap import confirmed_limit
 from pipeline.diagnosis.conclusion import Conclusion
 from pipeline.diagnosis.explanation import Explanation, candidates, refit_one
 from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.friction_in_law import shared
 from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
 from pipeline.diagnosis.pairs import pair_gains
 from pipeline.diagnosis.presentation import present
@@ -88,6 +89,7 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
         reduced_chi2=singles[0].fitted.chi2 / freedom,
         implausible=settings.implausible,
     )
+    weight = shared(bench, singles, weight)
     members = _members(bench, singles, weight, settings)
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]

@@ -12,11 +12,13 @@ the misfit then is an error of the model, and neither the law nor its band may t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.extended import law_of
 from pipeline.diagnosis.fit import Extension, Fit, Term, fit, sensitivities, whole_residual
 from pipeline.diagnosis.observation import Observation
@@ -63,11 +65,15 @@ class Identified:
     sizes: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
-def identified_again(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Identified:
+def identified_again(
+    observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, in_law: Sequence[Cause] = ()
+) -> Identified:
     """The law of a fitted model identified again, or the fit as it is where a finer law has no equilibrium.
 
     Two fits: one under a wide prior, whose linearisation tells along what and how smooth the law is; then one under the
     likeliest prior, from whose linearisation mean and covariance over all priors follow.
+
+    ``in_law`` are causes that these data cannot tell from the law: its band leaves room for them at plausible size.
     """
     if fitted.extension.base.straight or len(fitted.extension.base.knots) < 3:
         return Identified(fitted, fitted.covariance)
@@ -83,7 +89,21 @@ def identified_again(observation: Observation, fitted: Fit, settings: DiagnosisS
     posterior = _averaged(observation, settled)
     mean = _at(observation, settled, posterior.mean)
     found = settled if mean is None else mean
-    return _with_other_forms(observation, Identified(found, posterior.covariance), settings)
+    covariance = _with_room_for(observation, found, in_law, settings) if in_law else posterior.covariance
+    return _with_other_forms(observation, Identified(found, covariance), settings)
+
+
+def _with_room_for(
+    observation: Observation, fitted: Fit, causes: Sequence[Cause], settings: DiagnosisSettings
+) -> Array:
+    """Covariance (p, p) of the vector where every form of the causes, of plausible size, is an unknown beside it."""
+    facts, size = fitted.extension.facts, fitted.extension.size
+    traces = [
+        cause.plausible(facts)
+        * suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace).columns
+        for cause in causes
+    ]
+    return _averaged(observation, fitted, beside=np.hstack(traces)).covariance[:size, :size]
 
 
 def _with_fine_law(fitted: Fit, count: int) -> tuple[Extension, Array]:

@@ -11,6 +11,7 @@ from pipeline.diagnosis.conclusion import Conclusion
 from pipeline.diagnosis.explanation import Explanation
 from pipeline.diagnosis.extended import curve, curve_change, forms, stiffness_change, stiffness_change_linear
 from pipeline.diagnosis.fit import Fit
+from pipeline.diagnosis.friction_in_law import FRICTION, hidden_in_law
 from pipeline.diagnosis.heldout import measured_gain
 from pipeline.diagnosis.identified_again import Identified, identified_again
 from pipeline.diagnosis.maps import residual_map, smooth_share
@@ -35,7 +36,10 @@ def present(
     gain, held = measured_gain(bench, accepted.fitted, settings) if accepted else (None, None)
     rows = table(bench, conclusion, settings, heldout=held.removed if held else None)
     seen = [(row.name, row.minimal_detectable or 0.0, row.unit) for row in _seen_at_plausible_size(bench, rows)]
-    again = None if accepted is None else identified_again(bench.observation, accepted.fitted, settings)
+    in_law = hidden_in_law(bench, conclusion.names) if conclusion.two is None else []
+    again = None
+    if accepted is not None:
+        again = identified_again(bench.observation, accepted.fitted, settings, in_law=in_law)
     extended = _extended(again, conclusion, settings)
     causes = named_causes(bench, conclusion, again, extended)
     verdict = decide(
@@ -55,6 +59,7 @@ def present(
         change=_change(bench, accepted, extended, identified),
         weakest=could_have_been_seen(seen, len(rows)),
         leftover=leftover["message"],
+        friction_in_law=bool(in_law),
     )
     return DiagnosisPart(
         verdict=verdict,
@@ -217,9 +222,13 @@ def _unseen_row(name: str, unit: str) -> CauseRow:
 
 
 def _seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
-    """Rows of causes that a plausible size would have shown, the clearest first."""
-    plausible = {cause.name: cause.plausible(bench.facts) for cause in bench.suspicion.causes}
-    seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible[r.name]]
+    """Rows of causes that a plausible size would have shown, the clearest first.
+
+    One form of friction between the wires may be seen on loading alone, but another is part of the law.
+    """
+    causes = [cause for cause in bench.suspicion.causes if bench.facts.returns or cause.name != FRICTION]
+    plausible = {cause.name: cause.plausible(bench.facts) for cause in causes}
+    seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible.get(r.name, 0.0)]
     return sorted(seen, key=lambda row: (row.minimal_detectable or 0.0) / plausible[row.name])
 
 

@@ -14,6 +14,8 @@ SPOKEN = {
     "in_plane_load": "in-plane load",
 }
 
+IN_LAW = "; loading alone does not tell friction between the wires from f_EI, so the band of f_EI leaves room for it"
+
 
 def spoken(name: str) -> str:
     """Name of a cause as one says it in English: the one place that terminal, findings and reports take it from."""
@@ -35,6 +37,7 @@ def headline(
     change: float | None,
     weakest: str,
     leftover: str,
+    friction_in_law: bool = False,
 ) -> str:
     """One sentence.
 
@@ -52,6 +55,8 @@ def headline(
         What could have been seen, for ``adequate`` and ``underpowered``.
     leftover : str
         Where the unexplained misfit sits.
+    friction_in_law : bool
+        Whether loading alone leaves open what of the law is friction between the wires.
     """
     if verdict == "adequate":
         return f"Nothing beyond noise: the simulation explains forces and photos; {weakest}."
@@ -72,7 +77,7 @@ def headline(
     if verdict == "class":
         return (
             f"One cause that these data cannot name for certain: {listed(names[0])} (as {spoken(names[0][0])}: "
-            f"{sizes[0]}){gain}{shift}."
+            f"{sizes[0]}){gain}{shift}{IN_LAW if friction_in_law else ''}."
         )
     return f"The simulation lacks {listed(names[0])} ({sizes[0]}){gain}{shift}."
 
