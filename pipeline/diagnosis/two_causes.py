@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.bootstrap import widening
 from pipeline.diagnosis.explanation import Explanation, candidates, explanation_of, fit_terms
 from pipeline.diagnosis.fit import Fit, fit
 from pipeline.diagnosis.pairs import Pair, best_pairs, null_pair_gain, pair_gains
@@ -136,6 +137,10 @@ def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
         draws=settings.masked_draws,
         rng=rng,
     )
+    if linear[0].gain <= limit:
+        return None
+    # where curvature of the base model widens the scores, it does so to both of a pair
+    limit *= widening(bench, settings) ** 2
     if linear[0].gain <= limit:
         return None
     found = _exchanged(bench, _refitted(bench, linear, settings, hopeless=bench.base.chi2), settings)

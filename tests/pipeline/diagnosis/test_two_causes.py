@@ -1,17 +1,19 @@
 """Two causes: which pair, and what may stand in the place of each."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import Protocol, Reading, hidden_test
+from fixtures.hidden import THREE, Protocol, Reading, hidden_test
+from pipeline.diagnosis import two_causes
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanation import Explanation
 from pipeline.diagnosis.faults import faults_of_input
 from pipeline.diagnosis.pairs import Pair
-from pipeline.diagnosis.two_causes import _exchanged, _refitted, _weighed
+from pipeline.diagnosis.two_causes import _exchanged, _refitted, _weighed, masking
 from pipeline.diagnosis.verdict import Weighed
 from pipeline.diagnosis.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -66,3 +68,16 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     (wrong,) = _refitted(bench, [given], SETTINGS, hopeless=bench.base.chi2)
     best = max(_exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
     assert best.causes == (lens, decay) and best.gain > wrong.gain + 16.0
+
+
+@pytest.mark.parametrize(("gain", "tried"), [(50.0, True), (15.0, False)])
+def test_a_pair_beyond_the_linear_limit_is_nothing_where_scores_spread_wider(monkeypatch, gain, tried):
+    """A linear theory that claims half the spread there is: its limit (6) is a fourth of the true one (24)."""
+    settings = DiagnosisSettings(bootstrap=10, masked_draws=1000, masked_least=0.0)
+    bench = prepare(faults_of_input(hidden_test(Cable(), THREE, largest=0.0138, seed=3), settings), settings, knots=5)
+    scores = replace(bench.suspicion.scores, unit=0.5 * bench.suspicion.scores.unit)
+    asked = []
+    monkeypatch.setattr(two_causes, "_linear_pairs", lambda *_: [Pair(0, 1, gain)])
+    monkeypatch.setattr(two_causes, "_refitted", lambda *_, **__: asked.append(True) or [])
+    assert masking(replace(bench, suspicion=replace(bench.suspicion, scores=scores)), settings) is None
+    assert bool(asked) is tried
