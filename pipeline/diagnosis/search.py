@@ -93,7 +93,8 @@ def suspect(
             continue
         for variant in cause.variants(facts):
             term = Term(cause, variant)
-            columns.append(direction(observation, fitted, term, amount=trace * cause.plausible(facts)))
+            amount = trace * variant.trace * cause.plausible(facts)
+            columns.append(direction(observation, fitted, term, amount=amount))
             terms.append(term)
             owner.append(index)
     table = np.column_stack(columns) if columns else np.zeros((len(fitted.residual), 0))
@@ -133,7 +134,7 @@ def detectable_amount(
     best = int(own[np.argmax(suspicion.scores.norm[own])])
     amount = needed / float(suspicion.scores.norm[best])
     plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
-    at = trace * plausible
+    at = trace * suspicion.terms[best].variant.trace * plausible
     basis = span(fitted.jacobian)
     for _ in range(3):
         if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > 30.0 * plausible:

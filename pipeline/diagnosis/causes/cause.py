@@ -28,6 +28,9 @@ class Variant:
         Where they may go.
     setting : str
         What all forms of the cause that act together have in common, such as where the displacement is counted from.
+    trace : float
+        Multiple of the usual amount (`search.direction`) at which its trace in the data is computed: one that grows
+        otherwise than in proportion looks elsewhere when it is large.
     """
 
     label: str = ""
@@ -37,6 +40,7 @@ class Variant:
     at_range: tuple[float, float] = (0.0, 1.0)
     width_range: tuple[float, float] = (0.0, 1.0)
     setting: str = ""
+    trace: float = 1.0
 
     def range(self, name: str) -> tuple[float, float]:
         """Range of ``at`` or ``width``."""
