@@ -62,11 +62,18 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         chord=None if line is None else line.chord_m,
         chord_std=None if line is None else line.chord_std_m,
         shape=None if line is None else line.shape,
-        time=step.photo_time_s,
+        time=_time(step),
         hold_times=step.times_s if step.times_s.size else None,
         hold_forces=step.forces_N if step.forces_N.size else None,
         picture_centre=None if line is None else picture_centre(line, px_per_m),
     )
+
+
+def _time(step: LoadStep) -> float | None:
+    """Time of the photo, s; of a hold whose photo the log does not name its middle, as its force is its mean."""
+    if step.photo_time_s is not None or not step.times_s.size:
+        return step.photo_time_s
+    return float(np.mean(step.times_s))
 
 
 def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | None:

@@ -1,5 +1,6 @@
 """Records of folder and photos to the record of the mechanics."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,15 @@ def test_steps_and_photos_meet_by_name(specimen, traces, measured):
     assert test.moving == "right"
     assert test.length_std == pytest.approx(1e-4)
     assert np.array_equal(test.steps[1].hold_forces, specimen.steps[1].forces_N)
+
+
+def test_a_photo_that_the_log_does_not_name_was_taken_in_the_middle_of_its_hold(specimen, traces):
+    """A single hold without a time would hide all that goes with time, drift and relaxation, from the diagnosis."""
+    unnamed = replace(specimen.steps[1], photo_time_s=None)
+    changed = replace(specimen, steps=(specimen.steps[0], unnamed, *specimen.steps[2:]))
+    test = measured_test(changed, traces, IdentifySettings())
+    assert test.steps[1].time == pytest.approx(61.5)
+    assert test.steps[0].time == specimen.steps[0].photo_time_s
 
 
 def test_a_rejected_photo_leaves_the_force(specimen, traces):
