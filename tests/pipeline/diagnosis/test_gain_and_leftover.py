@@ -9,6 +9,8 @@ from pipeline.diagnosis.leftover import test_leftover as leftover_of
 from pipeline.diagnosis.noise import by_axes
 from pipeline.diagnosis.observation import observe
 from pipeline.diagnosis.prediction import facts_of
+from pipeline.diagnosis.presentation import unproven
+from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
@@ -126,3 +128,13 @@ def test_one_shape_that_comes_and_goes_from_step_to_step_is_found(fields):
     # singular value sqrt((64 + 7)(64 + 21) / 64) = 9.7, its scatter about 1, noise alone above 8.6 in 3 of 1000: found
     # with probability 0.87, of 40 at least 0.71 but for one chance in a thousand
     assert np.mean(found) >= 0.71
+
+
+@pytest.mark.parametrize(
+    ("p_value", "interval", "expected"),
+    [(1e-4, (0.77, 0.86), True), (0.2, (0.77, 0.86), False), (1e-4, (0.85, 0.97), False)],
+)
+def test_a_cause_that_fails_on_steps_held_out_does_not_explain_what_is_left(p_value, interval, expected):
+    gain = GainPart(heldout_excess_removed=0.81, ci95=interval, force_rmse_N=(1.0, 0.1), shape_rmse_m=(1e-3, 1e-4))
+    assert unproven(p_value, gain, DiagnosisSettings()) is expected
+    assert not unproven(p_value, None, DiagnosisSettings())
