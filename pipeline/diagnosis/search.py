@@ -128,13 +128,14 @@ def detectable_amount(
     A trace that grows otherwise than in proportion (stiff ends: with the square) is computed anew at the amount found,
     by fixed-point steps in the logarithm; three reach a few per cent.
     """
-    own = suspicion.of(cause)
+    # a trace computed at a large amount says little of the smallest one that is seen
+    own = np.array([k for k in suspicion.of(cause) if suspicion.terms[k].variant.trace == 1.0], dtype=int)
     if own.size == 0 or not np.any(suspicion.scores.norm[own] > 0.0):
         return float("inf")
     best = int(own[np.argmax(suspicion.scores.norm[own])])
     amount = needed / float(suspicion.scores.norm[best])
     plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
-    at = trace * suspicion.terms[best].variant.trace * plausible
+    at = trace * plausible
     basis = span(fitted.jacobian)
     for _ in range(3):
         if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > 30.0 * plausible:
