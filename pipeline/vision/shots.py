@@ -17,13 +17,13 @@ import numpy as np
 from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
-from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
 from pipeline.vision.bearings.steady import apart_px, expected_covers, fixed_cover, is_sure, moved_axes
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.scale.calibration import Calibration
+from pipeline.vision.scale.calibration import Calibration, from_number
 from pipeline.vision.segmentation import find_cable
 
 Found = TypeVar("Found")
@@ -44,6 +44,8 @@ def find_cables(
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
     shots = _find_all(specimen, calibration, settings)
+    if calibration is None and specimen.rig.marker_diameter_m is not None:
+        return _with_covers_by_length(specimen, specimen.rig.marker_diameter_m, shots, settings), ()
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
         return shots, ()
@@ -62,6 +64,31 @@ def find_cables(
     )
     again = _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     return again, (Finding("rig/covers-found", "info", text),)
+
+
+def _with_covers_by_length(
+    specimen: Specimen, diameter_m: float, shots: list[Shot], settings: VisionSettings
+) -> list[Shot]:
+    """Where most photos show no cover of the expected size: searched again with what the cable's length tells of it.
+
+    Without a scale the covers are expected in widths of the cable, and a shadow beside it makes it seem wider.
+    """
+    refused = sum(isinstance(shot.found, Rejected) and shot.found.code == "photo/bearing" for shot in shots)
+    if 2 * refused <= len(shots):
+        return shots
+    bare = replace(specimen, rig=replace(specimen.rig, marker_diameter_m=None))
+    seen = [shot for shot in _find_all(bare, None, settings) if isinstance(shot.found, RoughCable)]
+    if not seen:
+        return shots
+    lengths = [shot.found.length_px for shot in seen if isinstance(shot.found, RoughCable)]
+    expected = 0.5 * diameter_m * float(np.median(lengths)) / (specimen.length_m - diameter_m)
+    ends = [seen[0], seen[-1]] if len(seen) > 1 else seen
+    radius = rim_radius(_with_photos(specimen, ends, settings), expected, settings.bearings)
+    if radius is None:
+        return shots
+    again = _find_all(specimen, from_number(2.0 * radius / diameter_m, settings.calibration), settings)
+    better = sum(isinstance(shot.found, RoughCable) for shot in again) > len(shots) - refused
+    return again if better else shots
 
 
 def _with_axes_shown(shot: Shot) -> Shot:

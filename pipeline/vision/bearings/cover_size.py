@@ -53,6 +53,28 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
     return _common(ends, settings) if ends else None
 
 
+def rim_radius(seen: Iterable[tuple[Photo, RoughCable]], expected_px: float, settings: BearingSettings) -> float | None:
+    """Radius of covers about as large as expected; None unless half the ends show one, of one radius.
+
+    Parameters
+    ----------
+    seen : iterable of (Photo, RoughCable)
+        As in `cover_radius`.
+    expected_px : px
+        Radius, to a tenth.
+    settings : BearingSettings
+    """
+    expected = Radius(expected_px, 0.5 * settings.search_radii)
+    rims = [
+        find_rim(photo, end, expected, 2.0 * cable.half_width_px, settings)
+        for photo, cable in seen
+        for end in visible_ends(cable)
+    ]
+    radii = [rim.radius for rim in rims if rim is not None and rim.rim >= settings.min_rim]
+    alike = _alike(radii, settings) if 2 * len(radii) >= max(len(rims), 4) else None
+    return None if alike is None else float(np.median(alike))
+
+
 def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[float] | None:
     """All values, if each is known and they are the same within what covers of one rig differ; else None."""
     known: list[float] = []

@@ -8,7 +8,7 @@ from scipy.special import erfc
 
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
-from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
+from pipeline.vision.bearings.cover_size import cover_radius, rim_radius, visible_ends
 from pipeline.vision.bearings.covers import Radius, find_cover
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
@@ -262,6 +262,16 @@ def test_bright_middle_tells_the_axis_of_a_cover_whose_rim_is_like_the_ground() 
     for bearing, true in zip(bearings, (left, right), strict=True):
         assert bearing is not None and bearing.radius_px == radius
         assert np.abs(np.subtract(bearing.center_px, true)).max() < 0.3  # a soft shadow lies beside the disc
+
+
+def test_radius_about_known_is_told_by_the_rims_at_half_of_the_ends() -> None:
+    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
+    photos = painted_covers(lefts, right, radius, disc_grey=215.0)
+    photos[0].pixels[60:122, 570:650] = 150  # one cover is gone
+    seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
+    found = rim_radius(seen, 0.93 * radius, STAGE)
+    assert found is not None and abs(found - radius) < 0.3  # a soft shadow lies beside the rim
+    assert rim_radius(seen[:1], 0.93 * radius, STAGE) is None
 
 
 def test_one_cover_without_a_screw_tells_no_size() -> None:
