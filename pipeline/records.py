@@ -160,7 +160,7 @@ class Centerline:
     width_m, width_std_m : m
         Measured width of the cable and its scatter along s, to be held against the diameter.
     mirrored : bool
-        True if the bow points up on the photo (y of the chord frame is against the v axis).
+        True if y of the chord frame points up on the photo, against the v axis.
     quality : dict
         Figures a person may want: contrast_to_noise, blur_px, noise, correlation_px, edge_asymmetry, ...
     findings : tuple of Finding

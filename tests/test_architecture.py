@@ -62,7 +62,7 @@ INSIDE = {
         ("curve_fit", "edges"),
         ("midline", "continuation"),
         ("path",),
-        ("measurement", "lay"),
+        ("measurement", "lay", "side"),
     ],
     "pipeline.vision.render": [
         ("lens", "lighting", "sensor", "sheath"),

@@ -84,9 +84,8 @@ def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | N
     left, right = np.array(line.left_px), np.array(line.right_px)
     along = (right - left) / np.hypot(*(right - left))
     across = np.array([-along[1], along[0]])
-    middle = line.u_px.size // 2
-    bow: Array = np.array([line.u_px[middle], line.v_px[middle]]) - left
-    if bow @ across < 0.0:  # y of the chord frame points to the bow
+    offsets: Array = (np.column_stack([line.u_px, line.v_px]) - left) @ across
+    if offsets @ line.shape.y < 0.0:  # y of the chord frame points to the bow of the series
         across = -across
     centre = (0.5 * (size - 1.0) - left) / px_per_m
     return float(centre @ along), float(centre @ across)

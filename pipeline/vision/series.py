@@ -21,6 +21,7 @@ from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import measure_centerline
+from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
 from pipeline.vision.picture_size import of_one_size
@@ -97,12 +98,14 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     pairs = list(zip(shots, lines, strict=True))
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     lines = without_lay(lines, specimen.diameter_m, settings.curve)
+    lines, bow_findings = on_one_side(lines, specimen.diameter_m, settings.series)
     found, displacements = _told_by(shots, lines)
     findings = (
         *calibration.findings,
         *cover_findings,
         *size_findings,
         *side_findings,
+        *bow_findings,
         *check_scale(specimen, calibration, found, displacements, settings.calibration),
         *_check_lengths(specimen, lines, settings.series),
     )

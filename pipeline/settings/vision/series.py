@@ -22,6 +22,9 @@ class SeriesSettings(StageSettings):
     steady_share: float = Field(
         0.6, gt=0.5, le=1, description="of the photos; so many show the fixed bearing in one place, or the camera moved"
     )
+    other_side_widths: float = Field(
+        0.5, gt=0, description="widths; a bow that anyone sees: a smaller one to the other side is a straight cable"
+    )
     max_length_spread: float = Field(
         0.005, gt=0, description="relative; a cable's length is constant, tracing repeats within a tenth of this"
     )

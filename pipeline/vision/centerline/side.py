@@ -1,0 +1,94 @@
+"""One positive side for all photos of a series: that to which the most bent cable bows.
+
+A single photo counts curvature positive toward its own bow. Over a series that would lose a sign: a cable pushed
+against its natural bow, or one so straight that noise decides, shows its force-free photo from the other side, and its
+pre-curvature is negative.
+
+``centerlines, each in its own chord frame -> the same with y toward one side``
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records import Centerline, Finding, Rejected
+from pipeline.settings.vision.series import SeriesSettings
+from rod.measurement import MeasuredShape
+
+Array = NDArray[np.float64]
+
+
+def on_one_side(
+    lines: tuple[Centerline | Rejected, ...], diameter_m: float, settings: SeriesSettings
+) -> tuple[tuple[Centerline | Rejected, ...], tuple[Finding, ...]]:
+    """Centerlines with y of all chord frames toward one side of the photo.
+
+    Parameters
+    ----------
+    lines : tuple of Centerline or Rejected
+        As measured, every y toward the photo's own bow; left and right are the same bearings on all photos.
+    diameter_m : m
+    settings : SeriesSettings
+
+    Returns
+    -------
+    tuple of Centerline or Rejected
+        In the same order.
+    tuple of Finding
+        ``photo/other-side`` for every cable that visibly bows to the other side.
+    """
+    traced = [line for line in lines if isinstance(line, Centerline)]
+    if len(traced) < 2:
+        return lines, ()
+    side = bow_side(max(traced, key=_bow))
+    turned = [line for line in traced if bow_side(line) != side]
+    names = {line.image for line in turned}
+    findings = tuple(
+        Finding(
+            "photo/other-side",
+            "info",
+            f"{line.image}: the cable bows by {1e3 * _bow(line):.1f} mm to the other side than where it is bent most; "
+            "its curvature counts negative. Was it turned over, or pushed against its natural bow?",
+        )
+        for line in turned
+        if _bow(line) > settings.other_side_widths * diameter_m
+    )
+    return tuple(
+        _turned(line) if isinstance(line, Centerline) and line.image in names else line for line in lines
+    ), findings
+
+
+def bow_side(line: Centerline) -> int:
+    """Side of the chord to which y points on the photo: 1 on the right hand from the left axis to the right, else -1.
+
+    By all points together, so that it holds for a cable however straight.
+    """
+    left, right = np.array(line.left_px), np.array(line.right_px)
+    across = np.array([left[1] - right[1], right[0] - left[0]])
+    offsets = (np.column_stack([line.u_px, line.v_px]) - left) @ across
+    return 1 if float(offsets @ line.shape.y) >= 0.0 else -1
+
+
+def _bow(line: Centerline) -> float:
+    return float(np.max(np.abs(line.shape.y)))
+
+
+def _turned(line: Centerline) -> Centerline:
+    return replace(line, shape=reflected(line.shape), mirrored=not line.mirrored)
+
+
+def reflected(shape: MeasuredShape) -> MeasuredShape:
+    """The shape with y toward the other side: directions, curvature and all errors along the normal change sign."""
+    return replace(
+        shape,
+        y=-shape.y,
+        theta=-shape.theta,
+        kappa=-shape.kappa,
+        basis_normal=-shape.basis_normal,
+        basis_theta=-shape.basis_theta,
+        basis_kappa=-shape.basis_kappa,
+        section_y=-shape.section_y,
+    )
