@@ -67,10 +67,11 @@ def find_flanks(
     pooling = settings.pair_pooling_widths * width / pitch
     rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
     near = np.flatnonzero(np.abs(offsets) <= settings.pair_search_widths * width)
-    best = spacing * _pair_width(rise, fall, near, width / spacing, known, settings)
-    # Pooled sections repeat each other: every half width of them is enough for the course.
+    # Pooled sections repeat each other: every half width of them is enough for width and course.
     every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
-    score = _pair_score(rise[every], fall[every], near, np.array([best / spacing]))[:, 0]
+    rise, fall = rise[every], fall[every]
+    best = spacing * _pair_width(rise, fall, near, width / spacing, known, settings)
+    score = _pair_score(rise, fall, near, np.array([best / spacing]))[:, 0]
     course = offsets[near][_best_course(score, settings.pair_wander_cost)]
     middle = np.interp(np.arange(len(relief)), every, course)
     least = settings.least_edge_share * usual
