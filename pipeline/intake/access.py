@@ -70,6 +70,21 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
         raise _too_large(path, status.st_size, limit, setting)
 
 
+def read_begin(path: Path, count: int) -> bytes:
+    """First bytes of a file, at most so many.
+
+    Raises
+    ------
+    InputError
+        ``file/unreadable``.
+    """
+    try:
+        with path.open("rb") as stream:
+            return stream.read(count)
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
 def sha256(path: Path) -> str:
     """SHA-256 of a file, read in pieces so that memory stays bounded.
 

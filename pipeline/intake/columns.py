@@ -140,12 +140,14 @@ def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Pat
             )
     for role, where in places.items():
         if len(where) > 1:
+            names = [header[place] for place in where]
+            choose = f'choose in [force_log] of specimen.toml: columns = {{{role} = "..."}}'
             raise InputError(
-                f"{' and '.join(repr(header[place]) for place in where)} may both be the {role}",
+                f"{' and '.join(map(repr, names))} may both be the {role}",
                 path=path,
                 line=line,
                 code="log/ambiguous-column",
-                remedy=f'choose in [force_log] of specimen.toml: columns = {{{role} = "..."}}',
+                remedy=choose if len(set(names)) > 1 else "give the columns different names",
             )
     index = {role: where[0] for role, where in places.items()}
     headless = isinstance(spec.columns.get("force"), int)

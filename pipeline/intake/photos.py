@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from pipeline.errors import InputError
-from pipeline.intake.access import check_file, inside, sha256
+from pipeline.intake.access import check_file, inside, read_begin, sha256
 from pipeline.intake.noted import doubtful, inferred
 from pipeline.records import Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
@@ -22,6 +22,8 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 FOLDERS = ("images", "bilder", "fotos", "photos", "pictures", "aufnahmen")
 # Pictures of telephones and cameras that have to be converted first.
 OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".webp", ".gif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf")
+# First bytes of png, jpg, bmp and tif in either order of bytes.
+SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"II*\0", b"MM\0*")
 NO_PHOTO = re.compile(r"^\.|^~|^@|thumb|vorschau|preview|^__macosx$", re.IGNORECASE)
 
 
@@ -226,9 +228,18 @@ def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | 
         return None, "", [doubtful("photo/outside", f"{name} leads out of the folder and was not read")]
     try:
         check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
-        return path, sha256(path), []
+        begin = read_begin(path, max(map(len, SIGNATURES)))
+        # The stage that decodes it says so, too; here it is said before anything is measured.
+        told = [] if begin.startswith(SIGNATURES) else [_no_picture(name, begin)]
+        return path, sha256(path), told
     except InputError as error:
         return None, "", [doubtful(f"photo/{error.code.partition('/')[2]}", f"{name}: {error.message}; {error.remedy}")]
+
+
+def _no_picture(name: str, begin: bytes) -> Finding:
+    if not begin:
+        return doubtful("photo/no-picture", f"{name}: the file is empty; copy it again from the camera")
+    return doubtful("photo/no-picture", f"{name}: the file is no png, jpg, bmp or tif; copy it again from the camera")
 
 
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:

@@ -26,6 +26,7 @@ step,branch,time_s,displacement_mm,force_N,image
 2,loading,125.0,8.0,2.899,
 2,loading,129.0,8.0,2.903,step_2.png
 """
+BEGIN = b"\x89PNG"  # of a picture; the rest is its name
 PHOTOS = ("images/step_0.png", "images/step_1.png", "images/step_2.png")
 
 
@@ -64,7 +65,7 @@ def specimen_folder(tmp_path):
         if log is not None:
             folder.write("force.csv", log)
         for photo in photos:
-            folder.write(photo, f"photo {photo}")
+            folder.write(photo, BEGIN + photo.encode())
         return folder
 
     return make

@@ -42,6 +42,17 @@ def test_missing_photo_is_a_finding(specimen_folder):
     )
 
 
+def test_file_that_is_no_picture_is_told_before_it_is_measured(specimen_folder):
+    folder = specimen_folder()
+    folder.write("images/step_1.png", "this is a letter")
+    assert folder.message("photo/no-picture") == (
+        "images/step_1.png: the file is no png, jpg, bmp or tif; copy it again from the camera"
+    )
+    assert "images/step_1.png" in folder.read().images  # it is shown as refused among the photos
+    folder.write("images/step_1.png", b"")
+    assert folder.message("photo/no-picture") == "images/step_1.png: the file is empty; copy it again from the camera"
+
+
 def test_pictures_of_a_telephone_are_to_be_converted(specimen_folder):
     log = "force_N,displacement_mm\n0.001,0\n2.3,4\n"
     folder = specimen_folder(log=log, photos=("images/IMG_0001.HEIC", "images/IMG_0002.HEIC"))
@@ -55,7 +66,7 @@ def test_pictures_of_a_telephone_are_to_be_converted(specimen_folder):
 
 def test_doubled_photos_are_told(specimen_folder):
     folder = specimen_folder()
-    folder.write("images/step_2.png", "photo images/step_1.png")
+    folder.write("images/step_2.png", (folder.path / "images/step_1.png").read_bytes())
     assert folder.message("photo/doubled") == "images/step_2.png and images/step_1.png are the same picture"
     twice = specimen_folder(log=(folder.path / "force.csv").read_text().replace("step_2.png", "step_1.png"), name="b")
     assert "photo/doubled" in twice.codes()
