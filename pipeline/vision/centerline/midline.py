@@ -205,14 +205,19 @@ def _systematic(profiles: Profiles, s: Array, width: Array, std: Array, doubt: A
     Edges count by the shares with which they make the midpoint; ``doubt`` (2, n) are their variances by the light.
     """
     trust = doubt[::-1] / doubt.sum(axis=0)
-    balance = 2.0 * np.sqrt(trust[0] * trust[1])
+    balance, lead = 2.0 * np.sqrt(trust[0] * trust[1]), trust[1] - trust[0]
     shift, blur = profiles.at(s, "shift"), profiles.at(s, "blur")
-    by_model = 0.5 * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0]) ** 2))
+    # Both edges count by the width, in which their errors are too: what is constant along s moves the midpoint by
+    # half the difference, however they are weighted. Ramps that are seen and left out of the model move an edge by all
+    # of the change, ramps that are fitted by half of it at most.
+    share = 0.5 if profiles.inside.any() or profiles.outside.any() else 1.0
+    common = float(np.average(shift.sum(axis=0), weights=1.0 / doubt.sum(axis=0)))
+    by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
     noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
     by_width = 0.5 * np.sqrt(max(np.var(balance * (width - np.median(width))) - noise2, 0.0))
     by_blur = 0.25 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's.
-    by_likely = 0.5 * np.sqrt(np.mean(np.diff(trust, axis=0) ** 2) / np.mean(1.0 / doubt.sum(axis=0)))
+    by_likely = 0.5 * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))
     unequal = _asymmetry(profiles.step)
     by_diameter = 0.0 if diameter is None else 0.5 * abs(float(np.median(width)) - diameter) * min(unequal, 1.0)
     return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_likely**2 + by_diameter**2))
