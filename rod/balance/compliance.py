@@ -124,21 +124,39 @@ class ComplianceCurve:
         return np.asarray(self.basis.slope(moment) @ self.coefficients)
 
     def excess(self, moment: ArrayLike) -> Array:
-        """int_0^m c dm = K - K0, 1/m."""
-        return np.asarray(np.interp(np.asarray(moment, float), self.basis.moments, self.rise))
+        """int_0^m c dm = K - K0, 1/m; beyond the range of the basis with the compliance of its end.
+
+        Moments corrected for a common error of the axes leave that range: held at its end, the curve would refuse the
+        correction that a photo with the largest moments asks for.
+        """
+        below, above = self._beyond(moment)
+        return np.asarray(np.interp(np.asarray(moment, float), self.basis.moments, self.rise) + below + above)
 
     def excess_by_coefficients(self, moment: ArrayLike) -> Array:
         """Derivative of `excess`, (n, p) in 1/m."""
-        m = np.asarray(moment, float)
-        grid = self.basis.moments
+        grid, table = self.basis.moments, self.rise_by_coefficients
+        m = np.clip(np.asarray(moment, float), grid[0], grid[-1])
         cell = np.clip(np.searchsorted(grid, m) - 1, 0, grid.size - 2)
         weight = ((m - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
-        table = self.rise_by_coefficients
-        return np.asarray((1.0 - weight) * table[cell] + weight * table[cell + 1])
+        below, above = self._beyond(moment)
+        ends = below[:, None] * self.basis.table[0] + above[:, None] * self.basis.table[-1]
+        return np.asarray((1.0 - weight) * table[cell] + weight * table[cell + 1] + ends)
 
     def moment(self, excess: ArrayLike) -> Array:
-        """Inverse of `excess`: m for K - K0, N m; held at the ends of the range."""
-        return np.asarray(np.interp(np.asarray(excess, float), self.rise, self.basis.moments))
+        """Inverse of `excess`: m for K - K0, N m."""
+        K, (low, high), (first, last) = np.asarray(excess, float), self.rise[[0, -1]], self._at_ends
+        beyond = np.minimum(K - low, 0.0) / first + np.maximum(K - high, 0.0) / last
+        return np.asarray(np.interp(K, self.rise, self.basis.moments) + beyond)
+
+    def _beyond(self, moment: ArrayLike) -> tuple[Array, Array]:
+        """What of the excess lies below and above the range of the basis, 1/m."""
+        m, (low, high), (first, last) = np.asarray(moment, float), self.basis.moments[[0, -1]], self._at_ends
+        return np.asarray(first * np.minimum(m - low, 0.0)), np.asarray(last * np.maximum(m - high, 0.0))
+
+    @property
+    def _at_ends(self) -> Array:
+        """Compliance at both ends of the basis, (2,) 1/(N m^2)."""
+        return np.asarray(self.basis.unit * np.exp(self.basis.table[[0, -1]] @ self.coefficients))
 
 
 def compliance_curve(basis: ComplianceBasis, coefficients: Array) -> ComplianceCurve:

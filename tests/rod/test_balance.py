@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
+from rod.balance.compliance import compliance_basis, compliance_curve
 from rod.balance.moment_points import moment_points, pointwise_graph
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import StickSlip, bent_by_bvp, equilibrium, force_free
@@ -192,3 +193,20 @@ def test_fewer_points_per_photo_change_nothing_beyond_the_band():
     one, two = law_of(test), law_of(test, options=BalanceOptions(points=40))
     assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < one.tangent_std)
     assert max(p.s.size for p in moment_points(test, points=40)) == 40
+
+
+def test_curve_goes_on_beyond_the_moments_met():
+    """Moments corrected for a common error of the axes leave the range: excess, compliance and inverse stay one law."""
+    basis = compliance_basis(-1e-3, 0.05, unit=60.0)
+    curve = compliance_curve(basis, np.linspace(-0.3, 0.4, 10))
+    m = np.array([-2e-3, -1.2e-3, 0.02, 0.052, 0.06])
+    step = 1e-6
+    slope = (curve.excess(m + step) - curve.excess(m - step)) / (2.0 * step)
+    assert np.allclose(slope, curve.compliance(m), rtol=1e-4)  # inside it is a sum over cells
+    assert np.allclose(curve.moment(curve.excess(m)), m, rtol=1e-9)
+    beyond = curve.excess_by_coefficients(m)
+    for k in range(10):
+        moved = curve.coefficients + step * np.eye(10)[k]
+        numeric = (compliance_curve(basis, moved).excess(m) - curve.excess(m)) / step
+        # the quotient errs by half the step, relative, and by rounding over the step
+        assert np.allclose(beyond[:, k], numeric, rtol=1e-5, atol=1e-8)
