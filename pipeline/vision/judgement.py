@@ -120,6 +120,9 @@ def judge_strip(
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
+    short = _check_reach(photo, standout, cut, axes, stage)
+    if short is not None:
+        return short
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = _cut(standout, path, reading, cable, stage)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage) or _check_ends(
@@ -250,16 +253,39 @@ def _check_ends(
     width = float(np.nanmedian(cut.width))
     for axis, at_start in zip(axes, (True, False), strict=True):
         if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, stage, at_start=at_start):
-            u, v = axis.center_px
-            return refused(
-                photo,
-                "photo/hidden-end",
-                f"the cable was followed to ({u:.0f}, {v:.0f}) px only and seems to go on beyond: something lies across"
-                " it or shades it there",
-                u_px=float(u),
-                v_px=float(v),
-            )
+            return _goes_on_beyond(photo, axis.center_px)
     return None
+
+
+def _check_reach(
+    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
+) -> Rejected | None:
+    """Refuse a strip that ends before an axis that the user gave: far from it, or while the cable goes on."""
+    width = float(np.nanmedian(cut.width))
+    path = standout.to_pixels(cut.path)
+    near, far = stage.beyond_least_widths * width * standout.reduction, stage.hidden_widths * width * standout.reduction
+    for axis, at_start in zip(axes, (True, False), strict=True):
+        distance = np.hypot(*(path - axis.center_px).T)
+        end = 0 if at_start else len(path) - 1
+        # a strip that passes the axis is nearest to it before its end
+        ahead = abs(int(np.argmin(distance)) - end) * standout.reduction < 0.5 * distance[end]
+        if axis.kind != "given" or not ahead or distance[end] < near:
+            continue
+        if distance[end] > far or goes_on(standout, cut, width, stage, at_start=at_start):
+            return _goes_on_beyond(photo, (float(path[end, 0]), float(path[end, 1])))
+    return None
+
+
+def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
+    u, v = place
+    return refused(
+        photo,
+        "photo/hidden-end",
+        f"the cable was followed to ({u:.0f}, {v:.0f}) px only and seems to go on beyond: something lies across"
+        " it or shades it there",
+        u_px=float(u),
+        v_px=float(v),
+    )
 
 
 def _assemble(

@@ -175,6 +175,11 @@ class SegmentationSettings(StageSettings):
         gt=0,
         description="widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter",
     )
+    hidden_widths: float = Field(
+        15.0,
+        gt=0,
+        description="widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm",
+    )
     beyond_width_off: float = Field(
         0.15,
         gt=0,
