@@ -63,7 +63,10 @@ def headline(
     if verdict == "underpowered":
         return f"Nothing was found, but these data could hardly have shown it; {weakest}."
     if verdict == "unexplained":
-        return f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}."
+        return (
+            f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}; "
+            "f_EI and K0 are not to be relied on before that is settled."
+        )
     sizes = [amount_unit(unit, value, std).text(value, std) for value, std, unit in amounts]
     gain = (
         ""

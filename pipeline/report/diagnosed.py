@@ -34,6 +34,7 @@ class NamedCause:
 class DiagnosisView:
     """Texts, rows and figures of the section on the diagnosis."""
 
+    unexplained: bool = False
     named: list[NamedCause] = field(default_factory=list)
     gain: list[str] = field(default_factory=list)
     heads: list[str] = field(default_factory=list)
@@ -60,6 +61,7 @@ def diagnosis_view(
     following = part.next_experiment
     heads, rows = _table(part, words)
     return DiagnosisView(
+        unexplained=part.verdict == "unexplained",
         named=_named(part, words),
         gain=_gain(part, words),
         heads=heads,
@@ -95,6 +97,8 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
         share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
+        if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
+            share = words("does_not_suffice")
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
         line, known = f"{words.cause(cause.name)}: {estimate} ({share}){tail}", catalogue.get(cause.name)
