@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model
 from pipeline.result import CauseForm, Result
 from pipeline.visited import Visited, best, pre_curvature
 from rod.bending_test import BendingTest

@@ -18,8 +18,8 @@ from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.workbench import prepare
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings

@@ -12,7 +12,7 @@ import click
 from pipeline.cli.options import POSITIVE, settings_options
 
 if TYPE_CHECKING:
-    from pipeline.diagnosis.design import Design
+    from pipeline.diagnosis.plans.design import Design
 
 
 @click.command(short_help="What a planned test could see.")
@@ -58,8 +58,8 @@ def design(
 ) -> None:
     """Say what a planned test will know of f_EI, which causes it would show, and which stay invisible."""
     from pipeline.cli.configuration import read_settings
-    from pipeline.diagnosis.design import Plan
-    from pipeline.diagnosis.design import design as outlook
+    from pipeline.diagnosis.plans.design import Plan
+    from pipeline.diagnosis.plans.design import design as outlook
 
     settings = read_settings(settings_file, assignments)
     try:

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.bootstrap import confirmed_limit
-from pipeline.diagnosis.conclusion import Conclusion
-from pipeline.diagnosis.explanation import Explanation, candidates, refit_one
-from pipeline.diagnosis.faults import Faults, faults_of_input, outlier_fault, worst_item
-from pipeline.diagnosis.friction_in_law import shared
-from pipeline.diagnosis.leftover import Leftover, smooth_fields, test_leftover
-from pipeline.diagnosis.pairs import pair_gains
+from pipeline.diagnosis.explanations.conclusion import Conclusion
+from pipeline.diagnosis.explanations.explanation import Explanation, candidates, refit_one
+from pipeline.diagnosis.explanations.friction_in_law import shared
+from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
+from pipeline.diagnosis.fits.bootstrap import confirmed_limit
+from pipeline.diagnosis.fits.faults import Faults, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
 from pipeline.diagnosis.presentation import present
-from pipeline.diagnosis.twins import cosines
-from pipeline.diagnosis.two_causes import TwoCauses, masking, second_cause
-from pipeline.diagnosis.verdict import credible_set, probabilities, with_twins
-from pipeline.diagnosis.workbench import Workbench, prepare, with_finer_law
+from pipeline.diagnosis.statistics.leftover import Leftover, smooth_fields, test_leftover
+from pipeline.diagnosis.statistics.pairs import pair_gains
+from pipeline.diagnosis.statistics.twins import cosines
+from pipeline.diagnosis.statistics.verdict import credible_set, probabilities, with_twins
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding

@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.conclusion import Conclusion
-from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.extended import curve, curve_change, forms, stiffness_change, stiffness_change_linear
-from pipeline.diagnosis.fit import Fit
-from pipeline.diagnosis.friction_in_law import FRICTION, hidden_in_law
-from pipeline.diagnosis.heldout import measured_gain
-from pipeline.diagnosis.identified_again import Identified, identified_again
-from pipeline.diagnosis.maps import residual_map, smooth_share
-from pipeline.diagnosis.next_experiment import next_experiment
-from pipeline.diagnosis.score import adjusted_p, sigma_needed
-from pipeline.diagnosis.search import detectable_amount
-from pipeline.diagnosis.twins import between_causes, cosines, nearest
-from pipeline.diagnosis.verdict import decide
+from pipeline.diagnosis.explanations.conclusion import Conclusion
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.friction_in_law import FRICTION, hidden_in_law
+from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.heldout import measured_gain
+from pipeline.diagnosis.fits.identified_again import Identified, identified_again
+from pipeline.diagnosis.fits.maps import residual_map, smooth_share
+from pipeline.diagnosis.fits.search import detectable_amount
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.plans.next_experiment import next_experiment
+from pipeline.diagnosis.statistics.score import adjusted_p, sigma_needed
+from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.statistics.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline, spoken
-from pipeline.diagnosis.workbench import Workbench
 from pipeline.result import BlindSpot, CausePart, CauseRow, Curve, DiagnosisPart, GainPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.base import start
-from pipeline.diagnosis.design import Plan, planned_bench
-from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.fit import Extension, Fit, fit
-from pipeline.diagnosis.heldout import measured_gain
-from pipeline.diagnosis.observation import Observation, observe
-from pipeline.diagnosis.prediction import Facts, facts_of
-from pipeline.diagnosis.search import suspect
-from pipeline.diagnosis.workbench import Workbench
+from pipeline.diagnosis.fits.base import start
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.fit import Extension, Fit, fit
+from pipeline.diagnosis.fits.heldout import measured_gain
+from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.observations.observation import Observation, observe
+from pipeline.diagnosis.observations.prediction import Facts, facts_of
+from pipeline.diagnosis.plans.design import Plan, planned_bench
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
-from pipeline.diagnosis.verdict import Verdict
+from pipeline.diagnosis.statistics.verdict import Verdict
 from pipeline.units import amount_unit
 
 # Names that English says in another order or with a hyphen; the others as they are, with blanks.

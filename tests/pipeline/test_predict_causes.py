@@ -15,9 +15,9 @@ from fixtures.hidden import LOOP, SIX, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation import present
-from pipeline.diagnosis.workbench import prepare
 from pipeline.identified_model import identified_model
 from pipeline.predict import predict
 from pipeline.result import Result, SpecimenPart

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.cause import PLAIN, Variant
-from pipeline.diagnosis.prediction import Facts, Model, Observer, Prediction
+from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
 Move = Callable[[Array, Array], tuple[Array, Array]]

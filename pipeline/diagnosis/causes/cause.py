@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.causes.cause import PLAIN, Variant
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 

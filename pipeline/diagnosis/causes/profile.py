@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.cause import Variant
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model
 
 Array = NDArray[np.float64]
 

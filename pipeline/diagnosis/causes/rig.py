@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.causes.cause import PLAIN, Variant
-from pipeline.diagnosis.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
 """Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""

@@ -5,9 +5,9 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import THREE, Reading, hidden_test
-from pipeline.diagnosis.bootstrap import confirmed_limit
-from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.workbench import prepare
+from pipeline.diagnosis.fits.bootstrap import confirmed_limit
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 

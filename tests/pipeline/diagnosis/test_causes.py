@@ -9,11 +9,11 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis import explain
-from pipeline.diagnosis.base import start
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import spot_between
-from pipeline.diagnosis.prediction import facts_of
-from pipeline.diagnosis.simulation import run
+from pipeline.diagnosis.fits.base import start
+from pipeline.diagnosis.observations.prediction import facts_of
+from pipeline.diagnosis.observations.simulation import run
 
 CONTRACT = {
     "nonlinear_stiffness", "pre_curvature_varying", "stiffness_varying", "hysteresis", "plastic_set", "relaxation",

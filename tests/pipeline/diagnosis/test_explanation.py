@@ -9,11 +9,11 @@ from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.explanation import refit_one
-from pipeline.diagnosis.extended import curve
-from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.fit import fit
-from pipeline.diagnosis.workbench import prepare
+from pipeline.diagnosis.explanations.explanation import refit_one
+from pipeline.diagnosis.fits.extended import curve
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.fit import fit
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()

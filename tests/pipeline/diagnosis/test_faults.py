@@ -6,7 +6,7 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.hidden import SIX, Reading, hidden_test
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()

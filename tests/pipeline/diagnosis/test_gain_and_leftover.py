@@ -3,13 +3,13 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
-from pipeline.diagnosis.gain import Fold, folds_by_level, held_out, predictive_root
-from pipeline.diagnosis.leftover import smooth_fields
-from pipeline.diagnosis.leftover import test_leftover as leftover_of
-from pipeline.diagnosis.noise import by_axes
-from pipeline.diagnosis.observation import observe
-from pipeline.diagnosis.prediction import facts_of
+from pipeline.diagnosis.observations.noise import by_axes
+from pipeline.diagnosis.observations.observation import observe
+from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.presentation import unproven
+from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, predictive_root
+from pipeline.diagnosis.statistics.leftover import smooth_fields
+from pipeline.diagnosis.statistics.leftover import test_leftover as leftover_of
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 

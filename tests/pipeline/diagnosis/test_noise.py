@@ -5,7 +5,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, THREE, Reading, hidden_test
-from pipeline.diagnosis.noise import (
+from pipeline.diagnosis.observations.noise import (
     block_correlation,
     block_means,
     calibrate_photo_noise,

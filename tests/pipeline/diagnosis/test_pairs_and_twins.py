@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.pairs import best_pairs, null_pair_gain, pair_gains
-from pipeline.diagnosis.score import score
-from pipeline.diagnosis.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.statistics.pairs import best_pairs, null_pair_gain, pair_gains
+from pipeline.diagnosis.statistics.score import score
+from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, THREE, hidden_test
-from pipeline.diagnosis.design import Plan, design
+from pipeline.diagnosis.plans.design import Plan, design
 from pipeline.diagnosis.rediscovery import rediscover
 
 

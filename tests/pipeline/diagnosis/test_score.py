@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.diagnosis.score import adjusted_p, admissible, null_maxima, score, sigma_needed, threshold
+from pipeline.diagnosis.statistics.score import adjusted_p, admissible, null_maxima, score, sigma_needed, threshold
 
 
 @pytest.fixture

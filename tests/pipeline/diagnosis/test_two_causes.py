@@ -8,14 +8,14 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import THREE, Protocol, Reading, hidden_test
-from pipeline.diagnosis import two_causes
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.faults import faults_of_input
-from pipeline.diagnosis.pairs import Pair
-from pipeline.diagnosis.two_causes import _exchanged, _refitted, _weighed, masking
-from pipeline.diagnosis.verdict import Weighed
-from pipeline.diagnosis.workbench import prepare
+from pipeline.diagnosis.explanations import two_causes
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, masking
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.statistics.pairs import Pair
+from pipeline.diagnosis.statistics.verdict import Weighed
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pipeline.diagnosis.diagnose import _refitted
-from pipeline.diagnosis.score import score
-from pipeline.diagnosis.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
+from pipeline.diagnosis.statistics.score import score
+from pipeline.diagnosis.statistics.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 

@@ -8,10 +8,11 @@ from fixtures.effects import LARGEST
 from fixtures.hidden import SIX, THREE, hidden_test
 from fixtures.scores import fitted_base, observed
 from fixtures.trials import f_error
-from pipeline.diagnosis import diagnose, workbench
-from pipeline.diagnosis.extended import curve as curve_of
-from pipeline.diagnosis.extended import curve_change
-from pipeline.diagnosis.faults import faults_of_input
+from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.fits import workbench
+from pipeline.diagnosis.fits.extended import curve as curve_of
+from pipeline.diagnosis.fits.extended import curve_change
+from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
 from tests.rod.virtual_photo import parted_axes

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fit import Fit, fit
-from pipeline.diagnosis.gain import Fold, HeldOut, folds_by_level, held_out
-from pipeline.diagnosis.maps import rms_errors
-from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.workbench import Workbench
+from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.maps import rms_errors
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.statistics.gain import Fold, HeldOut, folds_by_level, held_out
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 

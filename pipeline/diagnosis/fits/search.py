@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.fit import Fit, Term, whole_residual
-from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.score import Scores, admissible, score, span
-from pipeline.diagnosis.simulation import run
+from pipeline.diagnosis.fits.fit import Fit, Term, whole_residual
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.simulation import run
+from pipeline.diagnosis.statistics.score import Scores, admissible, score, span
 
 Array = NDArray[np.float64]
 

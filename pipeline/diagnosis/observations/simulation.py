@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.prediction import Facts, Model, Prediction
+from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from rod.equilibrium import Branch, Equilibrium, solve
 from rod.sensitivity import Derivatives, derivatives
 

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.base import Base
 from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.observation import Observation, residual
-from pipeline.diagnosis.prediction import Facts, Model, Prediction, end_for_end
-from pipeline.diagnosis.simulation import Run, base_derivatives, moved, observed, run
+from pipeline.diagnosis.fits.base import Base
+from pipeline.diagnosis.observations.observation import Observation, residual
+from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction, end_for_end
+from pipeline.diagnosis.observations.simulation import Run, base_derivatives, moved, observed, run
 from rod.characteristic import Characteristic
 from rod.sensitivity import Derivatives
 

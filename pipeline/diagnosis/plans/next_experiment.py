@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.fit import Fit, sensitivities, whole_residual
-from pipeline.diagnosis.observation import observe
-from pipeline.diagnosis.plan import more_steps, planned_test, precision_of
-from pipeline.diagnosis.prediction import Facts
-from pipeline.diagnosis.simulation import run
-from pipeline.diagnosis.workbench import Workbench
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.fits.fit import Fit, sensitivities, whole_residual
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.observations.observation import observe
+from pipeline.diagnosis.observations.prediction import Facts
+from pipeline.diagnosis.observations.simulation import run
+from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 

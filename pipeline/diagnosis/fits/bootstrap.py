@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.fit import fit
-from pipeline.diagnosis.score import admissible, score
-from pipeline.diagnosis.workbench import Workbench
+from pipeline.diagnosis.fits.fit import fit
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.statistics.score import admissible, score
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 

@@ -24,14 +24,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.bootstrap import widening
-from pipeline.diagnosis.explanation import Explanation, candidates, explanation_of, fit_terms
-from pipeline.diagnosis.fit import Fit, fit
-from pipeline.diagnosis.pairs import Pair, best_pairs, null_pair_gain, pair_gains
-from pipeline.diagnosis.search import Suspicion, suspect
-from pipeline.diagnosis.twins import between_causes, cosines
-from pipeline.diagnosis.verdict import credible_set, probabilities, with_twins
-from pipeline.diagnosis.workbench import Workbench, scored
+from pipeline.diagnosis.explanations.explanation import Explanation, candidates, explanation_of, fit_terms
+from pipeline.diagnosis.fits.bootstrap import widening
+from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.search import Suspicion, suspect
+from pipeline.diagnosis.fits.workbench import Workbench, scored
+from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, null_pair_gain, pair_gains
+from pipeline.diagnosis.statistics.twins import between_causes, cosines
+from pipeline.diagnosis.statistics.verdict import credible_set, probabilities, with_twins
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.noise import by_axes
-from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.prediction import Facts
-from pipeline.diagnosis.score import span
+from pipeline.diagnosis.observations.noise import by_axes
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.prediction import Facts
+from pipeline.diagnosis.statistics.score import span
 
 Array = NDArray[np.float64]
 GROUPS = (8, 24)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.noise import (
+from pipeline.diagnosis.observations.noise import (
     PhotoNoise,
     Sections,
     block_means,
@@ -31,7 +31,7 @@ from pipeline.diagnosis.noise import (
     section_covariance,
     smooth_basis,
 )
-from pipeline.diagnosis.prediction import Prediction
+from pipeline.diagnosis.observations.prediction import Prediction
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.leftover import Leftover
-from pipeline.diagnosis.two_causes import TwoCauses
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.two_causes import TwoCauses
+from pipeline.diagnosis.statistics.leftover import Leftover
 
 
 @dataclass(frozen=True, eq=False)

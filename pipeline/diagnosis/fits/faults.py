@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from pipeline.diagnosis.fit import Fit
-from pipeline.diagnosis.observation import Observation
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import Finding
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredShape, MeasuredTest

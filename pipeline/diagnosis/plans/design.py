@@ -13,19 +13,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.base import Base
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.extended import curve, stiffness_change_linear
-from pipeline.diagnosis.fit import Extension, fit
-from pipeline.diagnosis.next_experiment import Protocol, protocols
-from pipeline.diagnosis.observation import observe
-from pipeline.diagnosis.plan import Precision, planned_test
-from pipeline.diagnosis.prediction import Facts
-from pipeline.diagnosis.score import sigma_needed
-from pipeline.diagnosis.search import detectable_amount, suspect
-from pipeline.diagnosis.simulation import run
-from pipeline.diagnosis.twins import between_causes, cosines, nearest
-from pipeline.diagnosis.workbench import Workbench, scored
+from pipeline.diagnosis.fits.base import Base
+from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
+from pipeline.diagnosis.fits.fit import Extension, fit
+from pipeline.diagnosis.fits.search import detectable_amount, suspect
+from pipeline.diagnosis.fits.workbench import Workbench, scored
+from pipeline.diagnosis.observations.observation import observe
+from pipeline.diagnosis.observations.prediction import Facts
+from pipeline.diagnosis.observations.simulation import run
+from pipeline.diagnosis.plans.next_experiment import Protocol, protocols
+from pipeline.diagnosis.plans.plan import Precision, planned_test
+from pipeline.diagnosis.statistics.score import sigma_needed
+from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.characteristic import MomentCurve

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.camera import axes_off, scaled
-from pipeline.diagnosis.prediction import Facts, Model, Observer
+from pipeline.diagnosis.observations.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
 from rod.inverse.knots import first_slope, place_knots, roughness

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.fit import Fit
-from pipeline.diagnosis.noise import section_covariance
-from pipeline.diagnosis.observation import KINDS, Observation, normal_distance
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.observations.noise import section_covariance
+from pipeline.diagnosis.observations.observation import KINDS, Observation, normal_distance
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.base import Base, start
 from pipeline.diagnosis.causes import CATALOGUE, Cause
-from pipeline.diagnosis.faults import Faults
-from pipeline.diagnosis.fit import Extension, Fit, fit
-from pipeline.diagnosis.noise import calibrate_photo_noise
-from pipeline.diagnosis.observation import Observation, normal_distance, observe
-from pipeline.diagnosis.prediction import Facts, facts_of
-from pipeline.diagnosis.score import null_maxima, threshold
-from pipeline.diagnosis.search import Suspicion, suspect
+from pipeline.diagnosis.fits.base import Base, start
+from pipeline.diagnosis.fits.faults import Faults
+from pipeline.diagnosis.fits.fit import Extension, Fit, fit
+from pipeline.diagnosis.fits.search import Suspicion, suspect
+from pipeline.diagnosis.observations.noise import calibrate_photo_noise
+from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
+from pipeline.diagnosis.observations.prediction import Facts, facts_of
+from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.knots import place_knots
 from rod.measurement import MeasuredTest

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.explanation import Explanation
-from pipeline.diagnosis.workbench import Workbench
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.fits.workbench import Workbench
 
 Array = NDArray[np.float64]
 

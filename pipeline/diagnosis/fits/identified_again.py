@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.extended import law_of
-from pipeline.diagnosis.fit import Extension, Fit, Term, fit, sensitivities, whole_residual
-from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.search import suspect
-from pipeline.diagnosis.simulation import run
-from pipeline.diagnosis.workbench import with_knots
+from pipeline.diagnosis.fits.extended import law_of
+from pipeline.diagnosis.fits.fit import Extension, Fit, Term, fit, sensitivities, whole_residual
+from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.workbench import with_knots
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.simulation import run
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.law_prior import FIRST_SIZES, places_of
 from rod.inverse.options import InverseOptions

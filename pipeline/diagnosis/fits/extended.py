@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fit import Fit
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.result import CauseForm, Curve
 from rod.characteristic import Characteristic
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import spot_between
-from pipeline.diagnosis.fit import Extension, Fit, Term, fit, whole_residual
-from pipeline.diagnosis.observation import Observation
-from pipeline.diagnosis.pairs import pair_gains
-from pipeline.diagnosis.search import Suspicion, suspect
-from pipeline.diagnosis.simulation import run
-from pipeline.diagnosis.twins import cosines
-from pipeline.diagnosis.verdict import Weighed, scan_share
+from pipeline.diagnosis.fits.fit import Extension, Fit, Term, fit, whole_residual
+from pipeline.diagnosis.fits.search import Suspicion, suspect
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.simulation import run
+from pipeline.diagnosis.statistics.pairs import pair_gains
+from pipeline.diagnosis.statistics.twins import cosines
+from pipeline.diagnosis.statistics.verdict import Weighed, scan_share
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""Experiments not yet made: what they could show, and which one comes next."""
