@@ -101,6 +101,14 @@ def _refusal(
     # chance gives no constant width: what then counts as noise is a pattern of the sheath or the ground
     constant = scatter < options.sure_width_scatter
     needed = options.patterned_contrast_to_noise if constant else options.min_contrast_to_noise
+    if ratio < needed <= rough.contrast / max(rough.noise, 1e-9) and not constant:
+        # the pixels are quiet enough: what is between them and a clean pair of edges is no noise
+        return rejected(
+            "photo/outline",
+            f"the cable's outline is no pair of smooth edges: the picture beside them is off by"
+            f" {sections.noise / sections.contrast:.0%} of their contrast, though its pixels are quiet, and the width"
+            f" varies by {scatter:.0%}; twisted pairs, bare strands and grounds of a strong pattern do that",
+        )
     if ratio < needed:
         return rejected(
             "photo/contrast",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -212,6 +213,27 @@ def test_too_little_contrast_and_too_much_blur_are_refused():
     soft = even(rng, blur=14.0)
     found = refused(rough_cable(soft, render(soft), rng), soft)
     assert isinstance(found, Rejected) and found.code in ("photo/blur", "photo/width")
+
+
+def test_an_outline_that_swings_is_called_so_and_not_noise():
+    """Two strands twisted about each other, each half as wide as the cable: a dark one and a red one."""
+    rng = np.random.default_rng(13)
+    scene = even(rng)
+    picture = render(scene)
+    rough = rough_cable(scene, picture, rng)
+    radius, ground = rough.half_width_px, int(np.median(picture.pixels))
+    path = rough.path_px
+    pixels = np.full_like(picture.pixels, ground)
+    step = np.gradient(path, axis=0)
+    normal = np.column_stack([-step[:, 1], step[:, 0]]) / np.hypot(*step.T)[:, None]
+    along = np.cumsum(np.hypot(*step.T))
+    for side, grey in ((1.0, 30), (-1.0, 90)):
+        swing = side * 0.5 * radius * np.sin(2.0 * np.pi * along / (8.0 * radius))
+        for u, v in path + swing[:, None] * normal:
+            cv2.circle(pixels, (round(u), round(v)), round(0.5 * radius), (grey,) * 3, -1)
+    found = refused(rough_cable(scene, picture, rng, pixels=pixels), scene)
+    assert isinstance(found, Rejected)
+    assert found.code == "photo/outline"
 
 
 def test_path_beside_the_cable_is_refused():
