@@ -129,7 +129,8 @@ def series(
         images[name] = folder / name
         travel = log_gain * (bows[0].chord - bow.chord)
         steps.append(LoadStep(number, "loading", travel, 1.0, 0.01, None, np.array([]), np.array([1.0]), name))
-    camera_spec = CameraSpec(scale_px_per_m=scales[0] if scale_given else None)
+    # covers drawn in the plane of the cable look as high ones do from very far away
+    camera_spec = CameraSpec(scale_px_per_m=scales[0] if scale_given else None, distance_m=100.0)
     rig = RigSpec(marker_diameter_m=0.012)
     specimen = Specimen("series", folder, LENGTH, DIAMETER, camera_spec, rig, tuple(steps), images)
     return trace_series(specimen, VisionSettings())
