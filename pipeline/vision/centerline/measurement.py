@@ -107,7 +107,7 @@ def _refusal(
             "photo/outline",
             f"the cable's outline is no pair of smooth edges: the picture beside them is off by"
             f" {sections.noise / sections.contrast:.0%} of their contrast, though its pixels are quiet, and the width"
-            f" varies by {scatter:.0%}; twisted pairs, bare strands and grounds of a strong pattern do that",
+            f" varies by {scatter:.0%}; twisted pairs, bare strands and a sheath or ground of strong pattern do that",
         )
     if ratio < needed:
         return rejected(
