@@ -187,6 +187,17 @@ class Centerline:
     findings: tuple[Finding, ...] = ()
     preview: Preview | None = None
 
+    @property
+    def side(self) -> int:
+        """Side of the chord to which y points on the photo: 1 on the right hand from left axis to right axis, else -1.
+
+        By all points together, so that it holds for a cable however straight.
+        """
+        left, right = np.array(self.left_px), np.array(self.right_px)
+        across = np.array([left[1] - right[1], right[0] - left[0]])
+        offsets = (np.column_stack([self.u_px, self.v_px]) - left) @ across
+        return 1 if float(offsets @ self.shape.y) >= 0.0 else -1
+
 
 @dataclass(frozen=True)
 class Traces:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.records import Array, Centerline, LoadStep, Specimen, Traces
+from pipeline.records import Centerline, LoadStep, Specimen, Traces
 from pipeline.settings.identify import IdentifySettings
 from rod.measurement import MeasuredStep, MeasuredTest
 
@@ -83,9 +83,6 @@ def picture_centre(line: Centerline, px_per_m: float) -> tuple[float, float] | N
     size = np.array([line.preview.width, line.preview.height]) * line.preview.reduction
     left, right = np.array(line.left_px), np.array(line.right_px)
     along = (right - left) / np.hypot(*(right - left))
-    across = np.array([-along[1], along[0]])
-    offsets: Array = (np.column_stack([line.u_px, line.v_px]) - left) @ across
-    if offsets @ line.shape.y < 0.0:  # y of the chord frame points to the bow of the series
-        across = -across
+    across = line.side * np.array([-along[1], along[0]])
     centre = (0.5 * (size - 1.0) - left) / px_per_m
     return float(centre @ along), float(centre @ across)

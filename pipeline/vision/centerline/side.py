@@ -43,8 +43,8 @@ def on_one_side(
     traced = [line for line in lines if isinstance(line, Centerline)]
     if len(traced) < 2:
         return lines, ()
-    side = bow_side(max(traced, key=_bow))
-    turned = [line for line in traced if bow_side(line) != side]
+    side = max(traced, key=_bow).side
+    turned = [line for line in traced if line.side != side]
     names = {line.image for line in turned}
     findings = tuple(
         Finding(
@@ -59,17 +59,6 @@ def on_one_side(
     return tuple(
         _turned(line) if isinstance(line, Centerline) and line.image in names else line for line in lines
     ), findings
-
-
-def bow_side(line: Centerline) -> int:
-    """Side of the chord to which y points on the photo: 1 on the right hand from the left axis to the right, else -1.
-
-    By all points together, so that it holds for a cable however straight.
-    """
-    left, right = np.array(line.left_px), np.array(line.right_px)
-    across = np.array([left[1] - right[1], right[0] - left[0]])
-    offsets = (np.column_stack([line.u_px, line.v_px]) - left) @ across
-    return 1 if float(offsets @ line.shape.y) >= 0.0 else -1
 
 
 def _bow(line: Centerline) -> float:

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import trace_series
-from pipeline.vision.centerline.side import bow_side, on_one_side, reflected
+from pipeline.vision.centerline.side import on_one_side, reflected
 from pipeline.vision.render import Camera, Curve
 from tests.pipeline.vision.test_series import DIAMETER, LENGTH, SCALE, series
 
@@ -33,7 +33,7 @@ def test_a_cable_pushed_against_its_natural_bow_has_a_negative_pre_curvature(tra
     rest, *loaded = traced.photos
     assert np.median(rest.shape.kappa) == pytest.approx(-1.0, abs=0.02)
     assert np.max(loaded[-1].shape.kappa) == pytest.approx(7.0, rel=0.01)
-    assert len({bow_side(line) for line in traced.photos}) == 1
+    assert len({line.side for line in traced.photos}) == 1
     told = [finding for finding in traced.findings if finding.code == "photo/other-side"]
     assert len(told) == 1
     assert rest.image in told[0].message
@@ -56,4 +56,4 @@ def test_photos_that_bow_alike_stay_as_they_are(traced):
     assert lines == traced.photos[1:]
     assert not findings
     straight = replace(traced.photos[0], shape=reflected(traced.photos[0].shape))
-    assert bow_side(straight) != bow_side(traced.photos[1])
+    assert straight.side != traced.photos[1].side
