@@ -29,14 +29,6 @@ Array = NDArray[np.float64]
 
 POSE = ("left_along", "left_across", "right_along", "right_across")
 
-FOOT = {
-    "left_along": "foot_along",
-    "right_along": "foot_along",
-    "left_across": "foot_across",
-    "right_across": "foot_across",
-}
-"""What moves both axes alike when the camera's foot is not in the middle of the picture."""
-
 NO_ERROR = 1e-7
 """Relative standard deviation of a length for which none is stated: below any photo's resolution."""
 
@@ -136,7 +128,9 @@ class FitModel:
 
     def pose_terms(self, part: str, data: StepData) -> tuple[tuple[str, float], ...]:
         """Nuisances, each with its factor, that add up to one of `POSE` on the photo of a step."""
-        common = ((part, 1.0), (FOOT[part], 1.0), ("parallax", data.from_foot(part)))
+        # what moves both axes alike: the camera's foot is not just in the middle of the picture
+        foot = "foot_" + part.partition("_")[2]
+        common = ((part, 1.0), (foot, 1.0), ("parallax", data.from_foot(part)))
         return ((f"{part}/{data.step.step}", 1.0), *((name, c) for name, c in common if name in self.nuisances))
 
     def cable_length(self, u: Array) -> float:
