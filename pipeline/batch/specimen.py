@@ -111,7 +111,7 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
     except InputError as error:
         finding = FindingPart(code=error.code, level="error", message=error.sentence)
         return store_failure(order, finding, started)
-    except Exception as error:
+    except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
         return store_failure(order, _refusal(error), started, trace=traceback.format_exc())
 
 
