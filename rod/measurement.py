@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,13 @@ class MeasuredShape:
     correlation_length: float
     systematic_std: float
     systematic_length: float
+
+    def section_offsets(self) -> Array:
+        """Distance of the sections from the smooth curve along its normal, (k,) m; cubic Hermite between its points."""
+        x = CubicHermiteSpline(self.s, self.x, np.cos(self.theta))(self.section_s)
+        y = CubicHermiteSpline(self.s, self.y, np.sin(self.theta))(self.section_s)
+        theta = np.interp(self.section_s, self.s, self.theta)
+        return np.asarray(-np.sin(theta) * (self.section_x - x) + np.cos(theta) * (self.section_y - y))
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     s, std = shape.section_s[order], shape.section_std[order]
     if s.size < 8:
         raise ValueError(f"{s.size} midline sections do not make a shape")
-    distance = _distance(shape, s, shape.section_x[order], shape.section_y[order])
+    distance = shape.section_offsets()[order]
     reach = float(s[-1] - s[0])
     width = max(reach / blocks, shape.correlation_length)
     count = max(8, min(blocks, int(np.ceil(reach / width)), s.size))
@@ -104,13 +104,6 @@ def _on_curve(shape: MeasuredShape, at: Array, x: Array, y: Array) -> tuple[Arra
     x = a * shape.x[cell] + b * h * cos[cell] + c * shape.x[cell + 1] + d * h * cos[cell + 1]
     y = a * shape.y[cell] + b * h * sin[cell] + c * shape.y[cell + 1] + d * h * sin[cell + 1]
     return x, y
-
-
-def _distance(shape: MeasuredShape, s: Array, x: Array, y: Array) -> Array:
-    """Distance of sections from the smooth curve along its normal, m."""
-    on_x, on_y = _on_curve(shape, s, x, y)
-    theta = np.interp(s, shape.s, shape.theta)
-    return np.asarray(-np.sin(theta) * (x - on_x) + np.cos(theta) * (y - on_y))
 
 
 def block_covariance(

@@ -67,10 +67,7 @@ def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
     s = shape.section_s[order]
     curve_x = CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))
     curve_y = CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))
-    theta = np.interp(s, shape.s, shape.theta)
-    across = -np.sin(theta) * (shape.section_x[order] - curve_x(s)) + np.cos(theta) * (
-        shape.section_y[order] - curve_y(s)
-    )
+    across = shape.section_offsets()[order]
     members = max(1, len(s) // blocks)
     count = len(s) // members
     first = (len(s) - count * members) // 2

@@ -17,7 +17,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 from scipy.ndimage import gaussian_filter1d
 
 from pipeline.records import Centerline, Rejected
@@ -63,7 +62,7 @@ def relieved(shapes: list[MeasuredShape], diameter_m: float, settings: CurveSett
 
 def _fast(shape: MeasuredShape, grid: Array, settings: CurveSettings) -> Array:
     """Distance (g,) m of the sections from their curve on the grid, without what a bend could do; nan where unseen."""
-    across = _across(shape)
+    across = shape.section_offsets()
     cell = np.rint(shape.section_s / (grid[1] - grid[0])).astype(int).clip(0, grid.size - 1)
     count = np.bincount(cell, minlength=grid.size)
     mean = np.bincount(cell, across, grid.size) / np.maximum(count, 1)
@@ -88,14 +87,6 @@ def _common(wiggles: Array) -> Array:
     return np.where(shared, mean, 0.0) * (max(0.0, 1.0 - chance / power) if power > 0.0 else 0.0)
 
 
-def _across(shape: MeasuredShape) -> Array:
-    """Distance (k,) m of the sections from the smooth curve along its normal."""
-    x = CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))(shape.section_s)
-    y = CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))(shape.section_s)
-    theta = np.interp(shape.section_s, shape.s, shape.theta)
-    return np.asarray(-np.sin(theta) * (shape.section_x - x) + np.cos(theta) * (shape.section_y - y))
-
-
 def _relieved(shape: MeasuredShape, grid: Array, wiggle: Array, *, spare: float) -> MeasuredShape:
     """Sections without the wiggle; their standard deviations shrink as their scatter does.
 
@@ -103,7 +94,7 @@ def _relieved(shape: MeasuredShape, grid: Array, wiggle: Array, *, spare: float)
     """
     if not shape.section_s.size:
         return shape
-    off, across = np.interp(shape.section_s, grid, wiggle), _across(shape)
+    off, across = np.interp(shape.section_s, grid, wiggle), shape.section_offsets()
     theta = np.interp(shape.section_s, shape.s, shape.theta)
     before, after = float(np.mean(across**2)), float(np.mean((across - off) ** 2))
     share = min(1.0, spare * after / before) if before > 0.0 else 1.0
