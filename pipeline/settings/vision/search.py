@@ -175,6 +175,9 @@ class SegmentationSettings(StageSettings):
         gt=0,
         description="widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter",
     )
+    beyond_darkest: float = Field(
+        0.02, gt=0, description="of full range; a ground darker than that is counted as so bright: it tells no share"
+    )
     hidden_widths: float = Field(
         15.0,
         gt=0,

@@ -18,8 +18,6 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, straight_body
 
-_DARKEST = 0.02  # of full range; a ground darker than that tells no share
-
 
 def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
     """True if beyond the first or the last point of a strip, led on as it ends, there is more of the same.
@@ -48,29 +46,29 @@ def goes_on(standout: Standout, cut: CrossCut, width: float, settings: Segmentat
     more = cut_across(standout, ahead, width, settings, known=True)
     if more.dark != cut.dark:
         return False
-    usual = float(np.median(_weber(standout, cut, width)))
+    usual = float(np.median(_weber(standout, cut, width, settings)))
     edges = np.flatnonzero(np.diff(np.r_[0, _alike(standout, more, width, usual, settings), 0]))
     return bool(np.max(edges[1::2] - edges[::2], initial=0) > least)
 
 
 def shaded(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> NDArray[np.bool_]:
     """Sections ``(k,)`` that look like most of the strip but for the light on them."""
-    return _alike(standout, cut, width, float(np.median(_weber(standout, cut, width))), settings)
+    return _alike(standout, cut, width, float(np.median(_weber(standout, cut, width, settings))), settings)
 
 
 def _alike(
     standout: Standout, cut: CrossCut, width: float, usual: float, settings: SegmentationSettings
 ) -> NDArray[np.bool_]:
     low, high = settings.beyond_contrast
-    share = _weber(standout, cut, width) / usual
+    share = _weber(standout, cut, width, settings) / usual
     return (np.abs(cut.width / width - 1.0) < settings.beyond_width_off) & (share > low) & (share < high)
 
 
-def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
+def _weber(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array:
     """Step of each section by the brightness of its ground."""
     _, normal = path_normals(cut.path)
     beside = (cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]).astype(np.float32)
     ground = cv2.remap(
         standout.picture, beside[..., 0], beside[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _DARKEST))
+    return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), settings.beyond_darkest))
