@@ -24,9 +24,8 @@ MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codec
 POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 INFINITE = ("inf", "-inf", "+inf", "infinity")
-MISSING = frozenset(
-    ("", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#nv", "null", "none", *INFINITE, "#wert!", "#value!")
-)
+SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
+MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
 # Digit grouping by space or apostrophe, and the typographic minus sign
 SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
 

@@ -13,13 +13,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.errors import InputError
 from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
 from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
-from pipeline.intake.signs import force_sign, inferred_branches, signed_displacements
+from pipeline.intake.signs import force_sign, from_mounted, inferred_branches, signed_displacements
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.records import Array, Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
@@ -50,8 +51,10 @@ def load_steps(
         ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters.
     """
     name = path.name
-    displacements, turned = signed_displacements(samples.displacements, name)
-    travel = float(np.ptp(displacements)) or float(abs(displacements[0])) or 1.0
+    travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
+    mounted = None if samples.branches is None else np.array([branch == "mounted" for branch in samples.branches])
+    displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
+    displacements, turned = signed_displacements(displacements, name)
     tolerance = settings.same_displacement_relative * travel
     runs, grouped = _runs(samples, displacements, tolerance, name=name, settings=settings)
     _check_swapped(samples, runs, path)
@@ -83,7 +86,16 @@ def load_steps(
     )
     within = _hold_findings(samples, displacements, runs, tolerance, name)
     order = order_findings(steps, tolerance, name=name)
-    return steps, (*turned, *grouped, *signed, *directed, *_fit_findings(fitted, name, settings), *within, *order)
+    return steps, (
+        *moved,
+        *turned,
+        *grouped,
+        *signed,
+        *directed,
+        *_fit_findings(fitted, name, settings),
+        *within,
+        *order,
+    )
 
 
 def _runs(
@@ -101,12 +113,31 @@ def _runs(
         if moved or branches[row] != branches[row - 1]:
             starts.append(row)
     stretches = list(pairwise([*starts, len(displacements)]))
-    long = [pair for pair in stretches if pair[1] - pair[0] >= settings.hold_min_samples]
-    held = [pair for pair in stretches if pair in long or any(samples.images[slice(*pair)])] if long else stretches
+    long = _held(stretches, displacements, tolerance, settings)
+    named = [any(samples.images[slice(*pair)]) for pair in stretches]
+    held = [pair for pair, keep in zip(stretches, long | named, strict=True) if keep] if long.any() else stretches
     way = f", {len(stretches) - len(held)} shorter ones are the way between them" if len(held) < len(stretches) else ""
     message = f"{name}: no step numbers; {len(held)} stretches of constant displacement are the steps{way}"
     runs = [Run(first, last, number) for number, (first, last) in enumerate(held)]
     return runs, [inferred("log/steps-inferred", message)]
+
+
+def _held(
+    stretches: Sequence[tuple[int, int]], displacements: Array, tolerance: float, settings: IntakeSettings
+) -> NDArray[np.bool_]:
+    """Which stretches of constant displacement are holds and no part of a ramp, (n,).
+
+    A slow ramp, or a fast one sampled often, is a chain of stretches a little more than the tolerance apart: what has
+    two samples or more moves on by at most twice that. In a chain only those are holds that stand out by their length.
+    """
+    firsts = np.array([first for first, _ in stretches])
+    lengths = np.array([last - first for first, last in stretches])
+    held = lengths >= settings.hold_min_samples
+    breaks = np.flatnonzero(np.abs(np.diff(displacements[firsts])) > 2.0 * tolerance) + 1
+    for chain in np.split(np.arange(lengths.size), breaks):
+        if chain.size >= settings.ramp_min_stretches:
+            held[chain] &= lengths[chain] > settings.hold_over_ramp * np.median(lengths[chain])
+    return held
 
 
 def _numbered(

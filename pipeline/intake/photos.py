@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -194,6 +195,9 @@ def _present_name(
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
         return None, [doubtful("photo/outside", f"{place}: photo {written!r} leads out of the folder and was not read")]
+    beside = [other for other in present if PurePosixPath(other).name == name]
+    if not _exists(path) and len(beside) == 1:
+        return beside[0], []  # the name alone, as people write it: there is nothing else that it could mean
     if _exists(path) or name in present:  # what is there but no ordinary file is refused with its reason later
         return name, []
     alike = [other for other in present if _loose(other) == _loose(name)]
@@ -216,8 +220,8 @@ def _exists(path: Path) -> bool:
 
 
 def _loose(name: str, *, whole: bool = True) -> str:
-    """A name without capitals, folder and (with ``whole=False``) suffix."""
-    path = PurePosixPath(name.casefold())
+    """A name without capitals, folder and (with ``whole=False``) suffix, however its accents are put together."""
+    path = PurePosixPath(unicodedata.normalize("NFC", name.casefold()))
     return path.name if whole or path.suffix not in SUFFIXES else path.stem
 
 
@@ -243,11 +247,12 @@ def _no_picture(name: str, begin: bytes) -> Finding:
 
 
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
-    """Warnings for photos that are the same file under two names."""
-    first: dict[str, str] = {}
-    findings = []
+    """A warning for each picture that is there under several names."""
+    names: dict[str, list[str]] = {}
     for name, digest in hashes.items():
-        if digest in first:
-            findings.append(doubtful("photo/doubled", f"{name} and {first[digest]} are the same picture"))
-        first.setdefault(digest, name)
-    return findings
+        names.setdefault(digest, []).append(name)
+    return [
+        doubtful("photo/doubled", f"{_some(more)} and {first} are the same picture")
+        for first, *more in names.values()
+        if more
+    ]

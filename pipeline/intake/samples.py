@@ -7,8 +7,6 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
-import datetime as dt
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import InputError
+from pipeline.intake.clock import clock_s, through_midnight
 from pipeline.intake.columns import Columns
 from pipeline.intake.dialect import Decimal, Row, decimal_sign, decimals, is_missing, to_number
 from pipeline.intake.noted import doubtful, inferred
@@ -29,8 +28,6 @@ BRANCHES: dict[Branch, str] = {
     "unloading": "unloading|unload|down|backward|back|return|entlastung|entlasten|zurück|rück|ab",
 }
 BRANCH_OF: dict[str, Branch] = {word: branch for branch, words in BRANCHES.items() for word in words.split("|")}
-CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)", re.ASCII)
-GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T]+(\d{1,2}:\d{1,2}(?::\d{1,2})?)(?:[.,](\d+))?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def read_samples(
     InputError
         ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``.
     """
-    data = rows[columns.first_row :]
+    data, summary = _without_summary(rows[columns.first_row :], columns)
     lines = [line for line, _ in data]
     _check_widths(data, columns, path)
     table = {role: [_cell(cells, place) for _, cells in data] for role, place in columns.index.items()}
@@ -103,13 +100,27 @@ def read_samples(
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
         resolution=columns.factor["force"] * 10.0 ** -max(decimals(force[row], decimal) for row in kept),
-        findings=(*_losses(path.name, lines, force, carried), *noted),
+        findings=(*_losses(path.name, lines, force, carried, summary), *noted),
     )
 
 
-def _losses(name: str, lines: Sequence[int], force: Sequence[str], carried: int) -> list[Finding]:
-    """Rows without a force, and displacements carried down."""
+def _without_summary(data: Sequence[Row], columns: Columns) -> tuple[Sequence[Row], Sequence[Row]]:
+    """Rows of samples, and rows at the end that are none: a mean or a remark below a table that is full above it."""
+    own = [not is_missing(_cell(cells, columns.index["displacement"])) for _, cells in data]
+    end = max((row + 1 for row, there in enumerate(own) if there), default=0)
+    # a displacement that stands only in the first row of each hold is missing above, too
+    whole = all(own[:end]) and 2 * end > len(data)
+    return (data[:end], data[end:]) if whole else (data, [])
+
+
+def _losses(
+    name: str, lines: Sequence[int], force: Sequence[str], carried: int, summary: Sequence[Row]
+) -> list[Finding]:
+    """Rows that are no samples, rows without a force, and displacements carried down."""
     findings = []
+    if summary:
+        message = f"the last {len(summary)} rows have no displacement, unlike all above: no samples, left out"
+        findings.append(doubtful("log/summary", f"{name}, line {summary[0][0]}: {message}"))
     empty = [row for row, cell in enumerate(force) if is_missing(cell)]
     if empty:
         message = f"{name}: {len(empty)} of {len(force)} rows have no force and were left out"
@@ -224,9 +235,12 @@ def _times(
     if empty:
         message = f"{name}: {len(empty)} rows have no time (first: line {lines[empty[0]]}); times are not used"
         return None, [(inferred if len(empty) == len(kept) else doubtful)("log/missing-time", message)]
-    clock = [time for row in kept if (time := _clock_s(cells[row])) is not None]
+    clock = [time for row in kept if (time := clock_s(cells[row])) is not None]
     if len(clock) == len(kept):
-        times = np.array(clock)
+        times = through_midnight(np.array(clock))
+    elif not clock and not any(to_number(cells[row], numbers.decimal) is not None for row in kept):
+        message = f"{name}: no time can be read in its column (first: {cells[kept[0]][:40]!r}); times are not used"
+        return None, [doubtful("log/time-format", message)]
     else:
         wide = replace(numbers, limit=1e15)  # epochs in milliseconds have 13 digits
         times = wide.column("time", cells, kept)
@@ -238,18 +252,3 @@ def _times(
         line = lines[kept[int(np.argmax(np.diff(times) < 0.0)) + 1]]
         return None, [doubtful("log/time-order", f"{name}, line {line}: time runs backwards; times are not used")]
     return times, noted
-
-
-def _clock_s(cell: str) -> float | None:
-    """Seconds of ``12:03:04,5``, of an ISO date with time or of ``21.11.2026 08:01:02``; None for anything else."""
-    if found := CLOCK.fullmatch(cell):
-        return 3600.0 * float(found[1] or 0) + 60.0 * float(found[2]) + float(found[3].replace(",", "."))
-    if found := GERMAN_DATE.fullmatch(cell):
-        cell = f"{found[3]}-{found[2]:0>2}-{found[1]:0>2} {found[4]:0>5}" + (f".{found[5][:6]:0<6}" if found[5] else "")
-    elif not re.fullmatch(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d.*", cell):
-        return None
-    try:
-        stamp = dt.datetime.fromisoformat(cell)
-    except ValueError:
-        return None
-    return (stamp.replace(tzinfo=None) - dt.datetime(2000, 1, 1)).total_seconds()  # naive: only differences count

@@ -18,6 +18,28 @@ from pipeline.settings.intake import IntakeSettings
 BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most of its buckling load whatever its law
 
 
+def from_mounted(
+    displacements: Array, mounted: Array | None, name: str, *, travel: float
+) -> tuple[Array, list[Finding]]:
+    """Displacements counted from the mounted cable where the log counts from the end of a machine's own way.
+
+    Parameters
+    ----------
+    displacements : (n,) m
+    mounted : (n,) bool, or None
+        Rows that are said to be of the mounted cable; None where the log names no branches.
+    travel : m
+        Between the smallest and the largest. A zero that is off by more is no error of the zero.
+    """
+    if mounted is None or not mounted.any():
+        return displacements, []
+    zero = float(np.median(displacements[mounted]))
+    if abs(zero) <= travel:
+        return displacements, []
+    message = f"{name}: the mounted cable stands at {zero * 1e3:.4g} mm; displacements count from there"
+    return displacements - zero, [inferred("log/displacement-zero", message)]
+
+
 def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[Finding]]:
     """Displacements (n,) m positive toward the other bearing; a log that counts downward is turned round."""
     reach = float(displacements[np.argmax(np.abs(displacements))])

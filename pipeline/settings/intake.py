@@ -43,6 +43,15 @@ class IntakeSettings(BaseModel):
     hold_min_samples: int = Field(
         3, gt=1, description="samples; in a log without step numbers shorter plateaus are part of the ramp"
     )
+    hold_over_ramp: float = Field(
+        3.0,
+        gt=1,
+        description="times the median stretch of a ramp; in a log without step numbers that was sampled often enough to "
+        "show stretches of constant displacement on the way, too, longer ones are holds",
+    )
+    ramp_min_stretches: int = Field(
+        5, gt=1, description="stretches in a row, each just beside the last; fewer are holds at almost one displacement"
+    )
     zero_force_relative: float = Field(
         0.05, gt=0, description="of the largest force; at displacement 0 a cable with more is not force-free"
     )

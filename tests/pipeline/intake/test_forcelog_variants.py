@@ -135,7 +135,12 @@ def test_clock_times_and_epochs_count_from_the_first_row(tmp_path):
     dated = [f"2026-11-21 {time}" for time in clock]
     german = [f"21.11.2026 {time}" for time in clock]
     epoch = [f"{1.8e9 + float(time):.1f}" for time in times]
-    for written in (clock, dated, german, epoch):
+    midnight = ["23:58:01", "23:58:05", "23:59:01", "23:59:05", "00:00:01", "00:00:05"]
+    winter = [  # summer time ends between the first and the second step
+        *("2026-10-25T02:59:01+02:00", "2026-10-25T02:59:05+02:00", "2026-10-25T02:00:01+01:00"),
+        *("2026-10-25T02:00:05+01:00", "2026-10-25T01:01:01Z", "2026-10-25T01:01:05Z"),
+    ]
+    for written in (clock, dated, german, epoch, midnight, winter):
         text = PLAIN
         for old, new in zip(times, written, strict=True):
             text = text.replace(f",{old},", f",{new},", 1)
@@ -145,7 +150,7 @@ def test_clock_times_and_epochs_count_from_the_first_row(tmp_path):
 
 
 def test_missing_forces_are_left_out_and_told(tmp_path):
-    for missing in ("", "NaN", "n/a", "-", "inf", "#WERT!"):
+    for missing in ("", "NaN", "n/a", "-", "inf", "#WERT!", "#DIV/0!"):
         log = read(PLAIN.replace("2.301", missing), tmp_path)
         assert len(log.steps[1].forces_N) == 1
         assert [f.level for f in log.findings if f.code == "log/missing-force"] == ["warning"]
@@ -154,6 +159,32 @@ def test_missing_forces_are_left_out_and_told(tmp_path):
 def test_photo_named_in_a_row_without_force_is_kept(tmp_path):
     log = read(PLAIN.replace("2.304,a_1.png", ",a_1.png"), tmp_path)
     assert log.steps[1].image == "a_1.png"
+
+
+def test_rows_of_a_summary_are_no_samples(tmp_path):
+    plain = read(PLAIN, tmp_path)
+    log = read(PLAIN + "mean,,,,3.1,\nEnd of the test,,,,,\n", tmp_path)
+    assert [step.force_N for step in log.steps] == [step.force_N for step in plain.steps]
+    assert log.steps[2].photo_time_s == plain.steps[2].photo_time_s
+    assert [finding.code for finding in log.findings] == ["log/summary"]
+
+
+def test_displacement_in_the_first_row_of_each_hold_is_no_summary(tmp_path):
+    text = PLAIN
+    for last in ("5.0,0.0", "65.0,4.5", "125.0,2.25"):
+        text = text.replace(last, last.partition(",")[0] + ",")
+    assert [len(step.forces_N) for step in read(text, tmp_path).steps] == [2, 2, 2]
+
+
+def test_times_in_no_known_notation_cost_the_times_only(tmp_path):
+    text = PLAIN
+    for time in ("1.0", "5.0", "61.0", "65.0", "121.0", "125.0"):
+        text = text.replace(f",{time},", f",11/21/2026 8:00:{float(time) / 10:02.0f} AM,", 1)
+    log = read(text, tmp_path)
+    assert all(step.photo_time_s is None for step in log.steps)
+    assert [finding.code for finding in log.findings] == ["log/time-format"]
+    with pytest.raises(InputError):  # one that cannot be read among others that can is a mistake
+        read(PLAIN.replace(",65.0,", ",65 s,"), tmp_path)
 
 
 def test_time_that_runs_backwards_is_not_used(tmp_path):

@@ -66,6 +66,21 @@ def test_ramps_between_holds_are_no_steps(read):
     assert "8 shorter ones" in next(f.message for f in log.findings if f.code == "log/steps-inferred")
 
 
+def test_ramps_sampled_often_are_no_steps(read):
+    """A slow ramp stands on each displacement for several samples, fewer than the holds."""
+    lines = log_text(UP, columns=()).splitlines()
+    slow = [lines[0]]
+    before = 0.0
+    for at, rows in zip(UP, zip(*[iter(lines[1:])] * 3, strict=True), strict=True):
+        ramp = np.linspace(before, at, 1000, endpoint=False)[1:] if at else []
+        slow += [f"{way:.4f},1.0," for way in ramp]
+        slow += [row for row in rows for _ in range(20)]
+        before = at
+    log = read("\n".join(slow))
+    assert displacements_mm(log) == list(UP)
+    assert "no step numbers; 5 stretches" in next(f.message for f in log.findings if f.code == "log/steps-inferred")
+
+
 def test_a_test_that_begins_loaded_has_no_mounted_step(read):
     log = read(log_text(UP[1:], columns=("step",)))
     assert [step.branch for step in log.steps] == ["loading"] * 4
@@ -103,6 +118,23 @@ def test_displacement_that_counts_downward(read):
     log = read(log_text(UP, towards=-1.0, columns=("step",)))
     assert displacements_mm(log) == list(UP)
     assert "log/displacement-sign" in codes(log)
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_a_machine_that_counts_from_the_end_of_its_own_way(towards, read):
+    lines = log_text(UP + DOWN).splitlines()
+    cells = [line.split(",") for line in lines]
+    far = [",".join([*c[:2], f"{250.0 + towards * float(c[2]):.3f}", *c[3:]]) for c in cells[1:]]
+    log = read("\n".join([lines[0], *far]))
+    assert displacements_mm(log) == list(UP + DOWN)
+    assert codes(log) == ["log/displacement-zero"] + ["log/displacement-sign"] * (towards < 0.0)
+
+
+def test_zero_that_is_a_little_off_stays(read):
+    """What is off by less than the travel is an error of the zero: the diagnosis names it, nobody corrects it."""
+    log = read(log_text(UP).replace("mounted,0.000", "mounted,0.300"))
+    assert displacements_mm(log)[0] == 0.3
+    assert codes(log) == ["steps/branch"]
 
 
 def test_clean_log_has_no_findings(read):
