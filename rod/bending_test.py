@@ -67,6 +67,8 @@ class BendingTest:
     friction : InternalFriction or None
     plastic_rate : 1/m per 1/m
         Growth of K0 with the largest curvature reached.
+    law_stays : bool
+        Whether the law stays at its curvature while K0 grows; else it moves along (see `rod.section`).
     zero : "natural", "loaded", "length" or m
         Distance of the axes at displacement zero.
     displacement_offset : m
@@ -87,6 +89,7 @@ class BendingTest:
     compliance: float = 0.0
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
+    law_stays: bool = False
     zero: Literal["natural", "loaded", "length"] | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
@@ -101,7 +104,7 @@ class BendingTest:
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
         profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
-        section = Section(self.characteristic, K0, profile, self.friction, self.plastic_rate)
+        section = Section(self.characteristic, K0, profile, self.friction, self.plastic_rate, self.law_stays)
         return Rod(
             self.length,
             elements,

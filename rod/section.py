@@ -2,11 +2,14 @@
 
 From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and tangent dm/dK (N m^2):
 
-    m = profile * m_law(K, K0_set) + sum_e M_e clip((K - z_e) / c_e, -1, 1)
+    m = profile * m_law(K; set) + sum_e M_e clip((K - z_e) / c_e, -1, 1)
 
 * Internal friction (wires that rub): parallel elasto-plastic elements (Prandtl-Ishlinskii). Element e sticks over a
   curvature change c_e and slips at the moment M_e; z_e is its relaxed curvature, its memory. At the start z_e = K0.
-* Plastic set: K0_set = K0 + rate * max(reached, K - K0), where ``reached`` is the largest excess K - K0 so far.
+* Plastic set p = rate * max(reached, K - K0), where ``reached`` is the largest excess K - K0 so far: the cable is free
+  of moment at K0 + p. The law m_law(K, K0) moves along with its rest, m_law(K - p, K0), as that of a cable that has
+  been bent to another shape; or it stays at its curvature (``law_stays``), m_law(K, K0) - m_law(K0 + p, K0), as that of
+  a cable whose stiffness belongs to the shape it has. For a law of constant stiffness both are the same.
 
 Within one displacement step the response is a function of K alone with the memory of the step's start: an increment is
 a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
@@ -19,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -96,6 +100,16 @@ class Memory:
     right_angle: float
 
 
+class Read(NamedTuple):
+    """One place where the law is read, ``at`` (n,) 1/m; with its share, and how the place moves with K, set and K0."""
+
+    share: float
+    at: Array
+    by_K: float = 0.0
+    by_set: float = 0.0
+    by_rest: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Section:
     """Constitutive data at the n joints of the rod.
@@ -110,6 +124,8 @@ class Section:
     friction : InternalFriction or None
     plastic_rate : float
         Growth of K0 with the largest curvature reached, 1/m per 1/m.
+    law_stays : bool
+        Whether the law stays at its curvature while K0 grows.
     """
 
     law: MomentCurve
@@ -117,6 +133,7 @@ class Section:
     profile: Array | None = None
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
+    law_stays: bool = False
 
     def _elastic(self) -> Response:
         """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
@@ -141,10 +158,19 @@ class Section:
         elements = 0 if self.friction is None else self.friction.stick.size
         return np.repeat(self.pre_curvature[None], elements, axis=0), np.zeros_like(self.pre_curvature)
 
+    def set_at(self, K: Array, memory: Memory) -> Array:
+        """Plastic set p that goes with curvature K, (n,) 1/m."""
+        return np.asarray(self.plastic_rate * np.maximum(memory.reached, K - self.pre_curvature))
+
     def rest_curvature(self, K: Array, memory: Memory) -> Array:
         """Pre-curvature with the set that goes with curvature K, (n,) 1/m."""
-        excess = np.maximum(memory.reached, K - self.pre_curvature)
-        return self.pre_curvature + self.plastic_rate * excess
+        return np.asarray(self.pre_curvature + self.set_at(K, memory))
+
+    def read(self, K: Array, p: Array) -> tuple[Read, ...]:
+        """Where the law is read for curvature K and set p: its moment is ``sum share * law.moment(at, K0)``."""
+        if self.law_stays:
+            return Read(1.0, K, by_K=1.0), Read(-1.0, self.pre_curvature + p, by_set=1.0, by_rest=1.0)
+        return (Read(1.0, K - p, by_K=1.0, by_set=-1.0),)
 
     def response(self, memory: Memory) -> Response:
         """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
@@ -162,14 +188,16 @@ class Section:
         return with_friction
 
     def _set_response(self, memory: Memory) -> Response:
-        law, rate, K0 = self.law, self.plastic_rate, self.pre_curvature
+        law, K0 = self.law, self.pre_curvature
         profile = np.ones(1) if self.profile is None else self.profile
 
         def with_set(K: Array) -> tuple[Array, Array]:
-            rest = self.rest_curvature(K, memory)
-            growing = rate * np.greater(K - K0, memory.reached)
-            tangent = law.tangent(K, rest) + growing * law.moment_by_pre_curvature(K, rest)
-            return profile * law.moment(K, rest), profile * tangent
+            growing = self.plastic_rate * np.greater(K - K0, memory.reached)
+            m, tangent = np.zeros((2, *K.shape))
+            for read in self.read(K, self.set_at(K, memory)):
+                m += read.share * law.moment(read.at, K0)
+                tangent += read.share * (read.by_K + read.by_set * growing) * law.tangent(read.at, K0)
+            return profile * m, profile * tangent
 
         return with_set
 
@@ -181,9 +209,17 @@ class Section:
         stick = self.friction.stick
         return np.clip(memory.relaxed, K - stick, K + stick), reached
 
+    def _law_energy(self, K: Array, p: Array) -> Array:
+        """Energy per length of the law alone from its rest K0 + p to curvature K, (n,) N."""
+        law, K0 = self.law, self.pre_curvature
+        if not self.law_stays:
+            return law.energy(K - p, K0)
+        rest = K0 + p
+        return np.asarray(law.energy(K, K0) - law.energy(rest, K0) - law.moment(rest, K0) * (K - rest))
+
     def stored_energy(self, K: Array, memory: Memory) -> Array:
         """Recoverable energy per length at the end of a step, (n,) N: law and sticking friction elements."""
-        energy = self.law.energy(K, self.rest_curvature(K, memory))
+        energy = self._law_energy(K, self.set_at(K, memory))
         energy = energy if self.profile is None else self.profile * energy
         if self.friction is None:
             return energy
@@ -192,17 +228,15 @@ class Section:
 
     def potential(self, K: Array, memory: Memory) -> Array:
         """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
-        rest = self.rest_curvature(K, memory)
+        # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
+        turn = np.minimum(K, self.pre_curvature + memory.reached) if self.plastic_rate else K
+        energy = self._law_energy(turn, self.plastic_rate * memory.reached)
         if self.plastic_rate:
-            # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
-            turn = np.minimum(K, self.pre_curvature + memory.reached)
-            kept = self.pre_curvature + self.plastic_rate * memory.reached
             nodes, weights = np.polynomial.legendre.leggauss(12)
             k = turn + 0.5 * (K - turn) * (nodes[:, None] + 1.0)
-            growing = self.law.moment(k, self.rest_curvature(k, memory))
-            energy = self.law.energy(turn, kept) + 0.5 * (K - turn) * (weights @ growing)
-        else:
-            energy = self.law.energy(K, rest)
+            reads = self.read(k, self.set_at(k, memory))
+            growing = sum(read.share * self.law.moment(read.at, self.pre_curvature) for read in reads)
+            energy = energy + 0.5 * (K - turn) * (weights @ growing)
         energy = energy if self.profile is None else self.profile * energy
         if self.friction is None:
             return np.asarray(energy)

@@ -28,7 +28,7 @@ from rod.characteristic import Array, Characteristic
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System
-from rod.section import InternalFriction
+from rod.section import InternalFriction, Read
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,20 +221,27 @@ def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
 def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Array:
     """Change of the moment at fixed curvature, (q, n)."""
     section, memory = step.rod.section, step.before
-    law, rest, move = section.law, section.rest(), moves.pre_curvature
+    law, K0, move = section.law, section.rest(), moves.pre_curvature
+    reads: tuple[Read, ...] = (Read(1.0, K),)
+    set_move = moves.none[:, None]
     if section.plastic_rate or moves.has("plastic_set"):
         K0 = section.pre_curvature
         excess = np.maximum(memory.reached, K - K0)
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
-        rest = K0 + section.plastic_rate * excess
-        move = move + section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
-    moment = law.moment_by_pre_curvature(K, rest) * move
-    if isinstance(law, Characteristic) and moves.lawful:
-        moment += moves.ordinates @ law.moment_by_ordinates(K, rest).T
-    if section.profile is not None:
-        moment *= section.profile
-    if moves.profiled:
-        moment += law.moment(K, rest) * moves.profile
+        set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
+        reads = section.read(K, section.set_at(K, memory))
+    moment = np.zeros_like(move)
+    for read in reads:
+        by_read = law.moment_by_pre_curvature(read.at, K0) * move
+        if read.by_set:
+            by_read = by_read + law.tangent(read.at, K0) * (read.by_set * set_move + read.by_rest * move)
+        if isinstance(law, Characteristic) and moves.lawful:
+            by_read = by_read + moves.ordinates @ law.moment_by_ordinates(read.at, K0).T
+        if section.profile is not None:
+            by_read = section.profile * by_read
+        if moves.profiled:
+            by_read = by_read + law.moment(read.at, K0) * moves.profile
+        moment += read.share * by_read
     return moment if section.friction is None else moment + _friction_moment(section.friction, K, step, moves, past)
 
 

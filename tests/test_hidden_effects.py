@@ -20,6 +20,7 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.presentation import present
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
@@ -178,6 +179,20 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
         amount, std = fitted.amount(place)
         assert amount == pytest.approx(cable.load[int(term.variant.at)], abs=4.0 * std)
     assert len(fitted.extension.terms) == 2
+
+
+@pytest.mark.parametrize("law_stays", [False, True])
+def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
+    """Against friction, which the form that does not fit had been told as, with f_EI a fifth off."""
+    cable = Cable(set_rate=0.08, law_stays=law_stays)
+    causes = [cause for cause in CATALOGUE if cause.name in NEEDS_THE_WAY_BACK]
+    test = hidden_test(cable, LOOP, largest=LARGEST, seed=16)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    part = present(bench, conclude(bench, SETTINGS), SETTINGS)
+    assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
+    assert part.causes[0].estimate == pytest.approx(0.08, abs=4.0 * part.causes[0].std)
+    assert [form.at > 0.5 for form in part.causes[0].forms] == [law_stays]
+    assert f_error(part.extended, cable)[0] < 0.02
 
 
 def test_two_causes_are_both_found():

@@ -25,6 +25,9 @@ def history(section: Section, path: np.ndarray) -> np.ndarray:
     return np.array(moments)
 
 
+FALLING = Characteristic.from_ordinates([0.0, 5.0, 10.0], [5e-3, 3e-3, 2e-3])
+
+
 def section(friction: InternalFriction | None = None, plastic_rate: float = 0.0) -> Section:
     return Section(Characteristic.constant(1e-3), np.array([2.0]), None, friction, plastic_rate)
 
@@ -68,8 +71,19 @@ def test_plastic_set_moves_the_rest_curvature_by_rate_times_excess() -> None:
     assert m[2:] == pytest.approx(1e-3 * (back - (2.0 + rate * 4.0)), rel=1e-12, abs=1e-15)  # zero at the new rest
 
 
-def test_potential_of_the_increment_has_the_moment_as_derivative() -> None:
-    full = Section(LAW, np.full(60, 2.0), np.full(60, 0.9), InternalFriction(1e-3, 1.5), 0.08)
+@pytest.mark.parametrize("abscissa", ["curvature", "excess"])
+def test_set_either_takes_the_law_along_or_leaves_it(abscissa: str) -> None:
+    law, K0, p = replace(FALLING, abscissa=abscissa), 2.0, 0.1 * 4.0
+    K = np.array([6.0, 5.0, 2.4])
+    along = history(Section(law, np.array([K0]), plastic_rate=0.1), K)
+    assert along == pytest.approx(law.moment(K - p, K0), rel=1e-12, abs=1e-15)
+    stays = history(Section(law, np.array([K0]), plastic_rate=0.1, law_stays=True), K)
+    assert stays == pytest.approx(law.moment(K, K0) - law.moment(K0 + p, K0), rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("law_stays", [False, True])
+def test_potential_of_the_increment_has_the_moment_as_derivative(law_stays: bool) -> None:
+    full = Section(LAW, np.full(60, 2.0), np.full(60, 0.9), InternalFriction(1e-3, 1.5), 0.08, law_stays)
     memory = Memory(np.repeat(np.linspace(1.0, 4.0, 60)[None], 3, 0), np.full(60, 1.3), 0.0, 0.0)
     K, step = np.linspace(0.03, 8.07, 60), 1e-6
     m, tangent = full.response(memory)(K)

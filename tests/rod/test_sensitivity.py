@@ -191,6 +191,17 @@ def test_control_points_and_pre_curvature_in_every_reading(reading: str, absciss
     assert worst_error(test, "pre_curvature", vary, h, displaced) < 1e-6
 
 
+@pytest.mark.parametrize("abscissa", ["curvature", "excess"])
+@pytest.mark.parametrize("name", ["pre_curvature[0]", "stiffness_profile[0]", "plastic_set"])
+def test_set_beside_a_law_that_stays(name: str, abscissa: str) -> None:
+    law = replace(LAW, abscissa=abscissa)
+    test = replace(EVERYTHING, characteristic=law, law_stays=True)
+    vary, h = VARIATIONS[name]
+    parameter = (name.partition("[")[0], BASIS) if name.endswith("[0]") else name
+    assert worst_error(test, parameter, vary, h, displaced) < 1e-6
+    assert worst_error(test, "ordinates", control_point(1), 3e-7, displaced, column=1) < 1e-6
+
+
 CAUSES = ("bearing_stiffness", "bearing_friction", "rigid_ends", "load_x", "load_y", "hysteresis", "plastic_set")
 
 

@@ -2,7 +2,7 @@
 
 nonlinear_stiffness  another control point: f_EI has a form the spline of the base model cannot follow
 hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
-plastic_set          K0 grows with the largest curvature reached (see `rod.section`)
+plastic_set          K0 grows with the largest curvature reached; the law moves along or stays (see `rod.section`)
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.causes.cause import Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
@@ -132,9 +132,9 @@ class PlasticSet:
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
+        """The law moves along with the new rest, or (``at`` 1) stays at its curvature."""
+        return Variant("with a law that moves along"), Variant("with a law that stays", at=1.0)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let ``amount`` of the largest excess curvature stay."""
-        return replace(model, bending=replace(model.bending, plastic_rate=amount))
+        return replace(model, bending=replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5))
