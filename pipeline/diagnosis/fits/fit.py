@@ -262,8 +262,8 @@ def fit(
     kept : (N,) bool or None
         Rows the model is fitted to; all of them are predicted.
     hopeless : float
-        Chi-square above which the fit is of no use: it ends where the steps left, each as good as the last, would not
-        get there; as converged if whole steps are taken and the linear model promises no more either.
+        Chi-square above which the fit is of no use: it ends where the steps left, each as good as the better of the
+        last two, would not get there; as converged if whole steps are taken and the linear model promises no more.
 
     Returns
     -------
@@ -286,13 +286,13 @@ def fit(
         state = _State(vector, base_model, here, value)
         jacobian = sensitivities(observation, extension, vector, base_model, here)
     rows = np.ones(len(state.value), dtype=bool) if kept is None else kept
-    converged, damping, crawled, fall = False, 0.0, 0, np.inf
+    converged, damping, crawled, falls = False, 0.0, 0, [np.inf, np.inf]
     for left in range(iterations, 0, -1):
         scaled = _Scaled(jacobian[rows], state.value[rows], cutoff)
         if scaled.expected < tolerance:
             converged = True
             break
-        if state.cost(rows) - left * fall > hopeless:
+        if state.cost(rows) - left * max(falls[-2:]) > hopeless:
             converged = damping == 0.0 and state.cost(rows) - scaled.expected > hopeless
             break
         accepted = _lower(observation, extension, state, scaled, damping, rows)
@@ -301,7 +301,7 @@ def fit(
             break
         before, (state, damping) = state.cost(rows), accepted
         jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.here)
-        fall = before - state.cost(rows)
+        falls.append(fall := before - state.cost(rows))
         if fall < tolerance and damping == 0.0:
             converged = True
             break
@@ -315,6 +315,9 @@ def fit(
 
 CRAWL, PATIENCE = 2e-3, 4
 """Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
+
+PART = 0.4
+"""Share of a step that leads too far; where amount and stiffness act as a product, halves of a step did."""
 
 
 class _State(NamedTuple):
@@ -338,9 +341,14 @@ def _lower(
     damping: float,
     rows: NDArray[np.bool_],
 ) -> tuple[_State, float] | None:
-    """First state of lower chi-square with rising damping, and that damping; None where seven trials find none."""
-    for used in (damping, *(max(damping, 1e-5) * 10.0**k for k in range(1, 7))):
-        trial = _inside(extension, state.vector, state.vector + scaled.step(used))
+    """First state of lower chi-square, and the damping that led there; None where eight trials find none.
+
+    A whole step first; then a part of it, which follows a curved valley where damping would creep along its wall; then
+    steps of rising damping.
+    """
+    least = max(damping, 1e-5)
+    for used, share in ((damping, 1.0), (least, PART), *((least * 10.0**k, 1.0) for k in range(1, 7))):
+        trial = _inside(extension, state.vector, state.vector + share * scaled.step(used))
         if not extension.admissible(trial):
             continue
         base_model = extension.base_model(trial)
