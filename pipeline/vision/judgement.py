@@ -7,7 +7,7 @@ The checks run from what misleads most to what misleads least; each refusal says
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.bands import by_diameter
-from pipeline.vision.search.beyond import goes_on, shaded
+from pipeline.vision.search.beyond import follow, followed_in, goes_on, shaded
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across
@@ -97,7 +97,24 @@ def _scatter(values: Array) -> float:
 def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
 ) -> RoughCable | Rejected:
-    """One strip: is it the cable? The checks run from what misleads most to what misleads least."""
+    """One strip: is it the cable? One that is a piece of it is followed beyond its ends and judged again."""
+    outcome = _judge(photo, standout, reading, strip, cable, settings)
+    if not isinstance(outcome, Rejected) or outcome.code != "photo/hidden-end":
+        return outcome
+    stage = settings.segmentation
+    cut = _cut(standout, strip.path, reading, cable, stage)
+    path = follow(standout, cut, float(np.nanmedian(cut.width)), stage)
+    if path is None:
+        return outcome
+    whole = replace(strip, path=path)
+    followed = _judge(photo, standout, followed_in(reading, strip, whole), whole, cable, settings)
+    return outcome if isinstance(followed, Rejected) else followed
+
+
+def _judge(
+    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
+) -> RoughCable | Rejected:
+    """The checks run from what misleads most to what misleads least."""
     stage = settings.segmentation
     cut = _cut(standout, strip.path, reading, cable, stage)
     ratio = cut.contrast / _disturbance(cut, standout, cable, stage)

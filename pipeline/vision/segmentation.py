@@ -73,7 +73,7 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
             )
         outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
         if isinstance(outcome, RoughCable):
-            return first if first is not None and _is_part(outcome, leaving) else outcome
+            return first if first is not None and _lies_on(outcome, leaving) else outcome
         if outcome.code in _CONCLUSIVE:
             return outcome
         if outcome.code == "photo/leaves-frame":
@@ -100,16 +100,18 @@ def _weigh(
     for reading in readings:
         least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
         rivals = [strip for strip in reading.strips if strip.length >= least]
-        outcomes = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in rivals]
+        outcomes = _whole([judge_strip(photo, standout, reading, strip, cable, settings) for strip in rivals], settings)
         contrasts = [outcome.contrast if isinstance(outcome, RoughCable) else 0.0 for outcome in outcomes]
         # a shadow that lies apart from the cable is as long and fainter
         faintest = settings.segmentation.rival_share * max(contrasts, default=0.0)
         accepted = [k for k, contrast in enumerate(contrasts) if contrast > 0.0 and contrast >= faintest]
+        accepted.sort(key=lambda k: -_length(outcomes[k]))  # a piece that was followed farther is more of the cable
         area = reading.longest * reading.width
         chosen = accepted[0] if accepted else 0
         outcome = outcomes[chosen]
         # blur is judged last: a strip refused for it looks like a cable in all else
-        alike = [k for k, verdict in enumerate(outcomes) if k in accepted or _code(verdict) == "photo/blur"]
+        blurred = [k for k, verdict in enumerate(outcomes) if _code(verdict) == "photo/blur"]
+        alike = _apart(accepted, outcomes) + blurred
         if accepted and len(alike) > 1:
             lengths = [rivals[k].length * standout.reduction for k in alike]
             text = (
@@ -127,11 +129,41 @@ def _code(outcome: RoughCable | Rejected) -> str:
     return outcome.code if isinstance(outcome, Rejected) else ""
 
 
-def _is_part(found: RoughCable, leaving: list[Array]) -> bool:
-    """True if the cable found lies on a strip that left the picture in another reading: a piece torn off it."""
+def _length(outcome: RoughCable | Rejected) -> float:
+    return outcome.length_px if isinstance(outcome, RoughCable) else 0.0
+
+
+def _whole(outcomes: list[RoughCable | Rejected], settings: VisionSettings) -> list[RoughCable | Rejected]:
+    """The verdicts, but for a cable that ends where another strip is known to go on: it is the piece beyond."""
+    going_on = [o for o in outcomes if isinstance(o, Rejected) and o.code == "photo/hidden-end"]
+
+    def piece_of(found: RoughCable) -> Rejected | None:
+        reach = 2.0 * settings.segmentation.hidden_widths * found.half_width_px
+        for other in going_on:
+            place = np.array([other.figure["u_px"], other.figure["v_px"]])
+            if np.hypot(*(found.path_px[[0, -1]] - place).T).min() < reach:
+                return other
+        return None
+
+    return [(piece_of(o) or o) if isinstance(o, RoughCable) and o.left.radius_px is None else o for o in outcomes]
+
+
+def _apart(chosen: list[int], outcomes: list[RoughCable | Rejected]) -> list[int]:
+    """Those chosen that do not lie on one before: two pieces of one cable are followed to the same whole."""
+    kept: list[int] = []
+    for k in chosen:
+        found = outcomes[k]
+        before = [o for o in (outcomes[other] for other in kept) if isinstance(o, RoughCable)]
+        if not (isinstance(found, RoughCable) and _lies_on(found, [other.path_px for other in before])):
+            kept.append(k)
+    return kept
+
+
+def _lies_on(found: RoughCable, paths: list[Array]) -> bool:
+    """True if most of the cable found lies within half a width of one of the paths (px)."""
     first, last = found.visible
     body = found.path_px[first : last + 1]
-    return any(float(np.median(cKDTree(path).query(body)[0])) < found.half_width_px for path in leaving)
+    return any(float(np.median(cKDTree(path).query(body)[0])) < found.half_width_px for path in paths)
 
 
 def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wanted:

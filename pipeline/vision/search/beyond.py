@@ -8,15 +8,21 @@ All lengths in cells.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import product
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.backdrop import Standout
+from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, straight_body
+from pipeline.vision.search.strips import Strip
 
 
 def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
@@ -34,21 +40,93 @@ def goes_on(standout: Standout, cut: CrossCut, width: float, settings: Segmentat
         The first point, else the last.
     """
     path = cut.path[::-1] if at_start else cut.path
-    body, outward = straight_body(path, width, 1.5 * width)
+    return _ahead(standout, cut, path, width, settings)[0] is not None
+
+
+def follow(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array | None:
+    """The path of a strip, led on beyond both ends for as long as there is more of the same; as `goes_on`.
+
+    None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
+    """
+    path = cut.path
+    most = (1.0 + settings.beyond_most_share) * len(path)
+    for _ in range(2):
+        path = path[::-1]
+        longer, scraps = _ahead(standout, cut, path, width, settings)
+        while longer is not None and len(longer) < most:
+            path = longer
+            longer, scraps = _ahead(standout, cut, path, width, settings)
+        if scraps > settings.beyond_least_widths * width:
+            return None
+    return path if len(path) > len(cut.path) else None
+
+
+def followed_in(reading: Reading, piece: Strip, whole: Strip) -> Reading:
+    """A reading with the ``whole`` in place of the ``piece`` and of other pieces of it.
+
+    What hid the rest, such as a shadow, is taken out of the masks around it: beyond its end there is no object.
+    """
+    width = reading.width
+    tree = cKDTree(whole.path)
+    others = [strip for strip in reading.strips if float(np.median(tree.query(strip.path)[0])) > 0.5 * width]
+    added = whole.path[cKDTree(piece.path).query(whole.path)[0] > width]
+    drawn, around = np.zeros_like(reading.mask), np.zeros_like(reading.mask)
+    cv2.polylines(drawn, [np.rint(whole.path).astype(np.int32)], False, 1, max(1, round(width)))
+    for point in np.rint(added[:: max(1, round(0.5 * width))]).astype(int).tolist():
+        cv2.circle(around, point, round(2.5 * width), 1, cv2.FILLED)
+    return replace(
+        reading,
+        strips=(whole, *others),
+        mask=np.where(around, drawn, reading.mask),
+        thick=np.where(around, np.uint8(0), reading.thick),
+    )
+
+
+def _ahead(
+    standout: Standout, cut: CrossCut, path: Array, width: float, settings: SegmentationSettings
+) -> tuple[Array | None, int]:
+    """The path and the more of the same beyond its last point, None if there is none; and how much in all there is.
+
+    A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place; and
+    the width of a mask, by which the strip's edges were sought, may be that of the cable or not.
+    """
+    usual = float(np.median(_weber(standout, cut, width, settings)))
+    best, scraps = None, 0
+    for (trimmed, base), known in product(settings.beyond_leads_widths, {True, cut.known}):
+        led, ahead = _led_into_picture(standout, path, width, (trimmed, base), settings)
+        if len(ahead) < settings.beyond_least_widths * width:
+            continue
+        more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
+        if more.dark != cut.dark:
+            continue
+        alike = _alike(standout, more, width, usual, settings)
+        edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
+        long = np.flatnonzero(edges[1::2] - edges[::2] > settings.beyond_least_widths * width)
+        scraps = max(scraps, int(alike.sum()))
+        if not len(long):
+            continue
+        stop = int(edges[1::2][long[-1]])
+        # edges are lost at the rounded corners of an end, a width of it at most
+        faint = np.flatnonzero(more.step[stop : stop + round(width)] < settings.seen_share * cut.contrast)
+        stop = min(stop + (int(faint[0]) if len(faint) else round(width)), len(ahead))
+        if best is None or len(led) + stop > len(best):
+            best = np.vstack([led, more.path[:stop]])
+            if stop > 0.8 * len(ahead):
+                break  # no other lead is much better
+    return best, scraps
+
+
+def _led_into_picture(
+    standout: Standout, path: Array, width: float, lead: tuple[float, float], settings: SegmentationSettings
+) -> tuple[Array, Array]:
+    """The path, and what it is led on by beyond its last point as far as the picture goes."""
+    body, outward = straight_body(path, width, lead[0] * width)
     reach = float(np.hypot(*(path[-1] - body[-1])))
-    ahead = led_on(body, outward, reach + settings.beyond_widths * width, width)[len(body) + int(reach) :]
+    led = led_on(body, outward, reach + settings.beyond_widths * width, width, base=lead[1])
+    led, ahead = np.split(led, [len(body) + int(reach)])
     rows, columns = standout.residual.shape[:2]
     inside = np.all((ahead >= 0) & (ahead <= (columns - 1, rows - 1)), axis=1)
-    ahead = ahead[: int(np.argmin(inside))] if not inside.all() else ahead
-    least = settings.beyond_least_widths * width
-    if len(ahead) < least:
-        return False
-    more = cut_across(standout, ahead, width, settings, known=True)
-    if more.dark != cut.dark:
-        return False
-    usual = float(np.median(_weber(standout, cut, width, settings)))
-    edges = np.flatnonzero(np.diff(np.r_[0, _alike(standout, more, width, usual, settings), 0]))
-    return bool(np.max(edges[1::2] - edges[::2], initial=0) > least)
+    return led, ahead if inside.all() else ahead[: int(np.argmin(inside))]
 
 
 def shaded(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> NDArray[np.bool_]:

@@ -42,6 +42,8 @@ class CrossCut:
         Colour projection in which the cable stands out best, sum of absolute values 1.
     dark : bool
         Cable darker than the ground along ``weights``.
+    known : bool
+        Whether the width that the edges were sought by is the cable's, not that of a mask.
     """
 
     path: Array
@@ -51,6 +53,7 @@ class CrossCut:
     texture: float
     weights: Array
     dark: bool
+    known: bool
 
 
 def smooth_path(path: Array, sigma: float) -> Array:
@@ -80,10 +83,11 @@ def cut_across(
     *,
     known: bool = False,
     shaded: bool = False,
+    weights: Array | None = None,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    ``shaded`` says that a hard shadow lies on one side.
+    ``shaded`` says that a hard shadow lies on one side; ``weights`` is the colour projection if it is not to be sought.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
     of edges one width apart gives middle and width of each section (`pipeline.vision.search.flanks`).
@@ -91,7 +95,7 @@ def cut_across(
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
     straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
-    weights = _projection(straight, offsets / width, standout.covariance)
+    weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
     core, flank = np.abs(offsets) < 0.35 * width, (np.abs(offsets) > 0.9 * width) & (np.abs(offsets) < 1.7 * width)
     ground = np.median(grey[:, flank], axis=1)
@@ -113,6 +117,7 @@ def cut_across(
         texture=float(np.hypot(texture, settings.min_ground_std)),
         weights=weights,
         dark=sign < 0,
+        known=known,
     )
 
 

@@ -141,12 +141,12 @@ def settle_end(
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 
 
-def led_on(body: Array, outward: Array, reach: float, width: float) -> Array:
-    """The body and a parabola through its last four widths, ``reach`` onward, in the unit of the body."""
+def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
+    """The body and a parabola through its last ``base`` widths, ``reach`` onward, in the unit of the body."""
     across = np.array([-outward[1], outward[0]])
     along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
     # counted from the end: a loop may come back beside it
-    last = np.cumprod((along > -4.0 * width)[::-1])[::-1].astype(bool)
+    last = np.cumprod((along > -base * width)[::-1])[::-1].astype(bool)
     parabola = np.polynomial.Polynomial.fit(along[last], aside[last], 2)
     steps = np.linspace(0.0, reach, max(2, round(reach) + 1))[1:]
     return np.vstack([body, body[-1] + steps[:, None] * outward + parabola(steps)[:, None] * across])

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
 
@@ -82,3 +82,18 @@ def test_a_stroke_of_print_is_no_end():
     found = find_cable(_photo(across), VisionSettings())
     assert isinstance(found, RoughCable)
     assert found.length_px == pytest.approx(_length(), rel=0.005)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("place", [(0.75, 0.87), (0.3, 0.8)])
+def test_a_real_cable_is_followed_through_a_shadow(place, shared_data):
+    """The shadow of a thing beside the table hides the cable from every mask; a piece of it would look like a cable."""
+    whole = load_photo(shared_data / "real" / "loop" / "black0.jpg", VisionSettings().photo)
+    picture = cv2.resize(whole.pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    rows, columns = picture.shape[:2]
+    u, v = (np.arange(columns) / columns - place[0]) / 0.1, (np.arange(rows)[:, None] / rows - place[1]) / 0.08
+    light = 1.0 - 0.55 * cv2.GaussianBlur((u**2 + v**2 < 1.0).astype(np.float32), (0, 0), 8)
+    found = find_cable(Photo("shadow.png", (picture * light[..., None]).astype(np.uint8), 8), VisionSettings())
+    assert isinstance(found, RoughCable)
+    # that of the photo without the shadow; the last piece at a clamp is a matter of a few widths
+    assert found.length_px == pytest.approx(3798.0, rel=0.01)
