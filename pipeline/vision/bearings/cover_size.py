@@ -6,6 +6,9 @@ A cable that vanishes ends on the rim of the cover, ahead of which the centre li
 lies too far ahead, a disc under a clamped end not far enough. One radius must serve both ends of several photos, all
 round: then it is what the user would have given as ``bearing_marker_mm``, and each photo is searched again with it.
 
+A cover with a raised edge, a bevel or a groove shows several circles about one axis; its rim is the largest under which
+the cable vanishes. Across a disc below it the cable is seen to run on.
+
 The rim of a cover of the ground's own grey shows in parts only. There the dot or screw on its axis tells the same: seen
 all round, and everywhere at one distance ahead of where the cable vanishes, which is the radius.
 Units: px.
@@ -18,9 +21,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_rim
-from pipeline.vision.bearings.rim import Radius
+from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
@@ -121,18 +125,22 @@ class _LostEnd:
     end: CableEnd
     width_px: float
     settings: BearingSettings
-    _known: list[tuple[float, float]] = field(default_factory=list)
-    _rest: Iterator[tuple[float, float]] | None = None
+    _known: list[Circle] = field(default_factory=list)
+    _rest: Iterator[Circle] | None = None
 
-    def circles(self) -> Iterator[tuple[float, float]]:
-        """Circles seen nearly all round, by size: radius, and distance of the centre from the end in radii."""
+    def circles(self) -> Iterator[Circle]:
+        """Circles seen nearly all round, by size."""
         self._rest = self._search() if self._rest is None else self._rest
         yield from self._known
         for circle in self._rest:
             self._known.append(circle)
             yield circle
 
-    def _search(self) -> Iterator[tuple[float, float]]:
+    def ahead(self, circle: Circle) -> float:
+        """Distance of a circle's centre from the end of the cable, in radii."""
+        return float(np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius)
+
+    def _search(self) -> Iterator[Circle]:
         settings = self.settings
         low, high = settings.cover_radii_widths
         # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
@@ -143,14 +151,49 @@ class _LostEnd:
             if circle is None or circle.rim < settings.sure_rim:
                 continue
             if circle.radius_std <= settings.same_radius * circle.radius:
-                ahead = np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius
-                yield circle.radius, float(ahead)
+                yield circle
 
 
 def _at_end(lost: _LostEnd) -> float | None:
-    """The smallest circle whose rim is where the cable ends."""
-    limit = lost.settings.end_on_rim
-    return next((radius for radius, ahead in lost.circles() if abs(ahead - 1.0) <= limit), None)
+    """Radius of the smallest circle with the cable's end on its rim, or of a larger one about it that hides it too."""
+    settings = lost.settings
+    at_end = (circle for circle in lost.circles() if abs(lost.ahead(circle) - 1.0) <= settings.end_on_rim)
+    rim = next(at_end, None)
+    if rim is None:
+        return None
+    for circle in at_end:
+        apart = np.hypot(*np.subtract(circle.center, rim.center))
+        wider = circle.radius > (1.0 + settings.same_radius) * rim.radius
+        if wider and apart <= settings.same_axis_radii * circle.radius and _hides(lost, rim, circle):
+            rim = circle
+    return rim.radius
+
+
+def _hides(lost: _LostEnd, inner: Circle, outer: Circle) -> bool:
+    """True if between two circles about one axis the cable looks as the rest of that ring does, not as outside it."""
+    way = lost.end.place - np.array(outer.center)
+    toward = np.arctan2(way[1], way[0])
+    half = 0.25 * lost.width_px / outer.radius  # the middle half of the cable: what is beside it is ground
+    along = np.linspace(-half, half, 9)
+    between = inner.radius + np.array([0.35, 0.5, 0.65]) * (outer.radius - inner.radius)
+    beyond = outer.radius + np.array([0.3, 0.5, 0.7]) * lost.width_px
+    # Beside the cable by its whole width and more, where it hides nothing either; light from one side differs less.
+    beside = np.linspace(4.0 * half, 4.0 * half + np.pi / 3.0, 30)
+    ring = _colour(lost.photo, outer.center, between, toward + np.concatenate([-beside, beside]))
+    here = _colour(lost.photo, outer.center, between, toward + along)
+    cable = _colour(lost.photo, outer.center, beyond, toward + along)
+    return bool(np.linalg.norm(here - ring) <= np.linalg.norm(here - cable))
+
+
+def _colour(photo: Photo, center: tuple[float, float], radii: Array, angles: Array) -> Array:
+    """Median colour ``(c,)`` on pieces of circles, as far as they lie in the picture."""
+    u, v = (
+        np.rint(at + np.multiply.outer(radii, turn(angles))).astype(int).ravel()
+        for at, turn in zip(center, (np.cos, np.sin), strict=True)
+    )
+    inside = (u >= 0) & (v >= 0) & (u < photo.size[0]) & (v < photo.size[1])
+    values = photo.pixels[v[inside], u[inside]].reshape(np.count_nonzero(inside), -1)
+    return np.asarray(np.median(values, axis=0) if len(values) else np.zeros(photo.channels), float)
 
 
 def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
@@ -159,14 +202,14 @@ def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
     White bands, letters and shadows hide the last of a cable. At one end it must be lost so near that the circle is no
     dot, which lies farther ahead; the largest, for a bevel lies on the same axis.
     """
-    for radius, _ in sorted(ends[0].circles(), reverse=True):
+    for radius in sorted((circle.radius for circle in ends[0].circles()), reverse=True):
         alike = [_nearest(end, radius) for end in ends]
-        ahead = [circle[1] for circle in alike if circle is not None]
-        radii = _alike((None if circle is None else circle[0] for circle in alike), settings)
+        ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
+        radii = _alike((None if circle is None else circle.radius for circle in alike), settings)
         if radii is not None and max(ahead) <= settings.lost_cable_reach and min(ahead) <= settings.lost_before_rim:
             return float(np.median(radii))
     return None
 
 
-def _nearest(lost: _LostEnd, radius: float) -> tuple[float, float] | None:
-    return min(lost.circles(), key=lambda circle: abs(circle[0] - radius), default=None)
+def _nearest(lost: _LostEnd, radius: float) -> Circle | None:
+    return min(lost.circles(), key=lambda circle: abs(circle.radius - radius), default=None)

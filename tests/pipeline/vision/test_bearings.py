@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
+from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius, visible_ends
 from pipeline.vision.bearings.covers import Radius, find_cover
+from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.ends import CableEnd
+from pipeline.vision.segmentation import find_cable
 
 STAGE = BearingSettings()
 SCALE = 9_000.0
@@ -272,6 +275,49 @@ def test_radius_about_known_is_told_by_the_rims_at_half_of_the_ends() -> None:
     found = rim_radius(seen, 0.93 * radius, STAGE)
     assert found is not None and abs(found - radius) < 0.3  # a soft shadow lies beside the rim
     assert rim_radius(seen[:1], 0.93 * radius, STAGE) is None
+
+
+def ringed_cover(
+    left: tuple[float, float],
+    right: tuple[float, float],
+    *,
+    cable_above: float,
+    inner: float = 29.0,
+    outer: float = 36.0,
+) -> Photo:
+    """Rings between two radii (px), middles of the ground's look, at both ends of a cable 28 px wide.
+
+    The cable is seen up to ``cable_above`` px from the axes: it vanishes under the ring, or runs across it.
+    """
+    v, u = np.mgrid[0:240, 0:700].astype(float)
+    along = np.subtract(right, left) / np.hypot(*np.subtract(right, left))
+    s = (u - left[0]) * along[0] + (v - left[1]) * along[1]
+    t = (v - left[1]) * along[0] - (u - left[0]) * along[1]
+    grey = np.full(u.shape, 170.0)
+    distance = np.minimum(np.hypot(u - left[0], v - left[1]), np.hypot(u - right[0], v - right[1]))
+    ring = 0.5 * (erfc((distance - outer) / np.sqrt(2.0)) - erfc((distance - inner) / np.sqrt(2.0)))
+    grey += (45.0 - grey) * ring
+    between = (s > 0.0) & (s < np.hypot(*np.subtract(right, left)))
+    shown = (
+        between * 0.5 * erfc((np.abs(t) - 14.0) / np.sqrt(2.0)) * erfc((cable_above - distance) / np.sqrt(2.0)) / 2.0
+    )
+    grey += (85.0 - grey) * shown + np.random.default_rng(5).normal(0.0, 1.5, grey.shape)
+    return Photo("ringed", grey.clip(0, 255).astype(np.uint8), 8)
+
+
+@pytest.mark.parametrize(("cable_above", "radius"), [(36.0, 36.0), (29.0, 29.0)], ids=["under it", "across it"])
+def test_rim_of_a_cover_with_a_ring_is_where_the_cable_vanishes(cable_above: float, radius: float) -> None:
+    left, right = (90.4, 120.7), (610.3, 110.6)
+    photo = ringed_cover(left, right, cable_above=cable_above)
+    found = cover_radius([(photo, cable_to_the_rims(left, right, 30.0))], STAGE)  # a mask ends within the dark ring
+    assert found is not None and abs(found - radius) < 0.5
+
+
+def test_ring_at_the_end_of_a_cable_is_no_loop_of_it() -> None:
+    photo = ringed_cover((90.4, 120.7), (610.3, 110.6), cable_above=45.0, inner=37.0, outer=45.0)
+    found = find_cable(photo, VisionSettings(), cable=Cable(28.0, bearings=BearingHints(cover_px=90.0)))
+    assert isinstance(found, RoughCable)
+    assert np.abs(np.subtract(found.left.center_px, (90.4, 120.7))).max() < 0.2
 
 
 def test_one_cover_without_a_screw_tells_no_size() -> None:
