@@ -62,6 +62,12 @@ def suited(values: Iterable[float], symbol: str, *, decimal: str = ".") -> Unit:
     return Unit(10.0**-power, PREFIXES[power] + symbol, decimal)
 
 
+def quantity(value: float, symbol: str, std: float | None = None) -> str:
+    """A number in SI units within a sentence, in the unit that suits it; with ± where its ``std`` is given."""
+    unit = suited((value,), symbol)
+    return unit.plain(value) if std is None else unit.text(value, std)
+
+
 def amount_unit(unit: str, *amounts: float, decimal: str = ".") -> Unit:
     """Unit of amounts of a cause: the contract writes ``N m^2``, and ``-`` for a plain number."""
     return suited(amounts, "" if unit == "-" else unit.replace("^2", "²"), decimal=decimal)

@@ -11,6 +11,7 @@ from pipeline.identify.identification import Identification
 from pipeline.records import Finding, Level
 from pipeline.rounding import p_value
 from pipeline.settings.identify import IdentifySettings
+from pipeline.units import quantity
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
@@ -50,15 +51,15 @@ def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
         yield Finding(
             "identify/force-sign",
             "warning",
-            f"the forces of the loaded steps are tension (median {np.median(loaded):.3g} N), but a cable pushed "
-            'together is compressed; if the log counts compression as negative, set rig.force_sign = "tension"',
+            f"the forces of the loaded steps are tension (median {quantity(float(np.median(loaded)), 'N')}), but a "
+            'cable pushed together is compressed; if the log counts compression as negative, set rig.force_sign = "tension"',
         )
     for step in test.steps:
         if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
             yield Finding(
                 "identify/force-zero",
                 "warning",
-                f"the load cell reads {step.force:.4g} N in the force-free step {step.step}, "
+                f"the load cell reads {quantity(step.force, 'N', step.force_std)} in the force-free step {step.step}, "
                 f"{abs(step.force) / step.force_std:.1f} standard deviations from zero",
             )
 

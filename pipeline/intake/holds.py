@@ -24,6 +24,7 @@ from pipeline.intake.signs import force_sign, from_mounted, inferred_branches, s
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.records import Array, Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
+from pipeline.units import quantity
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> It
         message = f"{name}: the force changes while a step is held; it was taken at the moment of the photo"
         yield inferred("log/trend", f"{message}, from a trend of degree {fitted.degree} in time")
     if fitted.source != FROM_SAMPLES:
-        share = f"{settings.force_std_relative:.1%} of the largest force, {fitted.std[0]:.3g} N"
+        share = f"{settings.force_std_relative:.1%} of the largest force, {quantity(float(fitted.std[0]), 'N')}"
         yield inferred("log/force-std", f"{name}: no repeated samples; standard deviation of a force taken as {share}")
 
 

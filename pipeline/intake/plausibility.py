@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.intake.noted import doubtful
 from pipeline.records import Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
+from pipeline.units import quantity
 
 
 def size_findings(
@@ -61,8 +62,9 @@ def _force_size(
     if low <= modulus_mpa <= high:
         return ()
     message = (
-        f"a force of {force:.3g} N on a cable of {length_m * 1e3:.4g} mm asks for EI = P L^2/pi^2 = "
-        f"{stiffness:.3g} N m^2, that is a modulus of {modulus_mpa:.3g} MPa for {diameter_m * 1e3:.3g} mm diameter; "
-        f"cables have {low:g} to {high:g} MPa: check the unit of the force (mN, N, kN), length_mm and diameter_mm"
+        f"a force of {quantity(force, 'N')} on a cable of {length_m * 1e3:.4g} mm asks for EI = P L^2/pi^2 = "
+        f"{quantity(stiffness, 'N m²')}, that is a modulus of {modulus_mpa:.3g} MPa for {diameter_m * 1e3:.3g} mm "
+        f"diameter; cables have {low:g} to {high:g} MPa: check the unit of the force (mN, N, kN), length_mm and "
+        "diameter_mm"
     )
     return (doubtful("size/force", message),)

@@ -14,6 +14,7 @@ from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.records import Array, Branch, Finding
 from pipeline.settings.intake import IntakeSettings
+from pipeline.units import quantity
 
 BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most of its buckling load whatever its law
 
@@ -67,7 +68,7 @@ def force_sign(
     if not np.any(loud):
         return said, []
     negative = forces[loud] < 0.0
-    median = f"median {np.median(forces[loud]):.4g} N"
+    median = f"median {quantity(float(np.median(forces[loud])), 'N')}"
     if spec.force_sign is None and np.mean(negative) >= settings.sign_share:
         message = (
             f"{name}: {np.count_nonzero(negative)} of {negative.size} bent steps have a negative force ({median}); the "

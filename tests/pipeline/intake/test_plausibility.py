@@ -41,7 +41,7 @@ def test_force_off_by_a_thousand(length, diameter, force, factor):
 
 def test_the_figures_are_right():
     (finding,) = size_findings(0.2, 5e-3, steps(1000.0, 0.012), settings=SETTINGS)
-    EI = float(re.search(r"pi\^2 = ([\d.e+]+) N m\^2", finding.message)[1])
+    EI = float(re.search(r"pi\^2 = ([\d.]+)\u00a0N m²", finding.message)[1])
     modulus = float(re.search(r"modulus of ([\d.e+]+) MPa", finding.message)[1])
     assert pytest.approx(1000.0 * 0.2**2 / np.pi**2, rel=5e-3) == EI
     assert modulus == pytest.approx(EI / (np.pi * 5e-3**4 / 64.0) * 1e-6, rel=1e-2)

@@ -39,10 +39,10 @@ def test_letters_without_a_shape_become_boxes():
 
 def test_findings_that_find_no_room_are_counted():
     sheet = Sheet("cable-07")
-    long = "the load cell reads 0.3 N in the force-free step 0, 12.0 standard deviations from zero"
+    long = "the load cell reads 0.300 ± 0.025 N in the force-free step 0, 12.0 standard deviations from zero"
     list_troubles(sheet, [FindingPart(code="x", level="warning", message=long)] * 60, Words("de"))
     told = [text.get_text() for text in sheet.figure.texts]
-    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 0,3 N") for line in told)
+    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 0,300 ± 0,025 N") for line in told)
     assert 10 < shown < 60
     assert told[-1] == f"{60 - shown} weitere in report.html."
     assert sheet.room() > 0.0
