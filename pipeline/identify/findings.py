@@ -52,7 +52,8 @@ def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
             "identify/force-sign",
             "warning",
             f"the forces of the loaded steps are tension (median {quantity(float(np.median(loaded)), 'N')}), but a "
-            'cable pushed together is compressed; if the log counts compression as negative, set rig.force_sign = "tension"',
+            "cable pushed together is compressed; if the log counts compression as negative, set "
+            'rig.force_sign = "tension"',
         )
     for step in test.steps:
         if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
