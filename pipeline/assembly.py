@@ -32,7 +32,7 @@ from pipeline.result import (
 )
 from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
-from pipeline.visited import visited
+from pipeline.visited import refuted, visited
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
@@ -124,11 +124,11 @@ def assemble(
 def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos: Sequence[PhotoPart]) -> str:
     """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
 
-    Where the diagnosis extended the model, what the extended model gives is the answer; where no photo could be used,
-    why the first was not.
+    Where the diagnosis extended the model, what the extended model gives is the answer, unless the data refute it;
+    where no photo could be used, why the first was not.
     """
     way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
-    extended = visited("extended", diagnosis.extended) if diagnosis is not None else None
+    extended = None if diagnosis is None or refuted(diagnosis) else visited("extended", diagnosis.extended)
     curve = extended or visited(name, way.curve)
     if curve is None and photos and all(photo.reason for photo in photos):
         return f"None of the {len(photos)} photos could be used. The first: {photos[0].reason}"

@@ -11,7 +11,7 @@ from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
-from pipeline.visited import best, curves, pre_curvature
+from pipeline.visited import best, pre_curvature, trusted
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
@@ -131,7 +131,7 @@ def _refused(result: Result) -> str:
 
 def _agreement(result: Result, words: Words) -> str:
     """Difference of the two ways against what their bands allow."""
-    part, found = result.agreement, curves(result)
+    part, found = result.agreement, trusted(result)
     if part is None or part.rms_relative is None or not {"inverse", "balance"} <= found.keys():
         return words("agree_none")
     one, two = found["inverse"], found["balance"]

@@ -16,7 +16,7 @@ from pipeline.report.words import Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit
-from pipeline.visited import curves
+from pipeline.visited import curves, trusted
 
 TALL = (400.0, 350.0)
 
@@ -39,7 +39,7 @@ class PhotoView:
 
 def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawing | None:
     """f_EI by every way."""
-    parts = curves(result)
+    parts = trusted(result)
     if not parts:
         return None
     unit = figures.stiffness_unit(result, words)
@@ -76,7 +76,7 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
             "std": _short(unit.factor * curve.tangent_std),
             "factor": [_short(unit.factor * column) for column in curve.factor.T],
         }
-        for method, curve in curves(result).items()
+        for method, curve in trusted(result).items()
     ]
     ranges = {photo.step: seen_range(photo) for photo in result.photos}
     return {

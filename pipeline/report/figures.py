@@ -19,7 +19,7 @@ from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit, suited
-from pipeline.visited import Visited, curves, visited
+from pipeline.visited import Visited, curves, trusted, visited
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.
@@ -35,12 +35,12 @@ def band_width(settings: ReportSettings) -> float:
 
 def stiffness_unit(result: Result, words: Words) -> Unit:
     """Unit of bending stiffness for all of a report."""
-    return suited((v for curve in curves(result).values() for v in curve.tangent), "N m²", decimal=words.decimal)
+    return suited((v for curve in trusted(result).values() for v in curve.tangent), "N m²", decimal=words.decimal)
 
 
 def moment_unit(result: Result, words: Words) -> Unit:
     """Unit of bending moment for all of a report."""
-    return suited((v for curve in curves(result).values() for v in curve.moment), "N m", decimal=words.decimal)
+    return suited((v for curve in trusted(result).values() for v in curve.moment), "N m", decimal=words.decimal)
 
 
 def force_unit(result: Result, words: Words) -> Unit:
@@ -50,7 +50,7 @@ def force_unit(result: Result, words: Words) -> Unit:
 
 def draw_characteristic(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw f_EI by every way with its band; what was never visited is shaded."""
-    axes, parts, unit = plot_area(figure), curves(result), stiffness_unit(result, words)
+    axes, parts, unit = plot_area(figure), trusted(result), stiffness_unit(result, words)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
     margin = 0.14 * (high - low)
     left = min(0.0, low) if abs(low) < 0.5 * (high - low) else low - margin
@@ -109,7 +109,7 @@ def _banded(
 
 def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
-    axes, parts, unit = plot_area(figure), curves(result), moment_unit(result, words)
+    axes, parts, unit = plot_area(figure), trusted(result), moment_unit(result, words)
     if result.balance and result.balance.points_kappa_per_m:
         count = len(result.balance.points_kappa_per_m)
         chosen = slice(None, None, max(1, count // 300))  # more points than that only fill the picture

@@ -145,14 +145,19 @@ def test_at_rest_there_is_no_force(result):
     assert step.kappa_max_per_m == pytest.approx(result.inverse.pre_curvature_per_m)
 
 
-def test_the_extended_characteristic_answers_where_there_is_one(result):
+@pytest.mark.parametrize(
+    ("verdict", "method", "codes"),
+    [("named", "extended", []), ("unexplained", "inverse", ["predict/unexplained"])],
+)
+def test_the_extended_characteristic_answers_unless_it_is_refuted(result, verdict, method, codes):
     curve = result.inverse.curve
     stiffer = {name: [1.1 * v for v in getattr(curve, name)] for name in ("moment_Nm", "tangent_Nm2", "secant_Nm2")}
-    extended = DiagnosisPart(verdict="unexplained", headline="", extended=curve.model_copy(update=stiffer))
+    extended = DiagnosisPart(verdict=verdict, headline="", extended=curve.model_copy(update=stiffer))
     prediction = predict(result.model_copy(update={"diagnosis": extended}), [8e-3])
-    assert prediction.method == "extended"
-    assert prediction.steps[0].force_N == pytest.approx(1.1 * predict(result, [8e-3]).steps[0].force_N, rel=1e-3)
-    assert [finding.code for finding in prediction.findings] == ["predict/unexplained"]
+    assert prediction.method == method
+    factor = 1.1 if method == "extended" else 1.0
+    assert prediction.steps[0].force_N == pytest.approx(factor * predict(result, [8e-3]).steps[0].force_N, rel=1e-3)
+    assert [finding.code for finding in prediction.findings] == codes
 
 
 def test_mistakes_of_the_caller(result):

@@ -71,6 +71,14 @@ def test_extended_model_answers_first(diagnosed, full_result):
     assert set(curves(diagnosed("named"))) == {"inverse", "balance", "extended"}
 
 
+def test_an_extended_model_that_the_data_refute_answers_last(diagnosed):
+    named = diagnosed("named")
+    refuted = named.diagnosis.model_copy(update={"verdict": "unexplained"})
+    unexplained = named.model_copy(update={"diagnosis": refuted})
+    assert best(unexplained).method == "inverse"
+    assert best(unexplained.model_copy(update={"inverse": None, "balance": None})).method == "extended"
+
+
 def test_smallest_radius_is_that_of_the_visible_cable(full_result):
     radius, std, step = smallest_radius(full_result)
     photo = full_result.photos[3]
