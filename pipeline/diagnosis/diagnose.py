@@ -25,11 +25,13 @@ from pipeline.diagnosis.statistics.leftover import Leftover, smooth_fields, test
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.diagnosis.statistics.verdict import credible_set, probabilities, with_twins
+from pipeline.diagnosis.words import spoken
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart
 from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.units import amount_unit
 from rod.measurement import MeasuredTest
 
 
@@ -56,6 +58,8 @@ def diagnose(
         return _nothing_to_compare("no photo under load was measured"), ()
     if not any(step.force for step in test.steps):
         return _nothing_to_compare("all forces in the log are zero"), ()
+    if _stands_still(test, settings):
+        return _nothing_to_compare("the log gives one displacement for all steps"), ()
     faults = faults_of_input(test, settings)
     bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
     if isinstance(bench, str):
@@ -67,7 +71,21 @@ def diagnose(
         if not isinstance(again, str) and again.largest <= again.limit:
             faults, bench = faults.joined(fault), again
     known = None if identification is None else curve_of(identification.inverse)
-    return present(bench, conclude(bench, settings), settings, identified=known), faults.findings
+    conclusion = conclude(bench, settings)
+    part = present(bench, conclusion, settings, identified=known)
+    return part, (*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ()))
+
+
+def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
+    """Whether all displacements of the log are zero, or the same while the photographed chord changes.
+
+    The displacement is what drives the simulation; the chords, which both ways live on, are held against it.
+    """
+    logged = {step.displacement for step in test.steps if step.displacement is not None}
+    chords = [step.chord for step in test.steps if step.chord is not None]
+    std = max((step.chord_std or settings.chord_std * test.length for step in test.steps), default=0.0)
+    moved = max(chords, default=0.0) - min(chords, default=0.0) > settings.fault_sigma * std
+    return logged == {0.0} or (len(logged) == 1 and moved)
 
 
 def chosen_knots(identification: Identification | None, settings: DiagnosisSettings) -> int:
@@ -80,9 +98,12 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects, weigh them, look for a second cause and for what is left."""
     if bench.largest <= confirmed_limit(bench, settings):
         return _concluded(bench, [], [], 0, masking(bench, settings), settings)
-    singles = _refitted(bench, settings)
+    found = _refitted(bench, settings)
+    singles = [e for e in found if e.impossible(bench.suspicion.causes, settings.impossible) is None]
+    impossible = [e for e in found if e not in singles and e.gain > max((s.gain for s in singles), default=0.0)]
     if not singles:
-        return _concluded(bench, [], [], 0, None, settings)
+        nothing = _concluded(bench, [], [], 0, None, settings)
+        return replace(nothing, impossible=impossible, alien=nothing.alien or bool(impossible))
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
     weight = probabilities(
         [e.weighed for e in singles],
@@ -95,7 +116,8 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
     two, instead = second_cause(bench, singles, named, settings)
-    return replace(_concluded(bench, singles, chance, len(members), two, settings), instead=instead)
+    concluded = _concluded(bench, singles, chance, len(members), two, settings)
+    return replace(concluded, instead=instead, impossible=impossible)
 
 
 def _concluded(
@@ -181,6 +203,23 @@ def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Le
         draws=settings.null_draws,
         rng=np.random.default_rng(settings.seed),
     )
+
+
+def _too_large(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> tuple[Finding, ...]:
+    """What would explain an unexplained specimen if it could be that large."""
+    for explanation in conclusion.impossible[:1]:
+        cause = explanation.impossible(bench.suspicion.causes, settings.impossible)
+        if cause is None:
+            break
+        amount, std = explanation.amount(cause)
+        size = amount_unit(cause.unit, amount, std).text(amount, std)
+        times = abs(amount) / cause.plausible(bench.facts)
+        message = (
+            f"{spoken(cause.name)} would remove the misfit, but only at {size}, {times:.0f} times its usual size: it "
+            "is something else, or scale, length or photos are wrong"
+        )
+        return (Finding("diagnosis/impossible-size", "warning", message),)
+    return ()
 
 
 def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

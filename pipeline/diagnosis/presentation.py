@@ -80,13 +80,13 @@ def present(
 
 
 def unproven(p_value: float, gain: GainPart | None, settings: DiagnosisSettings) -> bool:
-    """Whether what is left is no noise, and on steps held out too large a share of the misfit.
+    """Whether what is left is hardly noise, and on steps held out too large a share of the misfit.
 
     Forms whose place and width are tuned to the steps fit away what they do not explain: a soft spot in the place of a
     peg that pushes the cable left 2 % of the misfit, and 19 % of that of steps it had not seen.
     """
     shown = gain is None or not np.isfinite(gain.ci95[1]) or gain.ci95[1] >= 1.0 - settings.explained_share
-    return not shown and p_value < settings.alien_false_alarm
+    return not shown and p_value < settings.unproven
 
 
 def left_out(bench: Workbench) -> tuple[list[int], list[int]]:

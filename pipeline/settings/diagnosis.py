@@ -120,6 +120,17 @@ class DiagnosisSettings(BaseModel):
     implausible: float = Field(
         4.0, description="multiples of the plausible size from which a cause loses probability, by the inverse square"
     )
+    impossible: float = Field(
+        20.0,
+        gt=0,
+        description="multiples of the plausible size beyond which a cause that is limited by its nature is none: a tilt"
+        " of 40 degrees, stiff ends over a third of the cable, all force lost in a hold",
+    )
+    unproven: float = Field(
+        0.05,
+        description="probability; a leftover rarer than this is no noise where steps held out refute the named cause"
+        " too: a second witness beside the 2.5 % of its interval, so both together are a rarer error than false_alarm",
+    )
 
     same_level: float = Field(
         0.01, description="share of the travel; loading and unloading steps closer than this are left out together"

@@ -103,6 +103,7 @@ class ScaleError:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "camera"
     needs: str = "the cable's length or the displacement log to compare with"
     summary: str = "The scale of the photos (px/mm) is off, so every photographed length and curvature is off alike."
@@ -136,6 +137,7 @@ class LensDistortion:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "camera"
     needs: str = "the cable away from the centre of the picture"
     summary: str = "The lens magnifies the rim of the picture otherwise than its centre (barrel or cushion)."
@@ -177,6 +179,7 @@ class CameraTilt:
     sign: int = 0
     combines: bool = True
     additive: bool = False
+    limited: bool = True
     seat: str = "camera"
     needs: str = "photos of different chords, or the cable's length"
     summary: str = "The camera looks askew, so the scale changes across the picture."

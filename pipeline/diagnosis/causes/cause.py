@@ -74,6 +74,9 @@ class Cause(Protocol):
         Whether several forms may act together (a profile along the cable is a sum of forms).
     additive : bool
         Whether the amounts of forms acting together add up; else the largest is the size of the cause.
+    limited : bool
+        Whether many times the plausible amount cannot be. A number typed wrongly, a zero never set, a bearing that has
+        seized, a heavy or patched cable may be off by any amount.
     seat : str
         Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first
         kind only.
@@ -110,6 +113,10 @@ class Cause(Protocol):
     @property
     def additive(self) -> bool:
         """Whether their amounts add up."""
+
+    @property
+    def limited(self) -> bool:
+        """Whether many times the plausible amount cannot be."""
 
     @property
     def seat(self) -> str:

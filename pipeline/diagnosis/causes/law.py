@@ -26,6 +26,7 @@ class NonlinearStiffness:
     sign: int = 0
     combines: bool = True
     additive: bool = False
+    limited: bool = False
     seat: str = "cable"
     needs: str = "steps of different curvature"
     summary: str = "The bending stiffness depends on curvature, or does so in another form than the spline allows."
@@ -78,6 +79,7 @@ class Hysteresis:
     sign: int = 1
     combines: bool = True
     additive: bool = True
+    limited: bool = True
     seat: str = "cable"
     needs: str = "an unloading branch"
     summary: str = "Wires rub on each other: the moment depends on the way the cable was bent to its shape."
@@ -117,6 +119,7 @@ class PlasticSet:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "cable"
     needs: str = "an unloading branch or a force-free photo after bending"
     summary: str = "Bending leaves the cable bent: the pre-curvature grows with the largest curvature reached."

@@ -48,6 +48,7 @@ class ForceOffset:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "load cell"
     needs: str = "a force reading of the force-free cable, or large changes of the bow"
     summary: str = "The load cell shows a constant force too much or too little."
@@ -81,6 +82,7 @@ class ForceGain:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "load cell"
     needs: str = "nothing helps: it is the scale of EI itself"
     summary: str = "The load cell shows all forces too large or too small by one factor."
@@ -111,6 +113,7 @@ class ForceDrift:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "load cell"
     needs: str = "times in the force log"
     summary: str = "The load cell's zero wanders steadily while the test runs."
@@ -145,6 +148,7 @@ class Relaxation:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "cable"
     needs: str = "several force samples, with times, in every hold"
     summary: str = "The cable gives way while a step is held: the force decays toward a smaller value."

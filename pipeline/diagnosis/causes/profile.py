@@ -108,6 +108,7 @@ class PreCurvatureVarying:
     sign: int = 0
     combines: bool = True
     additive: bool = False
+    limited: bool = True
     seat: str = "cable"
     needs: str = "photos; a photo of the force-free cable shows it directly"
     summary: str = "The pre-curvature varies along the cable: set from the spool, or a kink."
@@ -142,6 +143,7 @@ class StiffnessVarying:
     sign: int = 0
     combines: bool = True
     additive: bool = False
+    limited: bool = False
     seat: str = "cable"
     needs: str = "photos under load"
     summary: str = "The bending stiffness varies along the cable: a soft spot, a splice, a stiff label."

@@ -31,6 +31,7 @@ class BearingFriction:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "rig"
     needs: str = "an unloading branch or a force-free photo"
     summary: str = "The bearings turn with a constant friction moment, against their turning direction."
@@ -69,6 +70,7 @@ class BearingStiffness:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "rig"
     needs: str = "photos at several steps"
     summary: str = "The bearings spring back: a moment that grows with their turn, from the mounted position."
@@ -102,6 +104,7 @@ class RigidEnds:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "rig"
     needs: str = "photos that show the cable near its ends"
     summary: str = "Clamps hold the cable's ends straight: a piece between bearing axis and free cable does not bend."
@@ -137,6 +140,7 @@ class RigCompliance:
     sign: int = 1
     combines: bool = False
     additive: bool = False
+    limited: bool = True
     seat: str = "rig"
     needs: str = "photographed chords beside the displacement log"
     summary: str = "The frame or the drive yields under force: less of the displacement reaches the cable."
@@ -170,6 +174,7 @@ class DisplacementOffset:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "rig"
     needs: str = "photographed chords beside the displacement log"
     summary: str = "The displacement was not zero where the log says so: play in the drive, or zeroed under force."
@@ -202,6 +207,7 @@ class LengthError:
     sign: int = 0
     combines: bool = False
     additive: bool = False
+    limited: bool = False
     seat: str = "rig"
     needs: str = "photos with a known scale"
     summary: str = "The stated cable length is not the length between the bearing axes."
@@ -234,6 +240,7 @@ class InPlaneLoad:
     sign: int = 0
     combines: bool = True
     additive: bool = False
+    limited: bool = False
     seat: str = "rig"
     needs: str = "photos at several steps"
     summary: str = "A load acts along the cable in the plane of the test: its weight on a tilted table, or a draught."

@@ -31,6 +31,8 @@ class Conclusion:
         Whether that exceeds noise and is no small share.
     instead : list of int
         Causes of pairs that may stand instead of a single cause of several forms.
+    impossible : list of Explanation
+        Single causes that would remove more than the accepted one, but only at a size that such a cause cannot have.
     """
 
     singles: list[Explanation]
@@ -41,6 +43,7 @@ class Conclusion:
     left: Leftover
     alien: bool
     instead: list[int] = field(default_factory=list)
+    impossible: list[Explanation] = field(default_factory=list)
 
     @property
     def names(self) -> list[int]:

@@ -6,6 +6,7 @@ place or time, and with further forms of the same cause where several may add up
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +53,14 @@ class Explanation:
         at = [self.fitted.extension.owners[i] for i in own]
         variance = float(self.fitted.covariance[np.ix_(at, at)].sum())
         return float(self.fitted.vector[at].sum()), float(np.sqrt(max(variance, 0.0)))
+
+    def impossible(self, catalogue: Sequence[Cause], most: float) -> Cause | None:
+        """A cause that would have to be larger, by two standard deviations, than ``most`` plausible sizes; or None."""
+        for cause in (catalogue[k] for k in self.causes):
+            amount, std = self.amount(cause)
+            if cause.limited and abs(amount) - 2.0 * std > most * cause.plausible(self.fitted.extension.facts):
+                return cause
+        return None
 
 
 def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: bool = False) -> list[int]:

@@ -95,7 +95,8 @@ def second_cause(
     def acceptable(pair: Explanation) -> bool:
         beside_law = [c for c in pair.causes if suspicion.causes[c].name != "nonlinear_stiffness"]
         known = len(beside_law) != 1 or beside_law[0] in named
-        return known and _both_needed(pair, singles, suspicion, least)
+        possible = pair.impossible(suspicion.causes, settings.impossible) is None
+        return known and possible and _both_needed(pair, singles, suspicion, least)
 
     accepted = [pair for pair in found if acceptable(pair)]
     accepted += [pair for pair in _exchanged(bench, accepted, settings) if acceptable(pair)]
@@ -145,6 +146,7 @@ def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
         return None
     found = _exchanged(bench, _refitted(bench, linear, settings, hopeless=bench.base.chi2), settings)
     law = [k for k, cause in enumerate(suspicion.causes) if cause.name == "nonlinear_stiffness"]
+    found = [e for e in found if e.impossible(suspicion.causes, settings.impossible) is None]
     return _weighed(bench, [e for e in found if e.gain > limit and not set(law) & set(e.causes)], settings, [])[0]
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import LOOP, hidden_test
+from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.explanations.explanation import refit_one
+from pipeline.diagnosis.diagnose import conclude
+from pipeline.diagnosis.explanations.explanation import explanation_of, refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import fit
@@ -55,6 +56,32 @@ def test_a_bearing_that_yields_before_it_slips_is_no_friction_of_wires():
     assert friction.gain > wires.gain + 9.0
     amount, std = friction.amount(CATALOGUE[friction.causes[0]])
     assert amount == pytest.approx(1.8e-3, abs=4.0 * std) and std < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "possible"),
+    [("camera_tilt", 5.0, True), ("camera_tilt", 30.0, False), ("force_offset", 30.0, True)],
+)
+def test_some_causes_cannot_be_many_times_their_usual_size(plain, name, times, possible):
+    """A camera that looks along the table has no photo; a load cell that was never set to zero may show anything."""
+    index = [cause.name for cause in CATALOGUE].index(name)
+    term = plain.suspicion.terms[plain.suspicion.of(index)[0]]
+    extension = replace(plain.base.extension, terms=(term,))
+    start = extension.start(plain.base.vector, (times * term.cause.plausible(plain.facts),))
+    fitted = fit(plain.observation, extension, start, iterations=0, tolerance=1e-3, near=plain.base.run)
+    found = explanation_of((index,), plain.base, fitted, plain.suspicion)
+    assert (found.impossible(CATALOGUE, SETTINGS.impossible) is None) == possible
+
+
+def test_what_only_an_impossible_cause_explains_is_unexplained():
+    """The bound is set below what is hidden, so that the refit is an easy one."""
+    (tilt,) = (cause for cause in CATALOGUE if cause.name == "camera_tilt")
+    test = hidden_test(Cable(), SIX, largest=0.0138, seed=6, reading=Reading(tilt=(0.2, 0.0)))
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=5, causes=[tilt])
+    found = conclude(bench, SETTINGS.model_copy(update={"impossible": 0.5}))
+    assert found.accepted is None and found.alien
+    amount, std = found.impossible[0].amount(tilt)
+    assert amount == pytest.approx(0.2, abs=4.0 * std)
 
 
 def test_rows_left_out_of_a_refit_do_not_matter(plain):

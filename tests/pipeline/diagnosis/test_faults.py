@@ -105,3 +105,11 @@ def test_without_forces_nothing_can_be_held_against_the_simulation(honest):
     steps = tuple(replace(step, force=0.0, hold_forces=0.0 * step.hold_forces) for step in honest.steps)
     part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
     assert part.verdict == "underpowered" and "all forces in the log are zero" in part.headline and findings == ()
+
+
+@pytest.mark.parametrize("displacement", [0.0, 5e-3])
+def test_a_log_that_stands_still_drives_no_simulation(honest, displacement):
+    """It had run for minutes into a division by a travel of zero."""
+    steps = tuple(replace(step, displacement=displacement) for step in honest.steps)
+    part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
+    assert part.verdict == "underpowered" and "one displacement for all steps" in part.headline and findings == ()

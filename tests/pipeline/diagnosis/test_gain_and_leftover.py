@@ -132,7 +132,7 @@ def test_one_shape_that_comes_and_goes_from_step_to_step_is_found(fields):
 
 @pytest.mark.parametrize(
     ("p_value", "interval", "expected"),
-    [(1e-4, (0.77, 0.86), True), (0.2, (0.77, 0.86), False), (1e-4, (0.85, 0.97), False)],
+    [(0.02, (0.77, 0.86), True), (0.2, (0.77, 0.86), False), (1e-4, (0.85, 0.97), False)],
 )
 def test_a_cause_that_fails_on_steps_held_out_does_not_explain_what_is_left(p_value, interval, expected):
     gain = GainPart(heldout_excess_removed=0.81, ci95=interval, force_rmse_N=(1.0, 0.1), shape_rmse_m=(1e-3, 1e-4))
