@@ -96,7 +96,7 @@ class SegmentationSettings(StageSettings):
     )
     junction_widths: float = Field(3.5, gt=0, description="widths; strips' ends that meet at a crossing are so near")
     touching_widths: float = Field(
-        2.0, gt=0, description="widths; an end nearer than that to the middle of another strip touches it"
+        2.0, gt=0, description="widths; an end nearer than that to the middle of another strip as wide touches it"
     )
     min_partner_widths: float = Field(
         8.0, gt=0, description="widths; an end that meets a strip shorter than that meets a bolt or a letter"

@@ -84,10 +84,12 @@ def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> 
     long = [other for other in reading.strips if other.length > settings.min_piece_widths * width]
     if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
         return True
-    near = settings.touching_widths * width
     partners = [o for o in reading.strips if o is not strip and o.length > settings.min_partner_widths * width]
     meets = [
-        _touches(end, a, b, near) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)
+        _touches(end, a, b, settings)
+        for other in partners
+        for a, b in ((strip, other), (other, strip))
+        for end in (0, -1)
     ]
     return any(meets)
 
@@ -102,8 +104,12 @@ def _arms(path: Array, junction: Array, reach: float) -> int:
     return int((np.hypot(*(path[[0, -1]] - junction).T) < reach).sum())
 
 
-def _touches(end: int, strip: Strip, other: Strip, near: float) -> bool:
-    """True if an end of ``strip`` lies on the course of ``other``, away from the ends of that."""
+def _touches(end: int, strip: Strip, other: Strip, settings: SegmentationSettings) -> bool:
+    """True if an end of ``strip`` lies on the course of ``other``, away from the ends of that.
+
+    Each counts by its own width: a ruler beside the cable is wider than that.
+    """
+    near = (settings.touching_widths - 0.5) * strip.width + 0.5 * other.width
     margin = int(2.0 * near)
     inner = other.path[margin : len(other.path) - margin]
     return bool(len(inner)) and bool(np.hypot(*(inner - strip.path[end]).T).min() < near)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 from math import pi
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -146,6 +147,24 @@ def test_cover_about_three_cables_wide_makes_no_crossing() -> None:
     wide = Cover(3.0 * DIAMETER, (0.15,) * 3)
     rough, _ = find(scene(covers=(wide, wide)), UNKNOWN)
     assert isinstance(rough, RoughCable), rough.reason
+
+
+def test_ruler_beside_the_cable_is_no_crossing() -> None:
+    """It is two cables wide and runs past both covers, nearer than two of its own widths."""
+    along = np.linspace(0.0, np.pi, 200)
+    bow = np.column_stack([330.0 + 360.0 * along, 530.0 - 350.0 * np.sin(along)])
+    grey = np.full((680, 1800), 35.0, np.float32)
+    cv2.rectangle(grey, (0, 606), (1799, 664), 150.0, -1)
+    cv2.polylines(grey, [np.rint(16.0 * bow).astype(np.int32)], False, 240.0, 30, cv2.LINE_AA, 4)
+    for u, v in bow[[0, -1]].round().astype(int).tolist():
+        cv2.circle(grey, (u, v), 40, 140.0, -1, cv2.LINE_AA)
+    noise = 4.0 * np.random.default_rng(2).standard_normal(grey.shape)
+    photo = Photo("ruler.png", np.clip(cv2.GaussianBlur(grey, (0, 0), 1.0) + noise, 0, 255).astype(np.uint8), 8)
+    found = find_cable(photo, SETTINGS, cable=UNKNOWN)
+    assert isinstance(found, RoughCable)
+    between = np.abs(found.path_px[:, 0] - 895.0) < 500.0  # without the covers, which nothing says are there
+    assert cKDTree(bow).query(found.path_px[between])[0].max() < 8.0  # a quarter of the width
+    assert np.ptp(found.path_px[between, 0]) > 990.0
 
 
 @pytest.mark.parametrize("azimuth", [-1.3, 1.7])
