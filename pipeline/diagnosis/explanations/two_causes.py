@@ -14,7 +14,8 @@ of names: what stands in its place in the pairs of the set.
 
 One cause of several forms may do what two plain ones do (friction between the wires in two elements: friction of the
 bearings and set). It has as many free numbers, so a larger gain of either is no proof. Both are weighed, two causes
-with a lower probability beforehand, and whichever wins, the other joins the names unless it is improbable.
+with a lower probability beforehand, and whichever wins, the other joins the names unless it is improbable. A pair that
+removes as much with no more numbers joins them in any case: the data do not speak against it.
 """
 
 from __future__ import annotations
@@ -287,7 +288,8 @@ def _weighed(
     weight /= weight.sum()
     members = credible_set(weight, level=settings.set_level)
     if float(weight[: len(pairs)].sum()) < 0.5:
-        return None, list(dict.fromkeys(cause for k in members if k < len(pairs) for cause in pairs[k].causes))
+        instead = [*(pairs[k] for k in members if k < len(pairs)), *_as_good(pairs, every[members[0]], settings)]
+        return None, list(dict.fromkeys(cause for pair in instead for cause in pair.causes))
     alone = tuple(dict.fromkeys(every[k].causes[0] for k in members if k >= len(pairs)))
     suspicion = bench.suspicion
     closeness = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
@@ -300,6 +302,15 @@ def _weighed(
     members = with_twins(members, own, gain, alike, cosine=settings.twin_cosine, margin=settings.twin_margin)
     share = own[members] / (own[members].sum() + weight[len(pairs) :].sum())
     return TwoCauses([pairs[k] for k in members], share.tolist(), alone), []
+
+
+def _as_good(pairs: list[Explanation], single: Explanation, settings: DiagnosisSettings) -> list[Explanation]:
+    """Pairs that remove as much as a single cause of several forms with no more numbers: only a prior is against it."""
+    return [
+        pair
+        for pair in pairs
+        if pair.gain > single.gain - settings.twin_margin and pair.weighed.tuned <= single.weighed.tuned
+    ]
 
 
 def _in_order(pair: Explanation, first: Explanation, closeness: Array) -> Explanation:

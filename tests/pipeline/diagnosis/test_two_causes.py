@@ -56,6 +56,13 @@ def test_the_causes_of_a_pair_that_fits_as_well_join_the_class_of_one_cause(benc
     assert _weighed(bench, [explanation(PAIR, 390.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
 
 
+def test_its_prior_alone_does_not_keep_a_pair_out_of_the_class(bench):
+    """Less than two sigma apart; prior and gain together leave it 2 %, less than the set asks for."""
+    two, instead = _weighed(bench, [explanation(PAIR, 397.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
+    assert two is None and instead == [0, 1]
+    assert _weighed(bench, [explanation(PAIR, 397.0, 2)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
+
+
 def test_a_wrong_half_of_a_pair_is_exchanged():
     """Beside a force that decays, a wrong scale is put right: it is the lens, which moves the same points."""
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
