@@ -128,6 +128,18 @@ class CurveSettings(StageSettings):
         gt=0,
         description="diameters; bound of the errors' correlation length, longer ones cannot be told from a bend",
     )
+    least_balance: float = Field(
+        0.8,
+        ge=0,
+        le=1,
+        description="of both edges in a section (1: they count alike) for its width to tell how long errors"
+        " last: one edge then has four times the other's variance",
+    )
+    slow_width_order: int = Field(
+        5,
+        ge=1,
+        description="of the polynomial of s that the width may follow by light, lens and distance of the camera",
+    )
     bias_share: float = Field(
         0.5,
         ge=0,

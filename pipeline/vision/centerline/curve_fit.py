@@ -23,7 +23,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
-from pipeline.vision.centerline.smoothing import Problem, Smooth
+from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,7 @@ def fit_curve(
     correlation_length: float | None = None,
     iterations: int = 8,
     bias_share: float = 0.5,
+    witness: Witness | None = None,
 ) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
 
@@ -102,6 +103,8 @@ def fit_curve(
     bias_share : float
         Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
+    witness : Witness, optional
+        Other data whose errors last as long along s as those of the points.
     """
     found = _settle(
         points,
@@ -112,6 +115,7 @@ def fit_curve(
         longest=longest,
         correlation_length=correlation_length,
         iterations=iterations,
+        witness=witness,
     )
     smooth = found.problem.smooth(found.length, bias_share=bias_share)
     curve = found.before.moved(smooth.estimate - found.before.parameters)
@@ -155,6 +159,7 @@ def _settle(
     longest: float,
     correlation_length: float | None,
     iterations: int,
+    witness: Witness | None = None,
 ) -> _Settled:
     """Gauss-Newton with robust weights, ``iterations`` steps at most."""
     weight = np.ones(len(points))
@@ -167,7 +172,7 @@ def _settle(
             weight = _biweight(residual / std, spread)
         problem = _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
-            length = problem.correlation_length(longest)
+            length = problem.correlation_length(longest, witness)
         step = problem.estimate(length) - curve.parameters
         found = _Settled(curve.moved(step), curve, problem, s, weight, length)
         curve = found.curve

@@ -10,6 +10,7 @@ from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges
 from pipeline.vision.centerline.midline import Cover, Sections, free_of_covers, measure_sections
+from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.rough import Bearing, RoughCable
 
 
@@ -23,6 +24,7 @@ def fit_along(
     diameter: float,
     settings: CurveSettings,
     breaks: tuple[float, ...] = (),
+    witness: Witness | None = None,
 ) -> CurveFit:
     """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
 
@@ -38,6 +40,8 @@ def fit_along(
         From axis to axis, and of the cable; one unit with the points.
     breaks : tuple of float
         Arc lengths at which the slope of the curvature may jump.
+    witness : Witness, optional
+        Other data whose errors last as long along s as those of the points.
     """
     most = max(settings.min_intervals, round(length / (settings.knot_spacing_diameters * diameter)))
     intervals = min(most, max(settings.first_intervals, round(length / (settings.path_knot_diameters * diameter))))
@@ -56,6 +60,7 @@ def fit_along(
             correlation_length=correlation_length,
             iterations=iterations,
             bias_share=settings.bias_share,
+            witness=witness,
         )
 
     while intervals < most:  # long cables only

@@ -9,6 +9,9 @@ singular vectors of its upper block Q1: the generalised singular values of the p
 O(p). Squared normal equations, which lose half the digits, are never formed; ``Q1' Q1`` is, for the columns of the
 whole are orthonormal, so that its eigenvalues keep an absolute error of one rounding.
 
+Errors that last as long as a bend of the curve cannot be told from one by the points alone: other data with errors of
+the same l and without the curve, the `Witness`, enter its likelihood.
+
 The restricted likelihood over ``log mu`` is kept whole: estimate and covariance are averaged over it, so that a weight
 that the data leave open widens the bands.
 
@@ -72,6 +75,29 @@ def whiten(rows: Array, std: Array, gaps: Array, length: float) -> Array:
 def _correlations(gaps: Array, length: float) -> Array:
     # Capped: two sections at the same place would be taken for one, and their difference for infinitely certain.
     return np.asarray(np.minimum(np.exp(-np.maximum(gaps, 0.0) / length), 0.999))
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Data ``(m,)`` at ``position`` ``(m,)`` whose errors last as long along s as those of a problem.
+
+    What they hold besides is slow: a combination of the columns of ``slow`` ``(m, k)``. ``std`` ``(m,)`` is the
+    relative size of the errors; their scale is their own.
+    """
+
+    data: Array
+    std: Array
+    position: Array
+    slow: Array
+
+    def criterion(self, length: float) -> float:
+        """Restricted likelihood of a correlation length, -2 log."""
+        gaps = np.diff(self.position)
+        columns = whiten(np.column_stack([self.slow, self.data]), self.std, gaps, length)
+        triangle = np.abs(np.diag(np.linalg.qr(columns, mode="r")))
+        value = 2.0 * (len(columns) - self.slow.shape[1]) * np.log(max(triangle[-1], 1e-300))
+        value += 2.0 * np.log(triangle[:-1]).sum() + np.log1p(-(_correlations(gaps, length) ** 2)).sum()
+        return float(value)
 
 
 @dataclass(frozen=True)
@@ -202,13 +228,18 @@ class Problem:
         """Distances of neighbours, ``(n - 1,)``."""
         return np.diff(self.position)
 
-    def correlation_length(self, longest: float) -> float:
-        """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``."""
+    def correlation_length(self, longest: float, witness: Witness | None = None) -> float:
+        """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``.
+
+        A ``witness`` tells of errors that last as long as a bend of the curve, which it does not follow.
+        """
         shortest = 0.2 * float(np.median(self.gaps))
 
         def value(log_length: float) -> float:
-            diagonal = self._diagonal(float(np.exp(log_length)))
-            return float(diagonal.criterion(diagonal.weights())[0].min())
+            length = float(np.exp(log_length))
+            diagonal = self._diagonal(length)
+            seen = 0.0 if witness is None else witness.criterion(length)
+            return seen + float(diagonal.criterion(diagonal.weights())[0].min())
 
         bounds = (np.log(shortest), np.log(max(longest, 2.0 * shortest)))
         return float(np.exp(minimize_scalar(value, bounds=bounds, method="bounded", options={"xatol": 0.2}).x))

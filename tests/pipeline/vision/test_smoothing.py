@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.testing import assert_allclose
-from scipy.linalg import block_diag
+from scipy.interpolate import BSpline
+from scipy.linalg import block_diag, null_space
 
-from pipeline.vision.centerline.smoothing import Problem, whiten
+from pipeline.vision.centerline.smoothing import Problem, Witness, whiten
 
 N, P = 60, 9
 
@@ -68,6 +69,45 @@ def test_correlation_length_has_the_likelihood_of_the_dense_form():
     found = task.correlation_length(5.0)
     at_found = min(dense_criterion(task, found, w)[0] for w in weights)
     assert at_found < min(value) + 0.2  # a tenth of what one standard deviation costs would be 0.1
+
+
+def errors(rng, position, length: float):
+    """Gaussian errors of unit variance and correlation exp(-ds / length), by the root of the full matrix."""
+    V = np.exp(-np.abs(position[:, None] - position) / length)
+    return np.linalg.cholesky(V + 1e-12 * np.eye(len(position))) @ rng.standard_normal(len(position))
+
+
+def test_witness_has_the_likelihood_of_the_dense_form():
+    rng = np.random.default_rng(4)
+    s = np.sort(rng.uniform(0.0, 10.0, N))
+    witness = Witness(errors(rng, s, 0.6), rng.uniform(0.5, 2.0, N), s, np.vander(s / 10.0, 3))
+
+    def dense(length: float) -> float:
+        V = np.exp(-np.abs(s[:, None] - s) / length) * np.outer(witness.std, witness.std)
+        contrast = null_space(witness.slow.T).T  # the restricted likelihood is that of all contrasts free of the slow
+        C, free = contrast @ V @ contrast.T, len(contrast)
+        z = contrast @ witness.data
+        return free * np.log(z @ np.linalg.solve(C, z)) + np.linalg.slogdet(C)[1]
+
+    lengths = np.array([0.1, 0.5, 2.0])
+    found, exact = (np.array([f(length) for length in lengths]) for f in (witness.criterion, dense))
+    assert_allclose(np.diff(found), np.diff(exact), rtol=1e-8)
+
+
+def test_witness_tells_errors_that_pass_for_the_curve():
+    """Errors that last three spacings under a curve of half as many parameters as points: 20 trials."""
+    rng, s = np.random.default_rng(5), np.linspace(0.0, 10.0, N)
+    design = BSpline.design_matrix(s, np.r_[[0.0] * 3, np.linspace(0.0, 10.0, N // 2 - 2), [10.0] * 3], 3).toarray()
+    alone, told = [], []
+    for _ in range(20):
+        data = errors(rng, s, 0.5)
+        task = Problem(design, data, np.diff(np.eye(design.shape[1] - 2), 2, axis=0), 4, np.ones(N), s)
+        witness = Witness(0.3 * errors(rng, s, 0.5), np.ones(N), s, np.vander(s / 10.0, 3))
+        alone.append(task.correlation_length(5.0))
+        told.append(task.correlation_length(5.0, witness))
+    off, by_witness = (np.sqrt(np.mean(np.log(np.array(found) / 0.5) ** 2)) for found in (alone, told))
+    assert by_witness < 0.5  # a correlation length is known to the root of 2 l / range, a third, at best
+    assert by_witness < 0.7 * off  # twice the data would give 0.71 if both told alike
 
 
 def test_covariance_is_that_of_all_weights():
