@@ -32,7 +32,7 @@ def language_option(command: Command) -> Command:
     return click.option(
         "--language",
         type=click.Choice(["de", "en"]),
-        help="Language of what is written; English by default.",
+        help="Language of reports, index and explanations; all else in the terminal is English. English by default.",
     )(command)
 
 

@@ -199,21 +199,29 @@ def _name_sides(
         du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
         if du <= np.tan(np.radians(settings.bearings.vertical_deg)) * dv:
             flipped = [replace(shot, found=_reversed(shot.found)) for shot in shots]
-            return flipped, _fixed_moved(steps, moving, calibration, settings.series)
+            return flipped, _fixed_moved(steps, moving, found, calibration, settings.series)
         text = (
             f"The {moving} bearing moves on the photos, specimen.toml says moving_bearing = "
             f'"{specimen.rig.moving_bearing}"; the camera may be turned by 180 degrees or the photos mirrored.'
         )
         findings.append(Finding("rig/moving-bearing", "warning", text))
-    return shots, (*findings, *_fixed_moved(steps, moving, calibration, settings.series))
+    return shots, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))
 
 
-def _fixed_moved(steps: Array, moving: str, calibration: Calibration, settings: SeriesSettings) -> tuple[Finding, ...]:
-    shift = float(steps.min()) / calibration.scale.px_per_m
-    if shift <= settings.max_fixed_shift_m:
-        return ()
+def _fixed_moved(
+    steps: Array, moving: str, found: list[RoughCable], calibration: Calibration, settings: SeriesSettings
+) -> tuple[Finding, ...]:
     other = "right" if moving == "left" else "left"
-    text = f"The fixed ({other}) bearing wanders by {1e3 * shift:.2f} mm over the photos; camera or frame moved."
+    axes = [cable.right if other == "right" else cable.left for cable in found]
+    shift = float(steps.min()) / calibration.scale.px_per_m
+    # Both coordinates of an axis spread over three standard deviations among eight photos, over four hardly ever.
+    doubt = 4.0 * np.sqrt(2.0) * float(np.median([axis.std_px for axis in axes])) / calibration.scale.px_per_m
+    if shift <= max(settings.max_fixed_shift_m, doubt):
+        return ()
+    text = (
+        f"The fixed ({other}) bearing wanders by {1e3 * shift:.2f} mm over the photos, more than its place on them is "
+        "open; camera or frame moved."
+    )
     return (Finding("photo/camera-moved", "warning", text),)
 
 

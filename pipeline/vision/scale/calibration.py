@@ -11,7 +11,7 @@ Standard deviations are relative and common to all photos of the specimen. SI un
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from pipeline.records import Array, Finding, Scale, Specimen
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
+
+_LENGTH = "length of the cable on the photos"
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def from_found(
         scale = Scale(
             float(np.median(lengths)) / specimen.length_m,
             settings.length_scale_std,
-            "length of the cable on the photos",
+            _LENGTH,
         )
     message = f"No scale is given; {scale.px_per_m / 1e3:.4g} px/mm follow from the {scale.source}."
     finding = Finding("scale/source", "info", message)
@@ -140,25 +142,66 @@ def check_scale(
     displacements: Array,
     settings: CalibrationSettings,
 ) -> tuple[Finding, ...]:
-    """Hold the scale against the covers' diameter and the travel of the moving bearing; what fails is a finding."""
-    findings = []
-    local = _local_scale(calibration, found)
+    """Hold the scale against travel of the moving bearing, covers' diameter and cable; what fails is a finding.
+
+    The rim that is seen of a domed or chamfered cover lies within the diameter that was measured on it. Where travel or
+    cable could tell such a difference and confirm the scale, it is the covers that are otherwise, not the scale.
+    """
+    found_by = calibration.scale
     parallax_std = axis_parallax_std(specimen, found, settings)
-    for other, code in (
-        (_by_covers(found, specimen, settings), "scale/covers"),
-        (_by_travel_on_plane(calibration, found, displacements, parallax_std), "scale/displacement"),
-    ):
-        if other is None or other.source == calibration.scale.source:
-            continue
-        ratio = other.px_per_m / (local if code == "scale/covers" else 1.0)
-        std = float(np.hypot(other.std_relative, calibration.scale.std_relative))
-        if abs(ratio - 1.0) > max(settings.check_sigmas * std, settings.check_floor):
+    travel = _by_travel_on_plane(calibration, found, displacements, parallax_std)
+    covers = _relative(_by_covers(found, specimen, settings), _local_scale(calibration, found))
+    findings = []
+    if covers is not None and covers.source != found_by.source and _off(covers, found_by, settings):
+        witnesses = [
+            witness
+            for witness in (travel, _by_length(calibration, found, specimen, settings))
+            if witness is not None
+            and witness.source != found_by.source
+            and abs(covers.px_per_m - 1.0) > settings.check_sigmas * _std(witness, found_by)
+        ]
+        confirmed = witnesses and not any(_off(witness, found_by, settings) for witness in witnesses)
+        text = _away(covers, found_by)
+        if confirmed:
             text = (
-                f"The {other.source} gives a scale {100 * (ratio - 1):+.2f} ± {100 * std:.2f} % away from the one used "
-                f"({calibration.scale.source})."
+                f"The rims seen of the bearing covers are {100 * covers.px_per_m:.1f} % as wide as the diameter given; "
+                f"the scale used ({found_by.source}) is confirmed by the {witnesses[0].source}."
             )
-            findings.append(Finding(code, "warning", text))
+        findings.append(Finding("scale/covers", "info" if confirmed else "warning", text))
+    if travel is not None and travel.source != found_by.source and _off(travel, found_by, settings):
+        findings.append(Finding("scale/displacement", "warning", _away(travel, found_by)))
     return tuple(findings)
+
+
+def _relative(scale: Scale | None, used: float) -> Scale | None:
+    """A scale in units of the one used."""
+    return None if scale is None else replace(scale, px_per_m=scale.px_per_m / used)
+
+
+def _std(other: Scale, used: Scale) -> float:
+    return math.hypot(other.std_relative, used.std_relative)
+
+
+def _off(other: Scale, used: Scale, settings: CalibrationSettings) -> bool:
+    """True if a scale in units of the one used differs from it by more than both allow."""
+    return abs(other.px_per_m - 1.0) > max(settings.check_sigmas * _std(other, used), settings.check_floor)
+
+
+def _away(other: Scale, used: Scale) -> str:
+    return (
+        f"The {other.source} gives a scale {100 * (other.px_per_m - 1):+.2f} ± {100 * _std(other, used):.2f} % away "
+        f"from the one used ({used.source})."
+    )
+
+
+def _by_length(
+    calibration: Calibration, found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings
+) -> Scale | None:
+    """Scale by the length of the cable in units of the one used."""
+    if not found:
+        return None
+    length = float(np.median([cable.length_px for cable in found])) / _local_scale(calibration, found)
+    return Scale(length / specimen.length_m, settings.length_scale_std, _LENGTH)
 
 
 def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:

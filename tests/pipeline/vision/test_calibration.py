@@ -282,3 +282,16 @@ def test_wrong_scale_is_found_by_covers_and_travel(error: float, codes: list[str
     findings = check_scale(specimen(), calibration, cables, travel, STAGE)
     assert [finding.code for finding in findings] == codes
     assert all("-2.9" in finding.message for finding in findings)
+
+
+@pytest.mark.parametrize(("error", "level"), [(0.0, "info"), (0.05, "warning")])
+def test_covers_of_another_width_than_given_speak_against_no_scale_that_travel_confirms(
+    error: float, level: str
+) -> None:
+    true, travel = 9_500.0, np.array([0.0, 0.005, 0.010])
+    cables = [found(200 + true * d, 1900.0, 0.95 * 0.006 * true) for d in travel]  # domes: the rim seen is 5 % narrower
+    cable = specimen(length_m=(1700.0 - 0.005 * true) / true)  # as long as on the middle one of the photos
+    findings = check_scale(cable, from_number(true * (1 + error), STAGE), cables, travel, STAGE)
+    covers = next(finding for finding in findings if finding.code == "scale/covers")
+    assert covers.level == level
+    assert ("95.0 % as wide" in covers.message) == (level == "info")
