@@ -36,7 +36,7 @@ INSIDE = {
         ("control_points", "estimate"),
         ("problem",),
     ],
-    "rod.balance": [("compliance",), ("moment_points",), ("moment_regression",), ("graph",)],
+    "rod.balance": [("compliance",), ("moment_points", "smoothness"), ("moment_regression",), ("graph",)],
     "pipeline.diagnosis": [
         ("observations",),
         ("causes", "statistics"),

@@ -2,8 +2,8 @@
 
 The balance equations give the moment almost without error and the curvature with error, so the curvature is regressed
 on the moment: no attenuation by errors in the abscissa. ``log c`` is a cubic B-spline over the moments met, so c > 0
-and m(K) is monotone whatever the coefficients. Its roughness ``int (d^2 log c / d mu^2)^2 dmu`` with
-``mu = (m - low) / (high - low)`` carries the prior: an integrated Wiener process whose size the data choose.
+and m(K) is monotone whatever the coefficients, with ``mu = (m - low) / (high - low)``. How smooth it is, is told by
+`rod.balance.smoothness`.
 
 Units: moment in N m, compliance in 1/(N m^2), curvature in 1/m.
 """
@@ -40,10 +40,8 @@ class ComplianceBasis:
         Index of m = 0.
     spline : BSpline
         The p splines as one vector-valued spline over mu.
-    roughness : (p, p)
-        Matrix of the penalty.
-    first_slope : (p,)
-        d/dmu of the splines at m = 0.
+    nodes, weights : (g,)
+        Of a quadrature over mu that is exact for products of the splines' second derivatives.
     """
 
     low: float
@@ -53,8 +51,8 @@ class ComplianceBasis:
     table: Array
     zero: int
     spline: BSpline
-    roughness: Array
-    first_slope: Array
+    nodes: Array
+    weights: Array
 
     def at(self, moment: ArrayLike) -> Array:
         """The splines at `moment` (n,), N m -> (n, p); constant continuation outside."""
@@ -78,7 +76,7 @@ def compliance_basis(low: float, high: float, *, unit: float, coefficients: int 
     unit : 1/(N m^2)
         Typical compliance.
     coefficients : int
-        Number of B-splines, at least 5. The penalty, not their number, decides how bent the law may be.
+        Number of B-splines, at least 5. The prior, not their number, decides how bent the law may be.
 
     Raises
     ------
@@ -100,10 +98,8 @@ def compliance_basis(low: float, high: float, *, unit: float, coefficients: int 
     # Second derivatives of cubics are linear in each interval: two Gauss points integrate their products exactly.
     half = 0.5 * np.diff(inner)[:, None]
     nodes = (0.5 * (inner[:-1] + inner[1:])[:, None] + half * np.array([-1.0, 1.0]) / np.sqrt(3.0)).ravel()
-    bend = np.asarray(spline(nodes, 2)) * np.sqrt(np.repeat(half.ravel(), 2))[:, None]
-    first_slope = np.asarray(spline(-low / (high - low), 1))
     zero = int(np.argmin(np.abs(moments)))
-    return ComplianceBasis(low, high, unit, moments, table, zero, spline, bend.T @ bend, first_slope)
+    return ComplianceBasis(low, high, unit, moments, table, zero, spline, nodes, np.repeat(half.ravel(), 2))
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class BalanceOptions:
     floor : relative
         Curvature that no photo resolves, over the range met: the error of the smooth curve's own spline.
     roughness : (low, high)
-        Range of the prior standard deviation of d^2 log c / dmu^2 that is averaged over: from a straight line to a law
+        Range of the prior standard deviation of d^2 log c / dt^2 that is averaged over: from a straight line to a law
         that changes its stiffness tenfold within a third of the range.
     grid : int
         Points of the reported curve.

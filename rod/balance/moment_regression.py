@@ -3,9 +3,10 @@
 Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the errors common
 to all photos (`rod.balance.moment_points.CommonErrors`, each in units of its standard deviation), and Legendre
 coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual depends on the compliance and is renewed
-in each iteration. The prior of the law's form is its roughness and its slope at rest, log c being flat there for a
-cable that bends alike to both sides. The posterior is an average over the sizes of both, weighted by their evidence
-(Laplace), so that the bands hold what the data do not know about the form of the law.
+in each iteration. The prior of the law's form is its roughness and its slope at rest (`rod.balance.smoothness`), log c
+being flat there for a cable that bends alike to both sides. The posterior is an average over what the law may be smooth
+along and over the sizes of both, weighted by their evidence (Laplace), so that the bands hold what the data do not know
+about the form of the law.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.special import chdtrc
 
 from rod.balance.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
 from rod.balance.moment_points import CommonErrors, MomentPoints, Residual, residual
+from rod.balance.smoothness import smoothnesses
 
 Array = NDArray[np.float64]
 
@@ -28,12 +30,12 @@ ROUGHNESS_STEPS = 15
 """Values of the roughness averaged over: a factor 1.6 apart, over which the posterior hardly changes."""
 
 SLOPES, SLOPE_STEPS = (0.03, 3.0), 5
-"""Sizes of the prior of d log c / dmu at m = 0 averaged over: from none that could be seen to a factor e^3."""
+"""Sizes of the prior of log c's slope at rest averaged over: from none that could be seen to a factor e^3."""
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Average over the sizes of roughness and slope.
+    """Average over what the law may be smooth along, and over the sizes of roughness and slope.
 
     Attributes
     ----------
@@ -86,7 +88,7 @@ class MomentModel:
     floor : 1/m
         Curvature that no photo resolves.
     roughness : (low, high)
-        Range of the prior standard deviation of d^2 log c / dmu^2.
+        Range of the prior standard deviation of d^2 log c / dt^2.
     varying : bool
         Whether K0(s) is free to vary.
     """
@@ -136,7 +138,7 @@ class MomentModel:
         return columns
 
     def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
-        """Mean and covariance of the unknowns, averaged over the priors' sizes with their evidence as the weight.
+        """Mean and covariance of the unknowns, averaged over the priors with their evidence as the weight.
 
         The priors act on the coefficients alone: all other unknowns are eliminated once, and follow.
         """
@@ -151,16 +153,11 @@ class MomentModel:
         inner = unit[:, None] * np.linalg.inv(unit[:, None] * normal[rest, rest] * unit) * unit
         back = -inner @ normal[rest, law]
         schur, force = normal[law, law] + normal[law, rest] @ back, pull[law] + back.T @ pull[rest]
-        rough = np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS)
-        steep = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
-        log_tau, log_slope = (axis.ravel() for axis in np.meshgrid(rough, steep))
-        flat = np.outer(self.basis.first_slope, self.basis.first_slope)
-        A = schur + np.exp(-2.0 * log_tau)[:, None, None] * self.basis.roughness
-        A += np.exp(-2.0 * log_slope)[:, None, None] * flat
+        precisions, norms = self._priors(compliance_curve(self.basis, unknowns[:p]))
+        A = schur + precisions
         inverses = np.linalg.inv(A)
         means = inverses @ force
-        # Each prior counts as often as it has directions: the roughness leaves straight lines free.
-        evidence = 0.5 * (means @ force - np.linalg.slogdet(A)[1]) - (p - 2) * log_tau - log_slope
+        evidence = norms + 0.5 * (means @ force - np.linalg.slogdet(A)[1])
         weight = np.exp(evidence - evidence.max())
         weight /= weight.sum()
         mean = weight @ means
@@ -173,6 +170,20 @@ class MomentModel:
             np.block([[covariance, across.T], [across, inner + across @ back.T]]),
             np.vstack([shrinkage, back @ shrinkage]),
         )
+
+    def _priors(self, curve: ComplianceCurve) -> tuple[Array, Array]:
+        """All priors averaged over: their precisions of log c (n, p, p) and the logs of their norms (n,)."""
+        rough = np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS)
+        steep = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
+        log_tau, log_slope = (axis.ravel() for axis in np.meshgrid(rough, steep))
+        precisions, norms = [], []
+        for smooth in smoothnesses(curve):
+            flat = np.outer(smooth.first_slope, smooth.first_slope)
+            precision = np.exp(-2.0 * log_tau)[:, None, None] * smooth.roughness
+            precisions.append(precision + np.exp(-2.0 * log_slope)[:, None, None] * flat)
+            # Each prior counts as often as it has directions: the roughness leaves straight lines free.
+            norms.append(np.log(smooth.share) + smooth.log_volume - (self.size - 2) * log_tau - log_slope)
+        return np.concatenate(precisions), np.concatenate(norms)
 
 
 def bow_terms(data: MomentPoints) -> Array:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
-from rod.inverse.law_prior import LawPrior, first_prior, places_of
+from rod.inverse.law_prior import Along, LawPrior, first_prior, places_of
 from rod.inverse.whitening import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
 
@@ -149,7 +149,7 @@ class FitModel:
         """f_EI at the knots, (k,) N m^2."""
         return np.asarray(self.unit * np.exp(u[: self.knots.size]))
 
-    def places(self, u: Array) -> tuple[Array, ...]:
+    def places(self, u: Array) -> tuple[Along, ...]:
         """Places of the knots along which the law may be smooth; see `rod.inverse.law_prior`."""
         return places_of(self.characteristic(u), self.knots, self.pre_curvature(u))
 

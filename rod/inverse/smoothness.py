@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from rod.inverse.evaluation import Evaluation
 from rod.inverse.fit_model import FitModel
 from rod.inverse.knots import first_slope, roughness
-from rod.inverse.law_prior import LawPrior, log_volume
+from rod.inverse.law_prior import Along, LawPrior, log_volume
 
 Array = NDArray[np.float64]
 
@@ -84,19 +84,19 @@ def _data_rows(found: Evaluation, without: tuple[str, ...]) -> tuple[Array, Arra
     return found.jacobian[keep], found.value[keep]
 
 
-def _priors(places: tuple[Array, ...], taus: tuple[float, float]) -> tuple[list[LawPrior], Array, Array]:
+def _priors(along: tuple[Along, ...], taus: tuple[float, float]) -> tuple[list[LawPrior], Array, Array]:
     """All priors averaged over, their precisions of z and K0 (n, k + 1, k + 1), and the logs of their norms (n,)."""
-    k = places[0].size
+    k = along[0].places.size
     sizes = np.meshgrid(_even(taus, TAU_STEPS), _even(SLOPES, SLOPE_STEPS), indexing="ij")
     tau, slope = (np.exp(axis.ravel()) for axis in sizes)
-    precisions = np.zeros((len(places), tau.size, k + 1, k + 1))
-    norms = np.zeros((len(places), tau.size))
-    for at, precision, norm in zip(places, precisions, norms, strict=True):
+    precisions = np.zeros((len(along), tau.size, k + 1, k + 1))
+    norms = np.zeros((len(along), tau.size))
+    for (at, share), precision, norm in zip(along, precisions, norms, strict=True):
         g = first_slope(at)
         precision[:, :k, :k] = roughness(at) / tau[:, None, None] ** 2 + np.outer(g, g) / slope[:, None, None] ** 2
         # Each prior counts as often as it has directions: the roughness leaves straight lines free.
-        norm[:] = log_volume(at) - (k - 2) * np.log(tau) - np.log(slope)
-    priors = [LawPrior(at, float(a), float(b)) for at in places for a, b in zip(tau, slope, strict=True)]
+        norm[:] = np.log(share) + log_volume(at) - (k - 2) * np.log(tau) - np.log(slope)
+    priors = [LawPrior(at, float(a), float(b)) for at, _ in along for a, b in zip(tau, slope, strict=True)]
     return priors, precisions.reshape(-1, k + 1, k + 1), norms.ravel()
 
 
@@ -105,7 +105,7 @@ def _even(bounds: tuple[float, float], count: int) -> Array:
     return np.linspace(np.log(bounds[0]), np.log(bounds[1]), count)
 
 
-def average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], taus: tuple[float, float]) -> Averaged:
+def average(value: Array, J: Array, unknowns: Array, along: tuple[Along, ...], taus: tuple[float, float]) -> Averaged:
     """Average over the priors of the law's form; only the laws' unknowns (control points, K0) change with them.
 
     Parameters
@@ -116,15 +116,15 @@ def average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], 
         Their derivatives by the unknowns.
     unknowns : (q,)
         Where they were taken: logarithms of f_EI at the k knots first, then K0 in any unit, then all others.
-    places : tuple of (k,)
-        Of the knots along what the law may be smooth.
+    along : tuple of Along
+        Places of the knots along what the law may be smooth.
     taus : (low, high)
         Range of the roughness.
 
     Strategy: the other unknowns are eliminated once: with A = [[A_ll, A_ln], [A_nl, A_nn]] every prior acts on the
     Schur complement of A_nn, and mean, covariance and response of all unknowns are linear in what is found there.
     """
-    k = places[0].size
+    k = along[0].places.size
     law, rest = slice(0, k + 1), slice(k + 1, unknowns.size)
     A, pull, chi2 = J.T @ J, -J.T @ value, float(value @ value)
     inner = np.asarray(np.linalg.inv(A[rest, rest]), dtype=np.float64)
@@ -133,7 +133,7 @@ def average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], 
     chi2 -= float(pull[rest] @ inner @ pull[rest])
     log_det_rest = float(np.linalg.slogdet(A[rest, rest])[1])
 
-    priors, precisions, norms = _priors(places, taus)
+    priors, precisions, norms = _priors(along, taus)
     z = unknowns[law]
     # Unknowns of very different size; what the data do not see at all is zero but for rounding, of either sign.
     unit = 1.0 / np.sqrt(np.maximum(np.diag(schur), np.finfo(float).eps * np.diag(A).max()))
@@ -159,20 +159,20 @@ def average(value: Array, J: Array, unknowns: Array, places: tuple[Array, ...], 
         _extended(covariance, inner, back),
         np.vstack([shrinkage, back @ shrinkage])[:, :k],
         priors[int(np.argmax(evidence))],
-        _typical_covariance(priors, share, places),
+        _typical_covariance(priors, share, along),
         log_evidence,
     )
 
 
-def _typical_covariance(priors: list[LawPrior], share: Array, places: tuple[Array, ...]) -> Array:
+def _typical_covariance(priors: list[LawPrior], share: Array, along: tuple[Along, ...]) -> Array:
     """Prior covariance of z for the geometric means of tau and slope along each of the places.
 
     A mean of the covariances themselves would be that of the widest priors, however unlikely the data make them.
     """
-    k = places[0].size
+    k = along[0].places.size
     covariance = np.zeros((k, k))
-    logs = np.log([(prior.tau, prior.slope) for prior in priors]).reshape(len(places), -1, 2)
-    for at, weights, sizes in zip(places, share.reshape(len(places), -1), logs, strict=True):
+    logs = np.log([(prior.tau, prior.slope) for prior in priors]).reshape(len(along), -1, 2)
+    for (at, _), weights, sizes in zip(along, share.reshape(len(along), -1), logs, strict=True):
         if not weights.any():
             continue  # the data leave no evidence at all to laws that are smooth along these places
         tau, slope = np.exp(weights @ sizes / weights.sum())
