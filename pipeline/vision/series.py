@@ -94,7 +94,9 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, "none: no photo could be measured"))
     shots = with_fixed_cover(specimen, shots, calibration, settings)
-    shots, lines, side_findings = _measure_all(specimen, shots, calibration, settings)
+    found, _ = _told_by(shots, [shot.found for shot in shots])
+    parallax_std = axis_parallax_std(specimen, found, settings.calibration)
+    shots, lines, side_findings = _measure_all(specimen, shots, calibration, parallax_std, settings)
     pairs = list(zip(shots, lines, strict=True))
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     lines = without_lay(lines, specimen.diameter_m, settings.curve)
@@ -109,7 +111,6 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         *check_scale(specimen, calibration, found, displacements, settings.calibration),
         *_check_lengths(specimen, lines, settings.series),
     )
-    parallax_std = axis_parallax_std(specimen, found, settings.calibration)
     return Traces(lines, calibration.scale, findings, parallax_std)
 
 
@@ -122,8 +123,10 @@ def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibrat
     return None
 
 
-def _line(shot: Shot, plane: PlaneMap, diameter_m: float, settings: VisionSettings) -> Centerline | Rejected:
-    work = partial(_measure, shot.found, plane, diameter_m, shot.preview, settings)
+def _line(
+    shot: Shot, plane: PlaneMap, diameter_m: float, parallax_std: float, settings: VisionSettings
+) -> Centerline | Rejected:
+    work = partial(_measure, shot.found, plane, diameter_m, shot.preview, settings, axis_parallax_std=parallax_std)
     line = guarded(shot.found.image, work)
     # the picture is shown also where the work on it broke
     return replace(line, preview=shot.preview) if line.preview is None else line
@@ -140,12 +143,12 @@ def _told_by(
 
 
 def _measure_all(
-    specimen: Specimen, shots: list[Shot], calibration: Calibration, settings: VisionSettings
+    specimen: Specimen, shots: list[Shot], calibration: Calibration, parallax_std: float, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Centerline | Rejected, ...], tuple[Finding, ...]]:
     """Measure all photos; once more if those that can be measured tell that sides or axes are others than taken."""
 
     def measured(some: list[Shot]) -> tuple[Centerline | Rejected, ...]:
-        return tuple(_line(shot, calibration.plane, specimen.diameter_m, settings) for shot in some)
+        return tuple(_line(shot, calibration.plane, specimen.diameter_m, parallax_std, settings) for shot in some)
 
     lines = measured(shots)
     found, _ = _told_by(shots, lines)
@@ -165,11 +168,15 @@ def _measure(
     diameter_m: float | None,
     preview: Preview | None,
     settings: VisionSettings,
+    *,
+    axis_parallax_std: float = 0.0,
 ) -> Centerline | Rejected:
     outcome = (
         rough
         if isinstance(rough, Rejected)
-        else measure_centerline(rough, plane=plane, diameter_m=diameter_m, settings=settings)
+        else measure_centerline(
+            rough, plane=plane, diameter_m=diameter_m, settings=settings, axis_parallax_std=axis_parallax_std
+        )
     )
     if preview is None:
         return outcome

@@ -235,9 +235,3 @@ class CurveSettings(StageSettings):
         description="widths; how far a cable sits beside its bearing's axis: 0.1 mm on 5 mm, the play of a sheath in a"
         " bore made for it",
     )
-    outward_std: float = Field(
-        0.003,
-        ge=0,
-        description="relative; covers look farther from the middle of the picture than the cable below them: 3 mm seen"
-        " from a metre",
-    )

@@ -64,8 +64,7 @@ def continue_to_axes(
     """
     rows, values, noise = _bow_at_ends(fit, covariance, settings.least_departure)
     if set(kinds) <= {"cover", "given"}:
-        outward = settings.outward_std if "cover" in kinds else 0.0
-        by_axes = _axes(fit, chord, settings.axis_play_widths * width, outward)
+        by_axes = _axes(fit, chord, settings.axis_play_widths * width)
         rows, values = np.vstack([rows, by_axes[0]]), np.concatenate([values, by_axes[1]])
         noise = np.block([[noise, np.zeros((2, 2))], [np.zeros((2, 2)), by_axes[2]]])
     # The second derivatives and the distances differ by orders of magnitude.
@@ -115,7 +114,7 @@ def _pull(curve: PlaneCurve, s: Array) -> tuple[float, float]:
     return float(a), float(b)
 
 
-def _axes(fit: CurveFit, chord: ChordFrame, play: float, outward: float) -> tuple[Array, Array, Array]:
+def _axes(fit: CurveFit, chord: ChordFrame, play: float) -> tuple[Array, Array, Array]:
     """Rows, values and noise of the distances of both axes from the curve, along its normals."""
     curve = fit.curve
     feet = curve.foot(chord.axes, np.array([0.0, curve.frame.knots[-1]]))
@@ -124,6 +123,6 @@ def _axes(fit: CurveFit, chord: ChordFrame, play: float, outward: float) -> tupl
     rows = curve.normal_basis(feet)
     values = ((chord.axes - where) * normal).sum(axis=1)
     # Apart along the chord, together across it; the middle of the picture lies beside the chord by half of its half.
-    outward = 0.5 * outward * chord.chord
+    outward = 0.5 * chord.axis_parallax_std * chord.chord
     common = normal * np.array([[-outward, 0.5 * outward], [outward, 0.5 * outward]])
     return rows, values, np.eye(2) * (chord.axis_std**2 + play**2) + common @ common.T

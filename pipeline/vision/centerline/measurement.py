@@ -40,6 +40,7 @@ def measure_centerline(
     diameter_m: float | None,
     settings: VisionSettings,
     breaks_m: tuple[float, ...] = (),
+    axis_parallax_std: float = 0.0,
 ) -> Centerline | Rejected:
     """Centerline of the cable in the chord frame, or why there is none.
 
@@ -54,6 +55,8 @@ def measure_centerline(
     settings : VisionSettings
     breaks_m : tuple of m
         Arc lengths from the left axis at which a point load is assumed: the slope of the curvature may jump there.
+    axis_parallax_std : relative
+        As in `pipeline.records.Traces`.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def measure_centerline(
     sections = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
     if isinstance(sections, Rejected):
         return sections
-    chord = chord_frame(rough, plane)
+    chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     refused = _refusal(rough, sections, width, diameter_m, options)
     if refused is not None:

@@ -30,6 +30,8 @@ class ChordFrame:
         Distance of the axes; standard deviation of each axis' coordinates.
     mirrored : bool
         True if y points up on the photo.
+    axis_parallax_std : relative
+        As in `pipeline.records.Traces`; no part of ``axis_std``.
     """
 
     plane: PlaneMap
@@ -38,6 +40,7 @@ class ChordFrame:
     chord: float
     axis_std: float
     mirrored: bool
+    axis_parallax_std: float = 0.0
 
     @property
     def axes(self) -> Array:
@@ -53,7 +56,7 @@ class ChordFrame:
         return self.plane.to_pixels(xy @ self.rotation + self.origin)
 
 
-def chord_frame(rough: RoughCable, plane: PlaneMap) -> ChordFrame:
+def chord_frame(rough: RoughCable, plane: PlaneMap, axis_parallax_std: float = 0.0) -> ChordFrame:
     """Chord frame of a photo by its bearing axes and the side on which its cable lies."""
     pixels = np.array([rough.left.center_px, rough.right.center_px])
     left, right = plane.to_plane(pixels)
@@ -71,4 +74,5 @@ def chord_frame(rough: RoughCable, plane: PlaneMap) -> ChordFrame:
         chord=chord,
         axis_std=float(std / np.median(plane.local_scale(pixels))),
         mirrored=bool(toward[1] < 0.0),
+        axis_parallax_std=axis_parallax_std,
     )

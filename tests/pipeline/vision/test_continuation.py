@@ -18,6 +18,7 @@ from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
 from tests.pipeline.vision.bow_scene import DIAMETER, LENGTH, bow
 
+PARALLAX = 0.003  # covers 3 mm above the plane, a metre from the camera
 SETTINGS, HIDDEN, ERROR, COUNT = CurveSettings(), 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
 
 
@@ -58,7 +59,8 @@ def _errors(case, *, kinds=("cover", "cover"), beside=0.0, apart=0.0, known=True
     covariance = fit.smooth.covariance
     if known:
         origin = np.array([-apart, beside])
-        chord = ChordFrame(PlaneMap.from_scale(1.0), origin, np.eye(2), curve.chord + 2.0 * apart, 1e-5, False)
+        seen = curve.chord + 2.0 * apart
+        chord = ChordFrame(PlaneMap.from_scale(1.0), origin, np.eye(2), seen, 1e-5, False, PARALLAX)
         fit = replace(fit, curve=replace(fit.curve, point=fit.curve.point - origin))
         fit, covariance = continue_to_axes(fit, covariance, chord, kinds=kinds, width=DIAMETER, settings=SETTINGS)
     ends = np.array([0.0, LENGTH])
