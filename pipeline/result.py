@@ -289,6 +289,9 @@ class DiagnosisPart(Part):
     blind_spots: list[BlindSpot] = []
     next_experiment: NextExperiment | None = None
     extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
+    extended_refuted: bool = Field(
+        False, description="whether the data refute the extended model, so that its curve is no answer"
+    )
     leftover: dict[str, Any] | None = None
     residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
     residuals_after: dict[str, Any] | None = None

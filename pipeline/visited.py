@@ -94,12 +94,8 @@ def curves(result: Result) -> dict[str, Visited]:
 
 
 def refuted(diagnosis: DiagnosisPart | None) -> bool:
-    """Whether the data refute the extended model, whose cause then has bent f_EI: it is no answer.
-
-    Of seven specimens with something outside the catalogue, f_EI was 2.8 % off without extension (median; 8.3 % at
-    worst) and 6.4 % with it (50 %).
-    """
-    return diagnosis is not None and diagnosis.verdict == "unexplained"
+    """Whether the data refute the extended model: its curve is no answer."""
+    return diagnosis is not None and diagnosis.extended_refuted
 
 
 def trusted(result: Result) -> dict[str, Visited]:

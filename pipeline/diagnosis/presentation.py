@@ -70,6 +70,7 @@ def present(
         blind_spots=blind_spots(bench, rows, settings),
         next_experiment=_next(bench, conclusion, settings, verdict),
         extended=extended,
+        extended_refuted=verdict == "unexplained" and not _removes_most(gain, settings),
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
@@ -87,6 +88,11 @@ def unproven(p_value: float, gain: GainPart | None, settings: DiagnosisSettings)
     """
     shown = gain is None or not np.isfinite(gain.ci95[1]) or gain.ci95[1] >= 1.0 - settings.explained_share
     return not shown and p_value < settings.unproven
+
+
+def _removes_most(gain: GainPart | None, settings: DiagnosisSettings) -> bool:
+    """Whether the extension removes so much of the misfit of steps held out that its f_EI is the better one."""
+    return gain is not None and gain.heldout_excess_removed >= settings.extension_share
 
 
 def left_out(bench: Workbench) -> tuple[list[int], list[int]]:

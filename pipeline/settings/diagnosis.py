@@ -132,6 +132,13 @@ class DiagnosisSettings(BaseModel):
         " too: a second witness beside the 2.5 % of its interval, so both together are a rarer error than false_alarm",
     )
 
+    extension_share: float = Field(
+        0.75,
+        description="share of the excess misfit of held-out steps that the extension of an unexplained specimen must"
+        " remove for its f_EI to be the answer: with less, that of five specimens was 1.4 to 50 % off and the plain one"
+        " 0.4 to 5 %; with more, that of three was 0.5 to 4 % off and the plain one 4 to 30 %",
+    )
+
     same_level: float = Field(
         0.01, description="share of the travel; loading and unloading steps closer than this are left out together"
     )

@@ -146,13 +146,18 @@ def test_at_rest_there_is_no_force(result):
 
 
 @pytest.mark.parametrize(
-    ("verdict", "method", "codes"),
-    [("named", "extended", []), ("unexplained", "inverse", ["predict/unexplained"])],
+    ("verdict", "refuted", "method", "codes"),
+    [
+        ("named", False, "extended", []),
+        ("unexplained", False, "extended", ["predict/unexplained"]),
+        ("unexplained", True, "inverse", ["predict/unexplained"]),
+    ],
 )
-def test_the_extended_characteristic_answers_unless_it_is_refuted(result, verdict, method, codes):
+def test_the_extended_characteristic_answers_unless_it_is_refuted(result, verdict, refuted, method, codes):
     curve = result.inverse.curve
     stiffer = {name: [1.1 * v for v in getattr(curve, name)] for name in ("moment_Nm", "tangent_Nm2", "secant_Nm2")}
-    extended = DiagnosisPart(verdict=verdict, headline="", extended=curve.model_copy(update=stiffer))
+    longer = curve.model_copy(update=stiffer)
+    extended = DiagnosisPart(verdict=verdict, headline="", extended=longer, extended_refuted=refuted)
     prediction = predict(result.model_copy(update={"diagnosis": extended}), [8e-3])
     assert prediction.method == method
     factor = 1.1 if method == "extended" else 1.0

@@ -6,7 +6,7 @@ from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
-from pipeline.diagnosis.presentation import unproven
+from pipeline.diagnosis.presentation import _removes_most, unproven
 from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, predictive_root
 from pipeline.diagnosis.statistics.leftover import smooth_fields
 from pipeline.diagnosis.statistics.leftover import test_leftover as leftover_of
@@ -138,3 +138,13 @@ def test_a_cause_that_fails_on_steps_held_out_does_not_explain_what_is_left(p_va
     gain = GainPart(heldout_excess_removed=0.81, ci95=interval, force_rmse_N=(1.0, 0.1), shape_rmse_m=(1e-3, 1e-4))
     assert unproven(p_value, gain, DiagnosisSettings()) is expected
     assert not unproven(p_value, None, DiagnosisSettings())
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.6, False), (0.9, True), (None, False)])
+def test_an_unexplained_extension_answers_only_if_it_removes_most(share, expected):
+    given = None
+    if share is not None:
+        given = GainPart(
+            heldout_excess_removed=share, ci95=(0.5, 1.0), force_rmse_N=(1.0, 0.1), shape_rmse_m=(1.0, 0.1)
+        )
+    assert _removes_most(given, DiagnosisSettings()) is expected

@@ -73,7 +73,7 @@ def test_extended_model_answers_first(diagnosed, full_result):
 
 def test_an_extended_model_that_the_data_refute_answers_last(diagnosed):
     named = diagnosed("named")
-    refuted = named.diagnosis.model_copy(update={"verdict": "unexplained"})
+    refuted = named.diagnosis.model_copy(update={"verdict": "unexplained", "extended_refuted": True})
     unexplained = named.model_copy(update={"diagnosis": refuted})
     assert best(unexplained).method == "inverse"
     assert best(unexplained.model_copy(update={"inverse": None, "balance": None})).method == "extended"
