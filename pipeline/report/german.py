@@ -112,10 +112,16 @@ def _turned(sentence: str, causes: tuple[tuple[str, str], ...]) -> tuple[str, bo
     if known is not None:
         return known, True
     runs = list(_runs(SEPARATORS.split(sentence), causes))
-    if all(german is None for _, german, _ in runs):
+    # A word or two of German in an English sentence (of another version of the program) is neither.
+    told_of = sum(_letters(text) for text, german, _ in runs if german is not None)
+    if not told_of or 2 * told_of < _letters(sentence):
         return _comma(sentence), False
     told = [(_comma(text) if german is None else german) + JOINED.get(sign, sign) for text, german, sign in runs]
     return "".join(told), True
+
+
+def _letters(text: str) -> int:
+    return sum(sign.isalpha() for sign in text)
 
 
 def _runs(tokens: list[str], causes: tuple[tuple[str, str], ...]) -> Iterator[tuple[str, str | None, str]]:

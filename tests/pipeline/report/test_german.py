@@ -221,7 +221,16 @@ def test_causes_are_explained_in_german():
             assert said(text).text.rstrip(".") == GERMAN[shown(text)]
 
 
-@pytest.mark.parametrize("text", ["My own cause: the moon is full.", "fotos/a and b 1.5.png", "2.1.0", "–"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "My own cause: the moon is full.",
+        "fotos/a and b 1.5.png",
+        "2.1.0",
+        "–",
+        "The fixed (right) bearing went astray; camera or something else did it.",  # of its words some are known
+    ],
+)
 def test_what_is_not_known_stays_and_is_called_english(text):
     said = Words("de").said(text)
     assert (said.text, said.language) == (text, "en")
