@@ -228,7 +228,7 @@ def test_causes_are_explained_in_german():
         "fotos/a and b 1.5.png",
         "2.1.0",
         "–",
-        "The fixed (right) bearing went astray; camera or something else did it.",  # of its words some are known
+        "The fixed (right) bearing wanders over the photos; camera or frame moved.",  # some of its words are known
     ],
 )
 def test_what_is_not_known_stays_and_is_called_english(text):
