@@ -251,7 +251,8 @@ def _linear_start(
             shown = run(extension.model(trial), extension.facts, near=base.run, patient=False)
             value = whole_residual(observation, shown.prediction, trial, extension.prior)
         costs.append(np.inf if value is None else float(value @ value))
-    return trials[int(np.argmin(costs))]
+    # where none has an equilibrium, the last one is at least a possible cable: whole moves may leave every range
+    return trials[int(np.argmin(costs)) if np.isfinite(min(costs)) else -1]
 
 
 SHARES = (1.0, 0.3, 0.1)

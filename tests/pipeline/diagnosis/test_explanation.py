@@ -1,6 +1,7 @@
 """Refits: forms that are not needed are dropped, refits without some data do not see them, bands of a class."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
+from pipeline.diagnosis.explanations import explanation
 from pipeline.diagnosis.explanations.explanation import explanation_of, refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.faults import faults_of_input
@@ -82,6 +84,16 @@ def test_what_only_an_impossible_cause_explains_is_unexplained():
     assert found.accepted is None and found.alien
     amount, std = found.impossible[0].amount(tilt)
     assert amount == pytest.approx(0.2, abs=4.0 * std)
+
+
+def test_a_start_is_a_possible_cable_where_none_tried_has_an_equilibrium(plain, monkeypatch):
+    """A whole linear move had left the range of a slip, and the refit began with a negative one."""
+    monkeypatch.setattr(explanation, "run", lambda *_, **__: SimpleNamespace(prediction=None))
+    direction = int(plain.suspicion.of([cause.name for cause in CATALOGUE].index("hysteresis"))[0])
+    term = plain.suspicion.terms[direction]
+    extension, columns = replace(plain.base.extension, terms=(term,)), plain.suspicion.columns[:, [direction]]
+    start = explanation._linear_start(plain.observation, plain.base, extension, 1e9 * columns, (term,), (1.0,))
+    assert extension.admissible(start)
 
 
 def test_rows_left_out_of_a_refit_do_not_matter(plain):
