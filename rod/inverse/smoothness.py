@@ -1,8 +1,8 @@
 """Linearised posterior of the inverse problem, averaged over the priors of the law's form; evidence of fewer knots.
 
 Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every prior of the
-law's form (`rod.inverse.law_prior`: smooth along curvature or moment, how smooth, how steep at rest) follow from one
-normal matrix. What the data leave open about the prior widens the bands.
+law's form (`rod.inverse.law_prior`: along what and how smooth, how steep at rest) follow from one normal matrix. What
+the data leave open about the prior widens the bands.
 The same matrix, projected on splines through fewer control points, gives the evidence of their number without a fit.
 """
 
