@@ -107,7 +107,8 @@ def judge_strip(
     if path is None:
         return outcome
     whole = replace(strip, path=path)
-    followed = _judge(photo, standout, followed_in(reading, strip, whole), whole, cable, settings)
+    masks = followed_in(standout, cut, reading, strip, whole, stage)
+    followed = _judge(photo, standout, masks, whole, cable, settings)
     return outcome if isinstance(followed, Rejected) else followed
 
 

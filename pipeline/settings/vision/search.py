@@ -203,6 +203,12 @@ class SegmentationSettings(StageSettings):
         gt=0,
         description="of the strip's length; followed no farther: a strip found is at least a quarter of the cable",
     )
+    beyond_object_contrast: float = Field(
+        0.8,
+        gt=0,
+        description="of the strip's step; thick things that stand out so much are clamps at the end of what was"
+        " followed, those that stand out less may be shadows",
+    )
     beyond_darkest: float = Field(
         0.02, gt=0, description="of full range; a ground darker than that is counted as so bright: it tells no share"
     )

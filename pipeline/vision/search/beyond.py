@@ -22,7 +22,7 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, straight_body
-from pipeline.vision.search.strips import Strip
+from pipeline.vision.search.strips import Strip, thick_part
 
 
 def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
@@ -61,10 +61,13 @@ def follow(standout: Standout, cut: CrossCut, width: float, settings: Segmentati
     return path if len(path) > len(cut.path) else None
 
 
-def followed_in(reading: Reading, piece: Strip, whole: Strip) -> Reading:
-    """A reading with the ``whole`` in place of the ``piece`` and of other pieces of it.
+def followed_in(
+    standout: Standout, cut: CrossCut, reading: Reading, piece: Strip, whole: Strip, settings: SegmentationSettings
+) -> Reading:
+    """A reading with the ``whole`` in place of the ``piece``, whose cross-cuts are ``cut``, and of other pieces of it.
 
-    What hid the rest, such as a shadow, is taken out of the masks around it: beyond its end there is no object.
+    What hid the rest, such as a shadow, is taken out of the masks around it, but for things that stand out like the
+    cable itself: a clamp at its end.
     """
     width = reading.width
     tree = cKDTree(whole.path)
@@ -74,11 +77,14 @@ def followed_in(reading: Reading, piece: Strip, whole: Strip) -> Reading:
     cv2.polylines(drawn, [np.rint(whole.path).astype(np.int32)], False, 1, max(1, round(width)))
     for point in np.rint(added[:: max(1, round(0.5 * width))]).astype(int).tolist():
         cv2.circle(around, point, round(2.5 * width), 1, cv2.FILLED)
+    relief = (standout.residual @ cut.weights.astype(np.float32)) * (-1.0 if cut.dark else 1.0)
+    strong = (relief > settings.beyond_object_contrast * cut.contrast).astype(np.uint8)
+    thick = reading.thick & thick_part(strong, settings.thick_widths * width)
     return replace(
         reading,
         strips=(whole, *others),
-        mask=np.where(around, drawn, reading.mask),
-        thick=np.where(around, np.uint8(0), reading.thick),
+        mask=np.where(around, drawn | thick, reading.mask),
+        thick=np.where(around, thick, reading.thick),
     )
 
 
