@@ -165,19 +165,23 @@ def _settle(
     weight = np.ones(len(points))
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
     length = float(np.median(np.diff(s))) if correlation_length is None else correlation_length
+    moved = 0.0
     for iteration in range(iterations):
         s, residual = _step_to_foot(curve, points, s)
         spread = max(1.4826 * float(np.median(np.abs(residual / std))), 1e-12)
         if iteration:
-            weight = _biweight(residual / std, spread)
+            # A step leaves less than a tenth of its length: points as near as that may still be the curve's. A gap
+            # among them starts the fit pixels off, and all beyond it would count as outliers.
+            weight = _biweight(residual / std, max(spread, 0.1 * moved))
         problem = _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
             length = problem.correlation_length(longest, witness)
         step = problem.estimate(length) - curve.parameters
         found = _Settled(curve.moved(step), curve, problem, s, weight, length)
         curve = found.curve
+        moved = float(np.max(np.abs(problem.design @ step)) / np.median(std))
         # A hundredth of a point's error: the curve's own is a tenth to a third of it.
-        if iteration > 1 and np.max(np.abs(problem.design @ step)) < 0.01 * spread * np.median(std):
+        if iteration > 1 and moved < 0.01 * spread:
             break
     return found
 

@@ -183,6 +183,16 @@ def test_outliers_do_not_bend_the_curve():
     assert np.max(np.abs(robust.curve.curvature(at) - plain.curve.curvature(at))) < 0.01 * 9.0
 
 
+def test_a_gap_among_the_points_does_not_throw_away_what_lies_beyond():
+    """The chord of a gap is shorter than the arc, so all beyond it starts far off the curve."""
+    s, points = noisy(lambda s: 25.0 * np.sin(40.0 * s), np.random.default_rng(6), std=2e-7, correlation=0.0)
+    points = points[np.r_[0:60, 100:240]]
+    walked = s[0] + np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+    found = fit(walked, points, length=LENGTH - (s[-1] - walked[-1]))
+    assert np.all(found.weight > 0.0)
+    assert np.sqrt(np.mean(found.residual**2)) < 2e-7
+
+
 def test_a_break_follows_a_point_load():
     """A point load at mid-span: kappa has a kink; with a break its slope jumps there, without one it is rounded off."""
 
