@@ -59,6 +59,12 @@ def load_steps(
     tolerance = settings.same_displacement_relative * travel
     runs, grouped = _runs(samples, displacements, tolerance, name=name, settings=settings)
     _check_swapped(samples, runs, path)
+    wild = _wild(samples.forces, runs, settings)
+    if wild:
+        steps, findings = load_steps(samples.without(wild), spec, path=path, settings=settings)
+        line, force = samples.lines[wild[0]], quantity(float(samples.forces[wild[0]]), "N")
+        message = f"{len(wild)} forces are off by more than the largest of all holds and were left out"
+        return steps, (doubtful("log/wild-force", f"{name}: {message} (first: line {line}, {force})"), *findings)
     positions = [_position(samples, displacements, run) for run in runs]
     means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
     sign, signed = force_sign(means, np.array(positions), spec, name=name, settings=settings)
@@ -208,6 +214,21 @@ def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
             code="log/swapped-columns",
             remedy="correct the header, or name the columns in [force_log] of specimen.toml",
         )
+
+
+def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[int]:
+    """Rows whose force no cable could have: a slipped digit, a word of the transmission lost.
+
+    Only where the other samples of the hold agree that it is wrong, which takes four of them.
+    """
+    middles = np.array([float(np.median(forces[run.rows])) for run in runs])
+    limit = settings.wild_force_relative * float(np.max(np.abs(middles)))
+    found = []
+    for run, middle in zip(runs, middles, strict=True):
+        off = np.flatnonzero(np.abs(forces[run.rows] - middle) > limit)
+        if limit > 0.0 and 0 < 4 * off.size < run.last - run.first:
+            found += [run.first + int(row) for row in off]
+    return found
 
 
 def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> Iterator[Finding]:

@@ -60,6 +60,21 @@ class Samples:
     resolution: float
     findings: tuple[Finding, ...]
 
+    def without(self, rows: Sequence[int]) -> Samples:
+        """The samples without some rows; a photo named in one of them moves as from a row without a force."""
+        kept = np.setdiff1d(np.arange(len(self.lines)), rows)
+        images = _kept_images(self.images, [int(row) for row in kept], len(self.lines))
+        return replace(
+            self,
+            lines=tuple(self.lines[row] for row in kept),
+            forces=self.forces[kept],
+            displacements=self.displacements[kept],
+            times=None if self.times is None else self.times[kept],
+            steps=None if self.steps is None else tuple(self.steps[row] for row in kept),
+            branches=None if self.branches is None else tuple(self.branches[row] for row in kept),
+            images=tuple(images[row] for row in kept),
+        )
+
 
 def read_samples(
     rows: Sequence[Row], columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings

@@ -46,8 +46,8 @@ class IntakeSettings(BaseModel):
     hold_over_ramp: float = Field(
         3.0,
         gt=1,
-        description="times the median stretch of a ramp; in a log without step numbers that was sampled often enough to "
-        "show stretches of constant displacement on the way, too, longer ones are holds",
+        description="times the median stretch of a ramp; in a log without step numbers, sampled often enough to show "
+        "stretches of constant displacement on the way, too, longer ones are holds",
     )
     ramp_min_stretches: int = Field(
         5, gt=1, description="stretches in a row, each just beside the last; fewer are holds at almost one displacement"
@@ -65,6 +65,12 @@ class IntakeSettings(BaseModel):
     )
     trend_level: float = Field(
         0.01, gt=0, lt=1, description="significance at which the holds together ask for one degree more; few false ones"
+    )
+    wild_force_relative: float = Field(
+        1.0,
+        gt=0,
+        description="of the largest median force of a hold; a sample further from those of its hold is no noise and no "
+        "relaxation of a cable",
     )
     force_std_relative: float = Field(
         3e-3, gt=0, description="of the largest force; where no hold has repeated samples: a load cell of class 0.5"

@@ -184,6 +184,18 @@ def test_two_photos_in_one_hold(read):
     assert log.steps[2].image == "early.png"
 
 
+def test_a_wild_force_is_left_out_and_its_photo_kept(read):
+    """A slipped digit among samples that agree; what four samples cannot decide stays."""
+    lines = log_text(UP).splitlines()
+    many = "\n".join([lines[0], *(line for row in lines[1:] for line in (row.rsplit(",", 1)[0] + ",", row))])
+    log = read(many.replace("2.6010,p3.png", "2601.0,p3.png"))
+    assert codes(log) == ["log/wild-force"]
+    assert "line 25" in log.findings[0].message
+    assert log.steps[3].image == "p3.png"
+    assert log.steps[3].force_N == pytest.approx(2.600, abs=2e-3)
+    assert codes(read("\n".join(lines).replace("2.6010,p3.png", "2601.0,p3.png"))) == []
+
+
 def test_swapped_columns_are_refused(read):
     text = log_text(UP).replace("displacement_mm,force_N", "force_N,displacement_mm")
     with pytest.raises(InputError) as refused:
