@@ -20,6 +20,7 @@ Source: Patterson and Thompson (1971), Biometrika 58, 545; Wood (2017), Generali
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -231,18 +232,20 @@ class Problem:
     def correlation_length(self, longest: float, witness: Witness | None = None) -> float:
         """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``.
 
-        A ``witness`` tells of errors that last as long as a bend of the curve, which it does not follow.
+        A ``witness`` tells of errors that last as long as a bend of the curve, which it does not follow. It makes the
+        length longer only: what it lacks, such as a highlight that moves the points for a stretch, they tell alone.
         """
+
+        def alone(log_length: float) -> float:
+            diagonal = self._diagonal(float(np.exp(log_length)))
+            return float(diagonal.criterion(diagonal.weights())[0].min())
+
         shortest = 0.2 * float(np.median(self.gaps))
-
-        def value(log_length: float) -> float:
-            length = float(np.exp(log_length))
-            diagonal = self._diagonal(length)
-            seen = 0.0 if witness is None else witness.criterion(length)
-            return seen + float(diagonal.criterion(diagonal.weights())[0].min())
-
-        bounds = (np.log(shortest), np.log(max(longest, 2.0 * shortest)))
-        return float(np.exp(minimize_scalar(value, bounds=bounds, method="bounded", options={"xatol": 0.2}).x))
+        found, end = np.log(shortest), np.log(max(longest, 2.0 * shortest))
+        found = _lowest(alone, found, end)
+        if witness is not None:
+            found = _lowest(lambda at: alone(at) + witness.criterion(float(np.exp(at))), found, end)
+        return float(np.exp(found))
 
     def estimate(self, correlation_length: float) -> Array:
         """Estimate ``(p,)`` at the likeliest weight of the penalty."""
@@ -288,6 +291,12 @@ class Problem:
             determinant = float(np.log1p(-(rho**2)).sum())
             self._known[length] = _diagonal(columns, self.penalty, self.null, determinant, self.least)
         return self._known[length]
+
+
+def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
+    """Place of the minimum to a fifth, either end included."""
+    found = minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 0.2})
+    return float(found.x) if found.fun <= function(low) else low
 
 
 def _unwhiten(gain: Array, std: Array, gaps: Array, length: float) -> Array:
