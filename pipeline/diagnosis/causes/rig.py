@@ -227,8 +227,9 @@ class LengthError:
         return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Shorten the cable by ``1 + amount``."""
-        return replace(model, bending=replace(model.bending, length=model.bending.length / (1.0 + amount)))
+        """Shorten the cable by ``1 + amount``; less than a tenth of a cable is never stated (a slip of the point)."""
+        length = model.bending.length / max(1.0 + amount, 0.1)
+        return replace(model, bending=replace(model.bending, length=length))
 
 
 @dataclass(frozen=True)
