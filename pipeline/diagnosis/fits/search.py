@@ -106,11 +106,13 @@ def suspect(
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
     """Whitened column (N,) of one form of a cause, from zero to ``amount``.
 
-    Where that amount leaves no equilibrium, a tenth of it is tried, then the other sign; a column of zeros says that
-    not even a trace can be simulated.
+    Where that amount leaves no equilibrium, a tenth and a hundredth of it are tried, then the other sign: a base model
+    that has taken a large cause for its own lives near its limits, and a cause without a trace would never be named. A
+    column of zeros says that not even a trace can be simulated.
     """
     facts = fitted.extension.facts
-    trials = (amount, 0.1 * amount) if term.cause.sign else (amount, 0.1 * amount, -0.1 * amount)
+    smaller = (amount, 0.1 * amount, 0.01 * amount)
+    trials = smaller if term.cause.sign else (*smaller, -0.1 * amount, -0.01 * amount)
     for step in trials:
         model = term.cause.apply(fitted.run.model, step, term.variant, facts)
         shown = run(model, facts, near=fitted.run).prediction

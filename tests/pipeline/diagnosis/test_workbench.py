@@ -7,8 +7,9 @@ from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import SIX, THREE, hidden_test
 from fixtures.scores import fitted_base, observed
-from fixtures.trials import f_error
+from fixtures.trials import Trial, f_error, made
 from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.diagnose import chosen_knots
 from pipeline.diagnosis.fits import workbench
 from pipeline.diagnosis.fits.extended import curve as curve_of
 from pipeline.diagnosis.fits.extended import curve_change
@@ -84,3 +85,17 @@ def test_covers_above_the_cable_are_no_cause(protocol):
     test = parted_axes(hidden_test(Cable(), protocol, largest=LARGEST, seed=9), 3e-3, (0.08, 0.06))
     part, _ = diagnose(replace(test, axis_parallax_std=4e-3, camera_foot_std=0.05), None, SETTINGS)
     assert part.verdict == "adequate", part.headline
+
+
+def test_every_cause_leaves_a_trace_beside_a_base_model_at_its_limits():
+    """A large friction in the bearings on loading alone: the law takes it for its own and can hardly be bent further.
+
+    Without a trace the friction was never refitted, and a displacement offset named alone (probability 1).
+    """
+    trial = Trial(kind="hidden", protocol="three", seed=30000, names=("bearing_friction",), times=4.0)
+    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS, knots=chosen_knots(None, SETTINGS))
+    assert not isinstance(bench, str), bench
+    suspicion = bench.suspicion
+    for name in ("bearing_friction", "bearing_stiffness"):
+        own = suspicion.of([cause.name for cause in suspicion.causes].index(name))
+        assert np.all(np.linalg.norm(suspicion.columns[:, own], axis=0) > 0.0), name
