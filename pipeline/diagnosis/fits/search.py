@@ -106,13 +106,13 @@ def suspect(
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
     """Whitened column (N,) of one form of a cause, from zero to ``amount``.
 
-    Where that amount leaves no equilibrium, a tenth and a hundredth of it are tried, then the other sign: a base model
-    that has taken a large cause for its own lives near its limits, and a cause without a trace would never be named. A
-    column of zeros says that not even a trace can be simulated.
+    Where that amount leaves no equilibrium, smaller and smaller ones are tried, then the other sign: a base model that
+    has taken a large cause for its own lives at its limits (a law that hardly rises), and a cause without a trace would
+    never be named. A column of zeros says that not even a trace can be simulated.
     """
     facts = fitted.extension.facts
-    smaller = (amount, 0.1 * amount, 0.01 * amount)
-    trials = smaller if term.cause.sign else (*smaller, -0.1 * amount, -0.01 * amount)
+    smaller = [amount * share for share in SMALLER]
+    trials = smaller if term.cause.sign else [*smaller, *(-step for step in smaller[1:])]
     for step in trials:
         model = term.cause.apply(fitted.run.model, step, term.variant, facts)
         shown = run(model, facts, near=fitted.run).prediction
@@ -120,6 +120,10 @@ def direction(observation: Observation, fitted: Fit, term: Term, *, amount: floa
         if there is not None:
             return (fitted.residual - there) / step
     return np.zeros_like(fitted.residual)
+
+
+SMALLER = (1.0, 0.1, 0.01, 1e-3, 1e-4)
+"""Of an amount: traces from the least one are still right to 1e-4 (measured where all have an equilibrium)."""
 
 
 def detectable_amount(
