@@ -51,6 +51,8 @@ INSIDE = {
     "pipeline.diagnosis.statistics": [("score", "twins", "verdict", "pairs", "gain"), ("leftover",)],
     "pipeline.diagnosis.fits": [
         ("base",),
+        ("extension",),
+        ("sensitivities",),
         ("fit",),
         ("search", "extended", "faults", "maps"),
         ("workbench",),

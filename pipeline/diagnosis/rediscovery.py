@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.fits.base import start
+from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import faults_of_input
-from pipeline.diagnosis.fits.fit import Extension, Fit, fit
+from pipeline.diagnosis.fits.fit import Fit, fit
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import spot_between
-from pipeline.diagnosis.fits.fit import Extension, Fit, Term, fit, whole_residual
+from pipeline.diagnosis.fits.extension import Extension, Term
+from pipeline.diagnosis.fits.fit import Fit, fit
 from pipeline.diagnosis.fits.search import Suspicion, suspect
+from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.statistics.pairs import pair_gains
@@ -47,10 +49,10 @@ class Explanation:
 
     def amount(self, cause: Cause) -> tuple[float, float]:
         """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest."""
-        own = [i for i, term in enumerate(self.fitted.extension.terms) if term.cause is cause]
+        own = self.fitted.extension.terms_of(cause)
         if not cause.additive:
             return max((self.fitted.amount(i) for i in own), key=lambda pair: abs(pair[0]))
-        at = [self.fitted.extension.owners[i] for i in own]
+        at = [self.fitted.extension.amounts_at[i] for i in own]
         variance = float(self.fitted.covariance[np.ix_(at, at)].sum())
         return float(self.fitted.vector[at].sum()), float(np.sqrt(max(variance, 0.0)))
 
@@ -336,7 +338,7 @@ def _without_needless_forms(observation: Observation, best: Fit, settings: Diagn
                 best,
                 settings,
             )
-            for dropped, at in enumerate(best.extension.owners)
+            for dropped, at in enumerate(best.extension.amounts_at)
             if dropped in own
         ]
         simplest = min(shorter, key=lambda fitted: fitted.chi2 if fitted.run.prediction is not None else np.inf)

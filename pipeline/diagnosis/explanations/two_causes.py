@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanations.explanation import Explanation, candidates, explanation_of, fit_terms
 from pipeline.diagnosis.fits.bootstrap import widening
-from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.fit import Fit, evaluated
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, null_pair_gain, pair_gains
@@ -112,8 +112,8 @@ def _composed(single: Explanation) -> bool:
 def _both_needed(pair: Explanation, singles: list[Explanation], suspicion: Suspicion, least: float) -> bool:
     """Whether either half would be missed: beside the other, and against all single causes that are simpler."""
     for cause in pair.causes:
-        own = [k for k, term in enumerate(pair.fitted.extension.terms) if term.cause is suspicion.causes[cause]]
-        at = [pair.fitted.extension.owners[k] for k in own]
+        extension = pair.fitted.extension
+        at = [extension.amounts_at[k] for k in extension.terms_of(suspicion.causes[cause])]
         amount, covariance = pair.fitted.vector[at], pair.fitted.covariance[np.ix_(at, at)]
         if float(amount @ np.linalg.solve(covariance, amount)) <= least:
             return False
@@ -225,7 +225,7 @@ def _worth(explanation: Explanation) -> float:
 def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings) -> list[Explanation]:
     """The pair with one of its causes replaced by whatever scores nearly as much beside the other."""
     suspicion, other, found = bench.suspicion, pair.causes[1 - place], []
-    rest = _without(bench, pair.fitted, pair.causes[place], settings)
+    rest = _without(bench, pair.fitted, pair.causes[place])
     if rest is None:
         return []
     beside = suspect(bench.observation, rest, suspicion.causes, visible=settings.visible, trace=settings.trace)
@@ -245,22 +245,12 @@ def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: Diag
     return found
 
 
-def _without(bench: Workbench, fitted: Fit, cause: int, settings: DiagnosisSettings) -> Fit | None:
+def _without(bench: Workbench, fitted: Fit, cause: int) -> Fit | None:
     """The model with a cause taken out and all else left where it is; None where that has no equilibrium."""
-    kind, extension = bench.suspicion.causes[cause], fitted.extension
-    gone = [
-        list(range(at, at + 1 + len(term.variant.tuned)))
-        for at, term in zip(extension.owners, extension.terms, strict=True)
-        if term.cause is kind
-    ]
-    rest = fit(
-        bench.observation,
-        replace(extension, terms=tuple(term for term in extension.terms if term.cause is not kind)),
-        np.delete(fitted.vector, np.concatenate(gone)),
-        iterations=0,
-        tolerance=settings.tolerance,
-        near=fitted.run,
+    extension, vector = fitted.extension.without(
+        fitted.vector, fitted.extension.terms_of(bench.suspicion.causes[cause])
     )
+    rest = evaluated(bench.observation, extension, vector, fitted.run)
     return None if rest.run.prediction is None else rest
 
 

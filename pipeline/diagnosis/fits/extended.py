@@ -103,7 +103,7 @@ def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = N
     """
     used, root = _root(fitted, covariance)
     found = []
-    for at, term in zip(fitted.extension.owners, fitted.extension.terms, strict=True):
+    for at, term in zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True):
         if term.cause.name != cause:
             continue
         tuned = term.variant.tuned

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.extended import law_of
-from pipeline.diagnosis.fits.fit import Extension, Fit, Term, fit, sensitivities, whole_residual
+from pipeline.diagnosis.fits.extension import Extension
+from pipeline.diagnosis.fits.fit import Fit, evaluated, fit
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import with_knots
 from pipeline.diagnosis.observations.observation import Observation
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.law_prior import FIRST_SIZES, places_of
 from rod.inverse.options import InverseOptions
@@ -111,20 +111,9 @@ def _with_fine_law(fitted: Fit, count: int) -> tuple[Extension, Array]:
     extension, vector = with_knots(fitted, count)
     whole = law_of(fitted).f(extension.base.knots)
     ordinates = np.log(np.maximum(whole, FLOOR * float(np.max(whole))) / extension.base.stiffness)
-    kept = [not _of_law(term) for term in extension.terms]
-    causes = [
-        vector[at : at + 1 + len(term.variant.tuned)]
-        for at, term, stays in zip(extension.owners, extension.terms, kept, strict=True)
-        if stays
-    ]
-    terms = tuple(term for term, stays in zip(extension.terms, kept, strict=True) if stays)
-    rest = vector[count : len(extension.base.names)]
-    return replace(extension, terms=terms), np.concatenate([ordinates, rest, *causes])
-
-
-def _of_law(term: Term) -> bool:
-    """Whether a term is one more control point of the law."""
-    return term.cause.name == "nonlinear_stiffness"
+    in_law = [k for k, term in enumerate(extension.terms) if term.cause.name == "nonlinear_stiffness"]
+    extension, vector = extension.without(vector, in_law)
+    return extension, np.r_[ordinates, vector[count:]]
 
 
 def _fit(
@@ -168,7 +157,7 @@ def _with_other_forms(observation: Observation, again: Identified, settings: Dia
 def _amounts_of(fitted: Fit, name: str) -> list[int]:
     """Positions in the vector of the amounts of a cause."""
     extension = fitted.extension
-    return [at for at, term in zip(extension.owners, extension.terms, strict=True) if term.cause.name == name]
+    return [at for at, term in zip(extension.amounts_at, extension.terms, strict=True) if term.cause.name == name]
 
 
 def _other_forms(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> tuple[list[str], Array]:
@@ -219,13 +208,7 @@ def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
 
 def _at(observation: Observation, fitted: Fit, vector: Array) -> Fit | None:
     """The model at another vector, not fitted; None where that is impossible."""
-    extension = fitted.extension
-    if not extension.admissible(vector):
+    if not fitted.extension.admissible(vector):
         return None
-    base_model = extension.base_model(vector)
-    here = run(extension.model(vector, of=base_model), extension.facts, near=fitted.run)
-    value = whole_residual(observation, here.prediction, vector, extension.prior)
-    if value is None:
-        return None
-    jacobian = sensitivities(observation, extension, vector, base_model, here)
-    return Fit(extension, vector, here, value, jacobian, fitted.converged, fitted.advice)
+    there = evaluated(observation, fitted.extension, vector, fitted.run)
+    return None if there.run.prediction is None else replace(there, converged=fitted.converged)

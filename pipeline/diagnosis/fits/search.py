@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.fits.fit import Fit, Term, whole_residual
+from pipeline.diagnosis.fits.extension import Term
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.statistics.score import Scores, admissible, score, span

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.fits.base import Base, start
+from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
-from pipeline.diagnosis.fits.fit import Extension, Fit, fit
+from pipeline.diagnosis.fits.fit import Fit, fit
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe

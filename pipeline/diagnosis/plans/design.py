@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
-from pipeline.diagnosis.fits.fit import Extension, fit
+from pipeline.diagnosis.fits.extension import Extension
+from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.search import detectable_amount, suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.fits.fit import Fit, sensitivities, whole_residual
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import Facts

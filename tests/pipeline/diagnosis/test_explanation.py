@@ -37,7 +37,7 @@ def test_two_elements_that_slip_are_found_as_two():
     bench = prepared(Cable(memory=ELEMENTS), 6)
     index = [cause.name for cause in CATALOGUE].index("hysteresis")
     found = refit_one(bench.observation, bench.base, bench.suspicion, index, SETTINGS)
-    own = found.fitted.extension.owners
+    own = found.fitted.extension.amounts_at
     assert len(own) == 2
     slip = sorted((found.fitted.vector[at + 1], np.sqrt(found.fitted.covariance[at + 1, at + 1])) for at in own)
     for (value, std), truth in zip(slip, ELEMENTS.slip, strict=True):

@@ -1,0 +1,120 @@
+"""Residual of a model against an observation, and how it moves with every parameter: the rows and columns of a fit.
+
+Rows: the whitened data in the order of `observation.Row`, then one row per piece of prior knowledge. Columns: control
+points of the law, K0 and length by the implicit function theorem (`rod.sensitivity`), what only the camera changes by
+the observers alone, amounts and forms of causes by difference quotients with warm starts.
+
+Sign: residual = data - model, so the Jacobian here is that of the model, ``d residual = - jacobian d vector``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fits.extension import Extension
+from pipeline.diagnosis.observations.observation import Observation, residual
+from pipeline.diagnosis.observations.prediction import Model, Prediction
+from pipeline.diagnosis.observations.simulation import Run, base_derivatives, moved, observed, run
+from rod.characteristic import Characteristic
+from rod.sensitivity import Derivatives
+
+Array = NDArray[np.float64]
+
+
+def whole_residual(
+    observation: Observation, prediction: Prediction | None, vector: Array, prior: Array
+) -> Array | None:
+    """Residual (N,) with the rows of prior knowledge at the end; None where the model has no equilibrium."""
+    if prediction is None:
+        return None
+    return np.asarray(np.r_[residual(observation, prediction), -prior @ vector])
+
+
+def sensitivities(observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run) -> Array:
+    """Jacobian (N, p) of the model, prior rows included.
+
+    A quotient that runs into a model without equilibrium is taken to the other side; a column of zeros is left where
+    neither side has one.
+
+    Parameters
+    ----------
+    observation : Observation
+    extension : Extension
+    vector : (p,)
+    base_model : Model
+        That of ``extension`` at the vector.
+    here : Run
+        Of the model at the vector, with a prediction.
+    """
+    prior = extension.prior
+    at_here = whole_residual(observation, here.prediction, vector, prior)
+    assert at_here is not None and here.bare is not None
+    columns = _base_columns(observation, extension, vector, here, at_here)
+    first = len(columns)
+    for j, step in enumerate(extension.steps[first:], start=first):
+        column = np.zeros_like(at_here)
+        for signed in (step, -step):
+            trial = vector.copy()
+            trial[j] += signed
+            if not extension.admissible(trial):
+                continue
+            there = run(extension.model(trial, of=base_model), extension.facts, near=here)
+            value = whole_residual(observation, there.prediction, trial, prior)
+            if value is not None:
+                column = (at_here - value) / signed
+                break
+        columns.append(column)
+    return np.column_stack(columns)
+
+
+def _base_columns(
+    observation: Observation, extension: Extension, vector: Array, here: Run, at_here: Array
+) -> list[Array]:
+    """Columns of the base parameters, in their order."""
+    base, facts, model, bare = extension.base, extension.facts, here.model, here.bare
+    assert bare is not None
+    bent = [name for name in base.names if name not in base.observed]
+    by = _bending_derivatives(extension, vector, here, bent)
+    columns = []
+    for j, (name, step) in enumerate(zip(base.names, extension.steps, strict=False)):
+        trial = vector.copy()
+        trial[j] += step
+        if name in base.observed:
+            shown = observed(bare, replace(model, observers=(base.observer(trial), *model.observers[1:])), facts)
+        else:
+            shown = observed(moved(bare, by, bent.index(name), float(step)), model, facts)
+        value = whole_residual(observation, shown, trial, extension.prior)
+        assert value is not None
+        columns.append((at_here - value) / step)
+    return columns
+
+
+def _bending_derivatives(extension: Extension, vector: Array, here: Run, bent: list[str]) -> tuple[Derivatives, ...]:
+    """Derivatives of every step with respect to the base parameters that bend the cable (``bent``, in their order).
+
+    The rod knows ordinates of its law in N m^2, K0 and the length; the vector has logarithms of ordinates and a
+    relative error of the length.
+    """
+    base, bending = extension.base, here.model.bending
+    names = ("ordinates", *(() if base.straight else ("pre_curvature",)), "length")
+    law = bending.characteristic
+    # where a cause has put further control points into the law, a base ordinate moves them along the base spline
+    share = base.law_directions(vector, law.knots if isinstance(law, Characteristic) else base.knots)
+    count = len(share)
+    change = np.zeros((count + len(names) - 1, len(bent)))
+    change[:count, : share.shape[1]] = share
+    if (bend := base.pre_curvature_index) is not None:
+        change[count, bend] = 1.0
+    change[-1, -1] = -bending.length / (1.0 + vector[len(base.names) - 1])
+    return tuple(_combined(d, change) for d in base_derivatives(here, extension.facts, names))
+
+
+def _combined(d: Derivatives, change: Array) -> Derivatives:
+    """Derivatives with respect to combinations (columns of ``change``) of the parameters."""
+    return Derivatives(
+        tuple(str(i) for i in range(change.shape[1])),
+        *(getattr(d, name) @ change for name in ("s", "x", "y", "theta", "kappa", "moment", "force", "chord")),
+    )
