@@ -69,7 +69,7 @@ def _disturbance(cut: CrossCut, standout: Standout, cable: Cable, stage: Segment
     """
     if cable.diameter_px is None:
         return cut.texture
-    width = cut.width[np.isfinite(cut.width)] * standout.reduction / cable.diameter_px
+    width = cut.seen_widths * standout.reduction / cable.diameter_px
     if len(width) < stage.sure_edges_share * len(cut.width):
         return cut.texture
     off = abs(float(np.median(width)) - 1.0)
@@ -83,8 +83,8 @@ def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage:
         return cut_across(standout, path, reading.width, stage)
     if not reading.banded:
         cut = cut_across(standout, path, reading.width, stage, known=True)
-        width = cut.width[np.isfinite(cut.width)]
-        if len(width) and _scatter(width) < stage.sure_width_scatter * float(np.median(width)):
+        width = cut.seen_widths
+        if len(width) and _scatter(width) < stage.sure_width_scatter * cut.usual_width:
             return cut
     return cut_across(standout, path, reading.width, by_diameter(stage), known=True, shaded=reading.banded)
 
@@ -103,7 +103,7 @@ def judge_strip(
         return outcome
     stage = settings.segmentation
     cut = _cut(standout, strip.path, reading, cable, stage)
-    path = follow(standout, cut, float(np.nanmedian(cut.width)), stage)
+    path = follow(standout, cut, cut.usual_width, stage)
     if path is None:
         return outcome
     whole = replace(strip, path=path)
@@ -151,9 +151,9 @@ def _judge(
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
     """Refuse a photo whose covers were not found because it is moved or out of focus."""
-    if not np.isfinite(cut.width).any():
+    if not len(cut.seen_widths):
         return None
-    width = float(np.nanmedian(cut.width)) * standout.reduction
+    width = cut.usual_width * standout.reduction
     closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights, settings.segmentation)
     return _check_sharpness(photo, closeup, width, 0.5 * settings.curve.hint_blur_radii, settings)
 
@@ -193,8 +193,8 @@ def _axes(
 ) -> tuple[Bearing, Bearing] | Rejected:
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
-    if cable.bearings.cover_widths is not None and np.isfinite(cut.width).any():
-        width = float(np.nanmedian(cut.width)) * standout.reduction  # the mask is wider by the shadow, covers would be
+    if cable.bearings.cover_widths is not None and len(cut.seen_widths):
+        width = cut.usual_width * standout.reduction  # the mask is wider by the shadow, covers would be
     cover = cable.bearings.cover_radius(width)
     ends = (
         find_end(strip.path[::-1], reading, standout, cover, settings.bearings),
@@ -233,7 +233,7 @@ def _check_width(
     photo: Photo, cut: CrossCut, reduction: int, cable: Cable, stage: SegmentationSettings
 ) -> Rejected | None:
     """Refuse a strip whose width is not the cable's, or not constant."""
-    widths = cut.width[np.isfinite(cut.width)] * reduction
+    widths = cut.seen_widths * reduction
     if len(widths) < 0.5 * len(cut.width):
         share = len(widths) / len(cut.width)
         return refused(
@@ -268,7 +268,7 @@ def _check_ends(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
 ) -> Rejected | None:
     """Refuse a strip that is a piece of the cable only: beyond its visible end the cable goes on."""
-    width = float(np.nanmedian(cut.width))
+    width = cut.usual_width
     for axis, at_start in zip(axes, (True, False), strict=True):
         if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, stage, at_start=at_start):
             return _goes_on_beyond(photo, axis.center_px)
@@ -279,7 +279,7 @@ def _check_reach(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
 ) -> Rejected | None:
     """Refuse a strip that ends before an axis that the user gave: far from it, or while the cable goes on."""
-    width = float(np.nanmedian(cut.width))
+    width = cut.usual_width
     path = standout.to_pixels(cut.path)
     near, far = stage.beyond_least_widths * width * standout.reduction, stage.hidden_widths * width * standout.reduction
     for axis, at_start in zip(axes, (True, False), strict=True):
@@ -316,11 +316,11 @@ def _assemble(
 ) -> RoughCable | Rejected:
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
-    kept = without_specks(_seen(standout, cut, stage), float(np.nanmedian(cut.width)))
+    kept = without_specks(_seen(standout, cut, stage), cut.usual_width)
     path = path[kept]
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
         path, axes = path[::-1], axes[::-1]
-    width = float(np.nanmedian(cut.width)) * standout.reduction
+    width = cut.usual_width * standout.reduction
     closeup = take_closeup(photo, path, width, cut.weights, stage)
     right, path = settle_end(axes[1], path, closeup, width, settings.bearings)
     left, backward = settle_end(axes[0], path[::-1], closeup, width, settings.bearings)
@@ -334,8 +334,7 @@ def _assemble(
     unsharp = _check_sharpness(photo, closeup, width, stage.max_blur_widths, settings)
     if unsharp is not None:
         return unsharp
-    finite = cut.width[np.isfinite(cut.width)]
-    scatter = _scatter(finite) / float(np.median(finite))
+    scatter = _scatter(cut.seen_widths) / cut.usual_width
     return RoughCable(
         image=photo.name,
         path_px=path,
@@ -357,7 +356,7 @@ def _assemble(
 
 def _seen(standout: Standout, cut: CrossCut, stage: SegmentationSettings) -> NDArray[np.bool_]:
     """Sections on which the cable is seen: it stands out, or looks the same but for a shadow."""
-    dimmed = shaded(standout, cut, float(np.nanmedian(cut.width)), stage)
+    dimmed = shaded(standout, cut, cut.usual_width, stage)
     return (cut.step > stage.seen_share * cut.contrast) | dimmed
 
 

@@ -9,7 +9,6 @@ All lengths in cells.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import cv2
 import numpy as np
@@ -20,7 +19,7 @@ from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
-from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
 from pipeline.vision.search.ends import led_on, straight_body
 from pipeline.vision.search.strips import Strip, thick_part
 
@@ -98,28 +97,57 @@ def _ahead(
     """
     usual = float(np.median(_weber(standout, cut, width, settings)))
     best, scraps = None, 0
-    for (trimmed, base), known in product(settings.beyond_leads_widths, {True, cut.known}):
-        led, ahead = _led_into_picture(standout, path, width, (trimmed, base), settings)
-        if len(ahead) < settings.beyond_least_widths * width:
+    for lead in settings.beyond_leads_widths:
+        led, ahead = _led_into_picture(standout, path, width, lead, settings)
+        if not _may_go_on(standout, cut, ahead, width, usual, settings):
             continue
-        more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
-        if more.dark != cut.dark:
-            continue
-        alike = _alike(standout, more, width, usual, settings)
-        edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
-        long = np.flatnonzero(edges[1::2] - edges[::2] > settings.beyond_least_widths * width)
-        scraps = max(scraps, int(alike.sum()))
-        if not len(long):
-            continue
-        stop = int(edges[1::2][long[-1]])
-        # edges are lost at the rounded corners of an end, a width of it at most
-        faint = np.flatnonzero(more.step[stop : stop + round(width)] < settings.seen_share * cut.contrast)
-        stop = min(stop + (int(faint[0]) if len(faint) else round(width)), len(ahead))
-        if best is None or len(led) + stop > len(best):
-            best = np.vstack([led, more.path[:stop]])
-            if stop > 0.8 * len(ahead):
-                break  # no other lead is much better
+        for known in {True, cut.known}:
+            more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
+            if more.dark != cut.dark:
+                continue
+            alike = _alike(standout, more, width, usual, settings)
+            scraps = max(scraps, int(alike.sum()))
+            stop = _end_of_more(more, alike, width, cut.contrast, settings)
+            if stop and (best is None or len(led) + stop > len(best)):
+                best = np.vstack([led, more.path[:stop]])
+                if stop > 0.8 * len(ahead):
+                    return best, scraps  # no other lead is much better
     return best, scraps
+
+
+def _end_of_more(
+    more: CrossCut, alike: NDArray[np.bool_], width: float, contrast: float, settings: SegmentationSettings
+) -> int:
+    """How many sections there are to the end of the last long run of those alike; 0 without a long one."""
+    edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
+    long = np.flatnonzero(edges[1::2] - edges[::2] > settings.beyond_least_widths * width)
+    if not len(long):
+        return 0
+    stop = int(edges[1::2][long[-1]])
+    # edges are lost at the rounded corners of an end, a width of it at most
+    faint = np.flatnonzero(more.step[stop : stop + round(width)] < settings.seen_share * contrast)
+    return min(stop + (int(faint[0]) if len(faint) else round(width)), len(alike))
+
+
+def _may_go_on(
+    standout: Standout, cut: CrossCut, ahead: Array, width: float, usual: float, settings: SegmentationSettings
+) -> bool:
+    """False where so little stands out of the ground about a lead that, cut across, it could show no more of the same.
+
+    Sections alike hold a core, at least half a width broad, that stands out as `_alike` asks in its median: a quarter
+    of a width then stands out so far, wherever it lies.
+    """
+    least = settings.beyond_least_widths * width
+    if len(ahead) < least:
+        return False
+    _, normal = path_normals(ahead)
+    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
+    light, _, _ = straighten(standout.picture, ahead, normal, width, settings)
+    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
+    darkest = np.maximum(light.mean(axis=2).min(axis=1), settings.beyond_darkest)
+    strong = (-relief if cut.dark else relief) > (settings.beyond_contrast[0] * usual) * darkest[:, None]
+    enough = 0.25 * width / (offsets[1] - offsets[0])
+    return np.count_nonzero(strong.sum(axis=1) >= enough) * len(ahead) / len(rows) > least
 
 
 def _led_into_picture(

@@ -8,6 +8,7 @@ All lengths in cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -55,6 +56,16 @@ class CrossCut:
     dark: bool
     known: bool
 
+    @cached_property
+    def seen_widths(self) -> Array:
+        """Widths of the sections on which both edges are seen."""
+        return self.width[np.isfinite(self.width)]
+
+    @cached_property
+    def usual_width(self) -> float:
+        """Median of the widths; NaN where no section shows both edges."""
+        return float(np.median(self.seen_widths)) if len(self.seen_widths) else np.nan
+
 
 def smooth_path(path: Array, sigma: float) -> Array:
     """Resample a path to points one cell apart and smooth it; the ends stay in place."""
@@ -97,10 +108,10 @@ def cut_across(
     straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
-    core, flank = np.abs(offsets) < 0.35 * width, (np.abs(offsets) > 0.9 * width) & (np.abs(offsets) < 1.7 * width)
-    ground = np.median(grey[:, flank], axis=1)
-    sign = -1.0 if np.median(np.median(grey[:, core], axis=1) - ground) < 0 else 1.0
-    relief = sign * (grey - ground[:, None])
+    relief, ground = against_ground(grey, offsets / width)
+    core = np.abs(offsets) < 0.35 * width
+    sign = -1.0 if np.median(np.median(relief[:, core], axis=1)) < 0 else 1.0
+    relief *= sign
     pitch = len(path) / len(rows)
     flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
     step = _core_level(relief, offsets, flanks)
@@ -121,13 +132,24 @@ def cut_across(
     )
 
 
+def against_ground(grey: Image, offset_widths: Array) -> tuple[Image, Image]:
+    """A straightened picture ``(n, m)`` less the ground on each section, and that ground ``(n,)``: beside the cable."""
+    ground = np.median(grey[:, _beside(offset_widths)], axis=1)
+    return grey - ground[:, None], ground
+
+
+def _beside(offset_widths: Array) -> NDArray[np.bool_]:
+    """Columns of the ground beside the cable."""
+    return np.asarray((np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7))
+
+
 def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, shaded: bool) -> float:
     """Scatter of the ground ``(n, m)`` beside the cable about what changes along it over less than ``light`` rows.
 
     A shadow runs along the cable: it is no texture, and what texture does along the path it does across, too. The
     border of a hard shadow (``shaded``) wanders over the columns of its side, and the other side tells.
     """
-    beside = (np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7)
+    beside = _beside(offset_widths)
     values = grey[:, beside] if shaded else grey[:, beside] - ground[:, None]
     # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
     # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
@@ -173,8 +195,7 @@ def _centres(many: int, few: int) -> Array:
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:
     """Fisher's discriminant of core against flanks, kept from chasing channels that hardly differ."""
     core = np.median(straight[:, np.abs(offset_widths) < 0.35].reshape(-1, straight.shape[2]), axis=0)
-    beside = (np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7)
-    ground = np.median(straight[:, beside].reshape(-1, straight.shape[2]), axis=0)
+    ground = np.median(straight[:, _beside(offset_widths)].reshape(-1, straight.shape[2]), axis=0)
     difference = (core - ground).astype(np.float64)
     if len(difference) == 1:
         return np.ones(1)
