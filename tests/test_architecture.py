@@ -58,7 +58,12 @@ INSIDE = {
         ("workbench",),
         ("identified_again", "heldout", "bootstrap"),
     ],
-    "pipeline.diagnosis.explanations": [("explanation",), ("two_causes", "friction_in_law"), ("conclusion",)],
+    "pipeline.diagnosis.explanations": [
+        ("explanation", "candidates", "refit"),
+        ("forms",),
+        ("single_cause", "two_causes", "friction_in_law"),
+        ("conclusion",),
+    ],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
         ("photo", "rough", "render"),

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.explanations.explanation import Explanation, candidates, refit_one
+from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.explanations.friction_in_law import shared
+from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
 from pipeline.diagnosis.fits.faults import Faults, faults_of_input, outlier_fault, worst_item

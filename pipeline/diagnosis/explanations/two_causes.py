@@ -25,7 +25,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.explanations.explanation import Explanation, candidates, explanation_of, fit_terms
+from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
+from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.bootstrap import widening
 from pipeline.diagnosis.fits.fit import Fit, evaluated
 from pipeline.diagnosis.fits.search import Suspicion, suspect

@@ -11,8 +11,10 @@ from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.explanations import explanation
-from pipeline.diagnosis.explanations.explanation import explanation_of, refit_one
+from pipeline.diagnosis.explanations import refit
+from pipeline.diagnosis.explanations.explanation import explanation_of
+from pipeline.diagnosis.explanations.refit import Addition, linear_start
+from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import fit
@@ -88,12 +90,11 @@ def test_what_only_an_impossible_cause_explains_is_unexplained():
 
 def test_a_start_is_a_possible_cable_where_none_tried_has_an_equilibrium(plain, monkeypatch):
     """A whole linear move had left the range of a slip, and the refit began with a negative one."""
-    monkeypatch.setattr(explanation, "run", lambda *_, **__: SimpleNamespace(prediction=None))
+    monkeypatch.setattr(refit, "run", lambda *_, **__: SimpleNamespace(prediction=None))
     direction = int(plain.suspicion.of([cause.name for cause in CATALOGUE].index("hysteresis"))[0])
     term = plain.suspicion.terms[direction]
-    extension, columns = replace(plain.base.extension, terms=(term,)), plain.suspicion.columns[:, [direction]]
-    start = explanation._linear_start(plain.observation, plain.base, extension, 1e9 * columns, (term,), (1.0,))
-    assert extension.admissible(start)
+    added = Addition(plain.base, (term,), (1.0,), 1e9 * plain.suspicion.columns[:, [direction]])
+    assert added.extension.admissible(linear_start(plain.observation, added))
 
 
 def test_rows_left_out_of_a_refit_do_not_matter(plain):

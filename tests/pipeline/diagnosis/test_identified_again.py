@@ -8,7 +8,7 @@ from fixtures.effects import SPOT, profile
 from fixtures.hidden import LOOP, SIX, Protocol, hidden_test
 from fixtures.memory import BoucWen, Slipping
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.explanations.explanation import refit_one
+from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.identified_again import identified_again

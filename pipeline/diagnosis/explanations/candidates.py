@@ -1,0 +1,43 @@
+"""Which causes are worth a refit: those whose linear scores come near the best one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.statistics.pairs import pair_gains
+from pipeline.diagnosis.statistics.twins import cosines
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: bool = False) -> list[int]:
+    """Causes worth a refit: by linear chi-square gain, within a margin of the best.
+
+    A cause whose forms may act together counts with its best two: a load at an angle to the chord scores little along
+    it and across it. The margin is that of single forms, else many forms of one cause would push out the others.
+
+    ``any_sign``: scores of an inadmissible sign count too. About a base model in a false valley of K0 the sign of a
+    score says nothing: friction of the bearings on loading alone asks for a negative amount there.
+    """
+    gains = np.zeros(len(suspicion.causes))
+    np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
+    best = gains.max(initial=0.0)
+    needed = best - max(settings.refit_least, settings.refit_margin * best)
+    for k, cause in enumerate(suspicion.causes):
+        if cause.combines:
+            gains[k] = max(gains[k], _best_two_forms(suspicion, k, settings))
+    order = np.argsort(-gains, kind="stable")
+    return [int(k) for k in order[: settings.refit_most] if gains[k] > max(needed, 0.0)]
+
+
+def _best_two_forms(suspicion: Suspicion, cause: int, settings: DiagnosisSettings) -> float:
+    """Linear chi-square gain of the best two forms of a cause together."""
+    own = suspicion.of(cause)
+    gains = pair_gains(
+        suspicion.scores.z[own],
+        cosines(suspicion.scores.unit[:, own]),
+        suspicion.sign[own],
+        np.arange(own.size),
+        collinear=settings.pair_collinear,
+    )
+    return float(gains.max(initial=0.0))

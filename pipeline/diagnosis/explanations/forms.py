@@ -1,0 +1,101 @@
+"""Several forms of one cause together: how many the data ask for, and whether they are one form after all.
+
+A profile along the cable is a sum of smooth forms and spots, friction between the wires a sum of elements that slip one
+after the other. Forms are added while each pays for itself; those that a later one has made needless go again; and
+where they add up to one spot, that spot is tried in their place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.profile import spot_between
+from pipeline.diagnosis.explanations.refit import fit_from, fit_terms
+from pipeline.diagnosis.fits.extension import Extension, Term
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+def with_more_forms(
+    observation: Observation, fitted: Fit, cause: Cause, setting: str, settings: DiagnosisSettings, *, hopeless: float
+) -> Fit:
+    """The model with as many further forms of a cause as remove ``shape_gain`` each, and as may get below ``hopeless``.
+
+    Parameters
+    ----------
+    observation : Observation
+    fitted : Fit
+        With the cause in it already.
+    cause : Cause
+        One whose forms may act together.
+    setting : str
+        Of the forms that may act together (`causes.cause.Variant`).
+    settings : DiagnosisSettings
+    hopeless : float
+        Chi-square above which the result is of no use.
+    """
+    while len(fitted.extension.terms) < settings.shapes_most:
+        more = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
+        fitting = np.array([term.variant.setting == setting for term in more.terms], dtype=bool)
+        fresh = fitting & np.array([term not in fitted.extension.terms for term in more.terms], dtype=bool)
+        if fitted.chi2 - _loudest(more.statistic, fitting) ** 2 >= hopeless:
+            break
+        added: Fit | None = None
+        # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
+        for eligible in (fresh, fitting):
+            if _loudest(more.statistic, eligible) ** 2 >= settings.shape_gain:
+                loudest = int(np.argmax(more.statistic * eligible))
+                added = fit_terms(observation, fitted, more, (loudest,), settings)
+            if added is not None and fitted.chi2 - added.chi2 >= settings.shape_gain:
+                break
+        if added is None or fitted.chi2 - added.chi2 < settings.shape_gain:
+            break
+        fitted = without_needless_forms(observation, added, cause, settings)
+    return fitted
+
+
+def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> float:
+    """Largest statistic of the eligible directions; 0 without any."""
+    return float(statistic[eligible].max(initial=0.0))
+
+
+def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings) -> Fit:
+    """Drop the forms of a cause that later ones have made needless: each removes less than ``shape_gain``.
+
+    A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
+    """
+    while len(own := fitted.extension.terms_of(cause)) > 1:
+        shorter = [
+            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, settings) for form in own
+        ]
+        simplest = min(shorter, key=lambda one: one.chi2 if one.run.prediction is not None else np.inf)
+        if simplest.run.prediction is None or simplest.chi2 - fitted.chi2 > settings.shape_gain:
+            break
+        fitted = simplest
+    return fitted
+
+
+def as_one_spot(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
+    """One spot in the place of several forms along the cable, where it explains the data as well.
+
+    A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
+    not: what they add up to tells where the spot is.
+    """
+    extension = fitted.extension
+    count = len(extension.terms)
+    if count < 2 or len(extension.terms_of(extension.terms[0].cause)) < count:
+        return fitted
+    spot = spot_between(extension.base_model(fitted.vector), extension.model(fitted.vector))
+    if spot is None:
+        return fitted
+    variant, amount, stiffer = spot
+    alone = Extension(extension.base, extension.facts, (Term(extension.terms[0].cause, variant),))
+    start = alone.start(fitted.vector, (amount,))
+    start[: len(alone.base.knots)] += np.log1p(stiffer)
+    one = fit_from(observation, alone, start, fitted, settings)
+    as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + settings.shape_gain * (count - 1)
+    return one if as_well else fitted

@@ -1,0 +1,182 @@
+"""Terms put beside what a fitted model has already, and everything fitted again in full.
+
+Scores are local: their amounts are right only as far as the model is linear. A refit starts from that linear estimate,
+the other parameters moved out of the new terms' place, or from the share of it that fits best; and from both sides of
+K0 where nothing but the fit tells where K0 is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fits.extension import Extension, Term
+from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.fits.sensitivities import whole_residual
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.simulation import run
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+Array = NDArray[np.float64]
+
+SHARES = (1.0, 0.3, 0.1)
+"""Of a linear estimate, tried before a refit."""
+
+SANE = 5.0
+"""Plausible sizes: no refit starts from a larger amount, however far the linear model goes."""
+
+OTHER_VALLEY = 0.1
+"""Of the curvature scale: how far to both sides of the first guess K0 is put for further starts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """Terms put beside a fitted model, with what the linear model says of them.
+
+    Attributes
+    ----------
+    base : Fit
+        The model they are put beside.
+    terms : tuple of Term
+    amounts : tuple of float
+        Linear estimate of each, in the unit of its cause.
+    columns : (N, terms)
+        Their whitened traces per unit of amount.
+    """
+
+    base: Fit
+    terms: tuple[Term, ...]
+    amounts: tuple[float, ...]
+    columns: Array
+
+    @property
+    def extension(self) -> Extension:
+        """The model with the terms in it."""
+        known = self.base.extension
+        return Extension(known.base, known.facts, (*known.terms, *self.terms))
+
+    def start(self, vector: Array, *, share: float = 1.0) -> Array:
+        """Vector of `extension`: one of the model so far, then the terms with a share of their amounts, kept sane."""
+        facts, parts = self.base.extension.facts, [vector]
+        for term, amount in zip(self.terms, self.amounts, strict=True):
+            limit = SANE * term.cause.plausible(facts)
+            value = float(np.clip(share * amount, -limit, limit))
+            parts.append(term.numbers(max(value, 0.0) if term.cause.sign > 0 else value))
+        return np.concatenate(parts)
+
+
+def fit_terms(
+    observation: Observation,
+    base: Fit,
+    suspicion: Suspicion,
+    directions: tuple[int, ...],
+    settings: DiagnosisSettings,
+    *,
+    amounts: tuple[float, ...] | None = None,
+    hopeless: float = np.inf,
+    tuned: bool = True,
+) -> Fit | None:
+    """Fit with further directions as terms, the best from all starts that are worth trying.
+
+    Parameters
+    ----------
+    observation : Observation
+    base : Fit
+        The model so far.
+    suspicion : Suspicion
+        Scores about that model.
+    directions : tuple of int
+        Of ``suspicion``, each to become a term.
+    settings : DiagnosisSettings
+    amounts : tuple of float or None
+        Linear estimates, where the directions share them; else each as it is scored alone.
+    hopeless : float
+        Chi-square above which the fit is of no use.
+    tuned : bool
+        Whether places and times of the forms are fitted too; else they stay as scored.
+
+    Returns
+    -------
+    Fit or None
+        None where the model has no equilibrium from any start.
+    """
+    terms = tuple(suspicion.terms[k] for k in directions)
+    if not tuned:
+        terms = tuple(Term(term.cause, replace(term.variant, tuned=())) for term in terms)
+    if amounts is None:
+        amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
+    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
+    # the first start speaks for all, but not beside a base model that has not settled itself
+    speaks = 1 if base.converged else 2
+    best: Fit | None = None
+    for tried, start in enumerate([linear_start(observation, added), *_other_valleys(added)]):
+        if tried >= speaks and best is not None and best.converged and best.chi2 >= hopeless:
+            break
+        found = fit_from(observation, added.extension, start, base, settings, hopeless=hopeless)
+        if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
+            best = found
+    return best
+
+
+def fit_from(
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    near: Fit,
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float = np.inf,
+) -> Fit:
+    """A refit as the settings ask for it, its equilibria sought from those of a fitted neighbour."""
+    return fit(
+        observation,
+        extension,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=near.run,
+        hopeless=hopeless,
+    )
+
+
+def linear_start(observation: Observation, added: Addition) -> Array:
+    """The linear estimate of amounts and of what they leave to the other parameters, or the share of it that fits best.
+
+    A cause put beside parameters that stay where they were starts far from its valley: they had taken its place. So the
+    others move as far as the linear model says; only the last trial leaves them, and takes the least of the amounts.
+    """
+    base, extension = added.base, added.extension
+    size = np.linalg.norm(base.jacobian, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    left = base.residual - added.columns @ np.asarray(added.amounts)
+    move = np.linalg.lstsq(base.jacobian / size, left, rcond=1e-7)[0] / size
+    trials = [added.start(base.vector + share * move, share=share) for share in SHARES]
+    trials.append(added.start(base.vector, share=SHARES[-1]))
+    costs = [_cost_at(observation, extension, trial, base) for trial in trials]
+    # where none has an equilibrium, the last one is at least a possible cable: whole moves may leave every range
+    return trials[int(np.argmin(costs)) if np.isfinite(min(costs)) else -1]
+
+
+def _cost_at(observation: Observation, extension: Extension, vector: Array, near: Fit) -> float:
+    """Chi-square of a model at a vector; infinite where that is impossible or has no equilibrium."""
+    if not extension.admissible(vector):
+        return np.inf
+    shown = run(extension.model(vector), extension.facts, near=near.run, patient=False)
+    value = whole_residual(observation, shown.prediction, vector, extension.prior)
+    return np.inf if value is None else float(value @ value)
+
+
+def _other_valleys(added: Addition) -> list[Array]:
+    """Starts on both sides of K0 beside a bare base model whose K0 no photo of the force-free cable shows.
+
+    K0 then has a second, false valley, as deep as the true one but for some sigma.
+    """
+    base, facts = added.base.extension.base, added.base.extension.facts
+    if "mounted" in facts.branch:
+        return []
+    shift = OTHER_VALLEY * facts.curvature_scale
+    guesses = [base.neutral(bend=bend) for bend in (shift, -shift)]
+    return [added.start(guess) for guess in guesses if len(guess) == len(added.base.vector)]
