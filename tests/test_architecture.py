@@ -64,6 +64,7 @@ INSIDE = {
         ("single_cause", "two_causes", "friction_in_law"),
         ("conclusion",),
     ],
+    "pipeline.diagnosis.presentation": [("leftover", "named", "table"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
         ("photo", "rough", "render"),
@@ -75,7 +76,7 @@ INSIDE = {
         ("picture_size",),
         ("series",),
     ],
-    "pipeline.vision.scale": [("plane",), ("calibration", "chord"), ("board",)],
+    "pipeline.vision.scale": [("plane",), ("calibration", "chord", "corners", "plane_fit"), ("board",)],
     "pipeline.vision.search": [
         ("flanks", "strips", "backdrop"),
         ("crosscut",),

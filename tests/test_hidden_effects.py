@@ -20,7 +20,7 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
-from pipeline.diagnosis.presentation import present
+from pipeline.diagnosis.presentation.part import present
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings

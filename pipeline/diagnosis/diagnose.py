@@ -22,7 +22,7 @@ from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, secon
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
 from pipeline.diagnosis.fits.faults import Faults, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
-from pipeline.diagnosis.presentation import present
+from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.leftover import Leftover, smooth_fields, test_leftover
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines

@@ -161,4 +161,4 @@ def _gain(
         return None
     suspicion = suspect(observation, before, (), visible=settings.visible, trace=settings.trace)
     bench = Workbench(test, facts, observation, before, suspicion, np.zeros(1), 0.0)
-    return measured_gain(bench, after, settings)[0]
+    return measured_gain(bench, after, settings)

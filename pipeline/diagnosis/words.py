@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.statistics.verdict import Verdict
+from pipeline.result import CausePart, CauseRow
 from pipeline.units import amount_unit
 
 # Names that English says in another order or with a hyphen; the others as they are, with blanks.
@@ -31,8 +34,7 @@ def listed(names: list[str], *, last: str = "or") -> str:
 def headline(
     verdict: Verdict,
     *,
-    names: list[list[str]],
-    amounts: list[tuple[float, float, str]],
+    causes: Sequence[CausePart],
     explained: float | None,
     change: float | None,
     weakest: str,
@@ -44,9 +46,8 @@ def headline(
     Parameters
     ----------
     verdict : Verdict
-    names : list of classes
-        One class of names for each cause found.
-    amounts : list of (estimate, std, unit)
+    causes : sequence of CausePart
+        What was found, each with its class of names.
     explained : share or None
         Of the held-out excess misfit.
     change : relative or None
@@ -67,7 +68,8 @@ def headline(
             f"The simulation misfits the data beyond noise and no cause in the catalogue removes it: {leftover}; "
             "f_EI and K0 are not to be relied on before that is settled."
         )
-    sizes = [amount_unit(unit, value, std).text(value, std) for value, std, unit in amounts]
+    names = [cause.class_ for cause in causes]
+    sizes = [amount_unit(c.unit, c.estimate, c.std).text(c.estimate, c.std) for c in causes]
     gain = (
         ""
         if explained is None
@@ -85,11 +87,12 @@ def headline(
     return f"The simulation lacks {listed(names[0])} ({sizes[0]}){gain}{shift}."
 
 
-def could_have_been_seen(seen: list[tuple[str, float, str]], total: int) -> str:
-    """What the data could have shown: the clearest three of the causes detectable at a plausible size."""
+def could_have_been_seen(seen: Sequence[CauseRow], total: int) -> str:
+    """What the data could have shown: the first three of the causes ``seen`` at a plausible size, of ``total``."""
     if not seen:
         return f"none of {total} causes would have shown at a plausible size"
-    sizes = ((spoken(name), amount_unit(unit, size).plain(size, 2)) for name, size, unit in seen[:3])
+    least = [(row, row.minimal_detectable or 0.0) for row in seen[:3]]
+    sizes = ((spoken(row.name), amount_unit(row.unit, size).plain(size, 2)) for row, size in least)
     clearest = ", ".join(f"{name} from {size}" for name, size in sizes)
     return f"{len(seen)} of {total} causes would have shown at a plausible size, such as {clearest}"
 

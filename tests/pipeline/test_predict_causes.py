@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
-from pipeline.diagnosis.presentation import present
+from pipeline.diagnosis.presentation.part import present
 from pipeline.identified_model import identified_model
 from pipeline.predict import predict
 from pipeline.result import Result, SpecimenPart

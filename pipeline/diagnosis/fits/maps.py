@@ -7,6 +7,7 @@ values within about 2.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -92,8 +93,7 @@ def _cells(s: Array, across: Array, covariance: Array, edges: Array) -> tuple[li
 
 def chi2_by_kind(observation: Observation, fitted: Fit) -> tuple[dict[str, float], dict[str, int]]:
     """Chi-square and number of data of forces, chords and shapes."""
-    rows = len(observation.rows.kind)
-    square = fitted.residual[:rows] ** 2
+    square = fitted.residual[: observation.rows.count] ** 2
     kinds = range(len(KINDS) - 1)
     return (
         {KINDS[k]: float(square[observation.rows.kind == k].sum()) for k in kinds},
@@ -115,21 +115,40 @@ def rms_errors(observation: Observation, fitted: Fit, steps: list[int]) -> tuple
     return np.array(force), np.concatenate(shape) if shape else np.zeros(0)
 
 
-def smooth_share(observation: Observation, field: Array) -> dict[str, Any]:
-    """Where a whitened field (N,) sits: share of its square by kind, strongest step and, on photos, its place."""
-    rows = len(observation.rows.kind)
-    square = field[:rows] ** 2
+@dataclass(frozen=True)
+class Whereabouts:
+    """Where a whitened field sits.
+
+    Attributes
+    ----------
+    share : dict of kind -> share
+        Of its square.
+    step : int
+        Index of the step where it is strongest.
+    place : m or None
+        Where along the cable it is largest there; None without a photo, and so the next two.
+    across, s : list of float or None
+        Its shape across the cable and the arc lengths of that, m.
+    """
+
+    share: dict[str, float]
+    step: int
+    place: float | None = None
+    across: list[float] | None = None
+    s: list[float] | None = None
+
+
+def whereabouts(observation: Observation, field: Array) -> Whereabouts:
+    """Where a whitened field (N,) sits."""
+    square = field**2
     total = max(float(square.sum()), 1e-300)
     share = {KINDS[k]: float(square[observation.rows.kind == k].sum()) / total for k in range(len(KINDS) - 1)}
     by_step = np.bincount(observation.rows.step, weights=square)
     strongest = int(np.argmax(by_step))
-    found: dict[str, Any] = {"share": share, "step_index": strongest, "place": None}
-    for photo in observation.photos:
-        if photo.step == strongest:
-            own = np.flatnonzero((observation.rows.step == strongest) & (observation.rows.kind > 0))
-            components = linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, field[own])[0]
-            across = photo.basis @ components
-            found["place"] = float(photo.sections.s[int(np.argmax(np.abs(across)))])
-            found["shape_m"] = across.tolist()
-            found["s_m"] = photo.sections.s.tolist()
-    return found
+    photo = next((photo for photo in observation.photos if photo.step == strongest), None)
+    if photo is None:
+        return Whereabouts(share, strongest)
+    own = observation.rows.of_photo(strongest)
+    across = photo.basis @ linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, field[own])[0]
+    s = photo.sections.s
+    return Whereabouts(share, strongest, float(s[int(np.argmax(np.abs(across)))]), across.tolist(), s.tolist())

@@ -48,6 +48,20 @@ class Row:
     kind: NDArray[np.int_]
     step: NDArray[np.int_]
 
+    @property
+    def count(self) -> int:
+        """N."""
+        return len(self.kind)
+
+    @property
+    def force(self) -> NDArray[np.bool_]:
+        """Which rows (N,) are forces; the others are chords and shapes."""
+        return np.asarray(self.kind == KINDS.index("force"))
+
+    def of_photo(self, step: int) -> NDArray[np.int_]:
+        """Positions of the rows of a step's photo: chord, then shape."""
+        return np.flatnonzero(~self.force & (self.step == step))
+
 
 KINDS = ("force", "chord", "shape", "prior")
 

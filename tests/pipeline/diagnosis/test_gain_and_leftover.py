@@ -3,10 +3,10 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
+from pipeline.diagnosis.fits.heldout import removes_most, unproven
 from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
-from pipeline.diagnosis.presentation import _removes_most, unproven
 from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, predictive_root
 from pipeline.diagnosis.statistics.leftover import smooth_fields
 from pipeline.diagnosis.statistics.leftover import test_leftover as leftover_of
@@ -141,10 +141,10 @@ def test_a_cause_that_fails_on_steps_held_out_does_not_explain_what_is_left(p_va
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.6, False), (0.9, True), (None, False)])
-def test_an_unexplained_extension_answers_only_if_it_removes_most(share, expected):
+def test_an_unexplained_extension_answers_only_if_itremoves_most(share, expected):
     given = None
     if share is not None:
         given = GainPart(
             heldout_excess_removed=share, ci95=(0.5, 1.0), force_rmse_N=(1.0, 0.1), shape_rmse_m=(1.0, 0.1)
         )
-    assert _removes_most(given, DiagnosisSettings()) is expected
+    assert removes_most(given, DiagnosisSettings()) is expected

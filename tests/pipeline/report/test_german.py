@@ -16,6 +16,7 @@ from pipeline.diagnosis.words import SPOKEN, could_have_been_seen, headline
 from pipeline.errors import InputError
 from pipeline.report.german import EDGES, entries
 from pipeline.report.words import Words
+from pipeline.result import CausePart, CauseRow
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 
@@ -121,7 +122,14 @@ def test_both_have_the_same_gaps():
 
 SIZES = [(0.00488, 0.00017, "N m"), (0.7, 0.0014, "1/m")]
 FOUND = {"explained": 0.94, "change": 0.2, "weakest": "", "leftover": ""}
-SEEN = could_have_been_seen([("stiffness_varying", 0.00051, "-"), ("displacement_offset", 3.5e-6, "m")], 19)
+LOUD = {"z": 9.0, "p_adjusted": 0.0, "estimate": 0.0, "std": 1.0, "surviving_fraction": 1.0}
+SEEN = could_have_been_seen(
+    [
+        CauseRow(name="stiffness_varying", unit="-", minimal_detectable=0.00051, **LOUD),
+        CauseRow(name="displacement_offset", unit="m", minimal_detectable=3.5e-6, **LOUD),
+    ],
+    19,
+)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +167,11 @@ SEEN = could_have_been_seen([("stiffness_varying", 0.00051, "-"), ("displacement
     ],
 )
 def test_headline_of_the_diagnosis(verdict, names, values, told):
-    sentence = headline(verdict, names=names, amounts=SIZES[: len(names)], **{**FOUND, **values})
+    causes = [
+        CausePart(name=group[0], **{"class": group}, probability=1.0, estimate=estimate, std=std, unit=unit)
+        for group, (estimate, std, unit) in zip(names, SIZES, strict=False)
+    ]
+    sentence = headline(verdict, causes=causes, **{**FOUND, **values})
     assert Words("de").said(sentence).text == told
 
 

@@ -1,0 +1,103 @@
+"""From a conclusion to the part of the result: what is named, what it is worth, what stays open, what to do next.
+
+gain on steps held out -> table of all causes -> f_EI identified again -> causes named, with their classes -> verdict ->
+the sentence on top -> the part of the result.
+"""
+
+from __future__ import annotations
+
+from pipeline.diagnosis.explanations.conclusion import Conclusion
+from pipeline.diagnosis.explanations.friction_in_law import hidden_in_law
+from pipeline.diagnosis.fits.heldout import measured_gain, removes_most, unproven
+from pipeline.diagnosis.fits.identified_again import identified_again
+from pipeline.diagnosis.fits.maps import residual_map
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.plans.next_experiment import next_experiment
+from pipeline.diagnosis.presentation.leftover import described
+from pipeline.diagnosis.presentation.named import change_of_stiffness, extended_curve, named_causes
+from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
+from pipeline.diagnosis.statistics.verdict import decide
+from pipeline.diagnosis.words import could_have_been_seen, headline
+from pipeline.result import Curve, DiagnosisPart, NextExperiment
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+def present(
+    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, identified: Curve | None = None
+) -> DiagnosisPart:
+    """Fill the part of the result; ``identified`` is f_EI before the diagnosis, which people compare with."""
+    accepted = conclusion.accepted
+    gain = None if accepted is None else measured_gain(bench, accepted.fitted, settings)
+    rows = table(bench, conclusion, settings, gain=gain)
+    seen = seen_at_plausible_size(bench, rows)
+    in_law = hidden_in_law(bench, conclusion.names) if conclusion.two is None else []
+    again = None
+    if accepted is not None:
+        again = identified_again(bench.observation, accepted.fitted, settings, in_law=in_law)
+    extended = None if again is None else extended_curve(again, conclusion, settings)
+    causes = named_causes(bench, conclusion, again, extended)
+    verdict = decide(
+        detected=accepted is not None,
+        alien=conclusion.alien or unproven(conclusion.left.p_value, gain, settings),
+        two=len(causes) == 2,
+        names=len(conclusion.names),
+        powerless=len(seen) < settings.powerless * len(rows),
+    )
+    leftover = described(bench, conclusion.left)
+    sentence = headline(
+        verdict,
+        causes=causes,
+        explained=None if gain is None else gain.heldout_excess_removed,
+        change=change_of_stiffness(bench, accepted, extended, identified),
+        weakest=could_have_been_seen(seen, len(rows)),
+        leftover=leftover["message"],
+        friction_in_law=bool(in_law),
+    )
+    photos, forces = left_out(bench)
+    return DiagnosisPart(
+        verdict=verdict,
+        headline=sentence,
+        causes=causes,
+        table=rows,
+        gain=gain,
+        blind_spots=blind_spots(bench, seen, settings),
+        next_experiment=what_next(bench, conclusion, settings, unexplained=verdict == "unexplained"),
+        extended=extended,
+        extended_refuted=verdict == "unexplained" and not removes_most(gain, settings),
+        leftover=leftover,
+        residuals_before=residual_map(bench.test, bench.observation, bench.base),
+        residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
+        twins=confusable(bench, conclusion, settings),
+        left_out_photos=photos,
+        left_out_forces=forces,
+    )
+
+
+def left_out(bench: Workbench) -> tuple[list[int], list[int]]:
+    """Steps whose photo, and steps whose force, the data at fault took out of the diagnosis."""
+    used = {photo.step for photo in bench.observation.photos}
+    steps = list(enumerate(bench.test.steps))
+    return (
+        [step.step for k, step in steps if step.shape is not None and k not in used],
+        [step.step for k, step in steps if bench.observation.forces[k].size == 0],
+    )
+
+
+def what_next(
+    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, unexplained: bool
+) -> NextExperiment | None:
+    """What separates the names that are confused; without any, what tells most about what these data cannot show.
+
+    The order is that of use: a class can be settled, a misfit of no name needs a second look at the same cable, what
+    was never unloaded hides whole causes, and the force calibration is unseen always.
+    """
+    confused = conclusion.two.pairs if conclusion.two else conclusion.singles[: conclusion.members]
+    if len(confused) > 1:
+        return next_experiment(bench, confused[0], confused[1:], settings)
+    if unexplained:
+        return NextExperiment(what="repeat the test with the cable turned end for end, and unload", separates=[])
+    if not bench.facts.returns:
+        return NextExperiment(
+            what="unload in the same steps, with photos", separates=["bearing_friction", "hysteresis", "plastic_set"]
+        )
+    return NextExperiment(what="hang dead weights on the load cell", separates=["force_gain"])

@@ -1,0 +1,145 @@
+"""All causes of the catalogue side by side: how loud each is, how large it would be, what it would do to f_EI.
+
+Loudness and harm are unrelated: a cause may be seen clearly and leave f_EI alone, or spoil it unseen. So the table has
+both, the blind spots are those of the second kind, and the table of cosines says which causes cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.explanations.conclusion import Conclusion
+from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.friction_in_law import FRICTION
+from pipeline.diagnosis.fits.extended import stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.fits.search import detectable_amount
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.statistics.score import adjusted_p, sigma_needed
+from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.result import BlindSpot, CauseRow, GainPart
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+Array = NDArray[np.float64]
+
+
+def table(
+    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, gain: GainPart | None
+) -> list[CauseRow]:
+    """One row for every cause, the loudest first; ``gain`` is that of the accepted explanation."""
+    suspicion, scores = bench.suspicion, bench.suspicion.scores
+    p_values = adjusted_p(suspicion.statistic, bench.maxima) if suspicion.terms else suspicion.statistic
+    needed = sigma_needed(bench.limit, power=settings.power)
+    twin, closeness = nearest(_closeness(bench))
+    refitted = {e.causes[0]: e for e in conclusion.singles}
+    rows = []
+    for index, cause in enumerate(suspicion.causes):
+        loudest = suspicion.best(index)
+        if loudest is None:
+            rows.append(_unseen_row(cause.name, cause.unit))
+            continue
+        found = refitted.get(index)
+        size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found)
+        detectable = detectable_amount(
+            bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace
+        )
+        accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
+        rows.append(
+            CauseRow(
+                name=cause.name,
+                z=float(scores.z[loudest]),
+                p_adjusted=float(p_values[loudest]),
+                estimate=_finite(size.estimate),
+                std=_finite(size.std),
+                unit=cause.unit,
+                minimal_detectable=detectable if np.isfinite(detectable) else None,
+                surviving_fraction=float(scores.surviving[loudest]),
+                nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
+                twin_cosine=float(closeness[index]),
+                delta_chi2=size.gain,
+                heldout_excess_removed=gain.heldout_excess_removed if gain and accepted_alone else None,
+                stiffness_shift=_finite(size.shift),
+            )
+        )
+    return sorted(rows, key=lambda row: -abs(row.z))
+
+
+class _Size(NamedTuple):
+    """What a cause would amount to: estimate and std (its unit), relative rms change of f_EI, chi-square removed."""
+
+    estimate: float
+    std: float
+    shift: float
+    gain: float | None
+
+
+def _as_refitted(bench: Workbench, found: Explanation) -> _Size:
+    estimate, std = found.amount(bench.suspicion.causes[found.causes[0]])
+    return _Size(estimate, std, stiffness_change(bench.base, found.fitted), found.gain)
+
+
+def _as_scored(bench: Workbench, direction: int) -> _Size:
+    """By the linear model alone, for causes that were not worth a refit."""
+    suspicion, own = bench.suspicion, [direction]
+    shift = stiffness_change_linear(bench.base, suspicion.columns[:, own], suspicion.scores.estimate[own])
+    scores = suspicion.scores
+    return _Size(float(scores.estimate[direction]), float(scores.std[direction]), float(shift[0]), None)
+
+
+def _unseen_row(name: str, unit: str) -> CauseRow:
+    return CauseRow(name=name, z=0.0, p_adjusted=1.0, estimate=0.0, std=0.0, unit=unit, surviving_fraction=0.0)
+
+
+def _finite(value: float) -> float:
+    """A number that JSON can hold; what is invisible has an infinite std, and nothing of its trace survives."""
+    return value if np.isfinite(value) else 0.0
+
+
+def _closeness(bench: Workbench) -> Array:
+    """Largest ``|cos|`` (causes, causes) between the directions of any two causes."""
+    suspicion = bench.suspicion
+    return between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
+
+
+def seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
+    """Rows of causes that a plausible size would have shown, the clearest first.
+
+    One form of friction between the wires may be seen on loading alone, but another is part of the law.
+    """
+    causes = [cause for cause in bench.suspicion.causes if bench.facts.returns or cause.name != FRICTION]
+    plausible = {cause.name: cause.plausible(bench.facts) for cause in causes}
+    seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible.get(r.name, 0.0)]
+    return sorted(seen, key=lambda row: (row.minimal_detectable or 0.0) / plausible[row.name])
+
+
+def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSettings) -> list[BlindSpot]:
+    """Causes that cannot be seen at a plausible size but would move f_EI, the most harmful first."""
+    suspicion = bench.suspicion
+    known = {row.name for row in seen} | {"nonlinear_stiffness"}
+    spots = []
+    for index, cause in enumerate(suspicion.causes):
+        own = suspicion.of(index)
+        if cause.name in known or own.size == 0:
+            continue
+        sizes = np.full(own.size, cause.plausible(bench.facts))
+        bias = float(stiffness_change_linear(bench.base, suspicion.columns[:, own], sizes).max())
+        if bias >= settings.harm:
+            spots.append(BlindSpot(name=cause.name, stiffness_bias_at_plausible_size=bias, settled_by=cause.settled_by))
+    return sorted(spots, key=lambda spot: -spot.stiffness_bias_at_plausible_size)
+
+
+def confusable(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> dict[str, dict[str, float]]:
+    """Cosines among the loudest causes and whatever is in the set of names."""
+    suspicion, closeness = bench.suspicion, _closeness(bench)
+    loudness = np.zeros(len(suspicion.causes))
+    np.maximum.at(loudness, suspicion.owner, suspicion.statistic)
+    chosen = [e.causes[0] for e in conclusion.singles[: conclusion.members]]
+    chosen += [int(k) for k in np.argsort(-loudness) if int(k) not in chosen and closeness[k, k] > 0.0]
+    chosen = chosen[: settings.twins_shown]
+    names = [suspicion.causes[k].name for k in chosen]
+    return {
+        name: {other: float(closeness[k, j]) for other, j in zip(names, chosen, strict=True) if j != k}
+        for name, k in zip(names, chosen, strict=True)
+    }
