@@ -147,7 +147,7 @@ def _may_go_on(
     darkest = np.maximum(light.mean(axis=2).min(axis=1), settings.beyond_darkest)
     strong = (-relief if cut.dark else relief) > (settings.beyond_contrast[0] * usual) * darkest[:, None]
     enough = 0.25 * width / (offsets[1] - offsets[0])
-    return np.count_nonzero(strong.sum(axis=1) >= enough) * len(ahead) / len(rows) > least
+    return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * len(ahead) / len(rows) > least)
 
 
 def _led_into_picture(
