@@ -192,6 +192,7 @@ def _facts(length: float, model: IdentifiedModel) -> Facts:
     return Facts(
         branch=("loading",),
         displacement=np.zeros(1),
+        displacement_std=np.zeros(1),
         photo_time=np.zeros(1),
         hold_times=(np.zeros(1),),
         clock=np.zeros(1),

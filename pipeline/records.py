@@ -66,7 +66,8 @@ class LoadStep:
     """One displacement step of the force log: a hold with its force samples and the photo taken in it.
 
     ``force_N`` is the force at the time of the photo (compression positive), ``force_std_N`` its standard deviation
-    from the samples of the hold. ``times_s`` may be empty where the log has no time.
+    from the samples of the hold. ``times_s`` may be empty where the log has no time. ``displacement_std_m`` is the
+    scatter of the displacement by those samples; None where they tell none.
     """
 
     step: int
@@ -79,6 +80,7 @@ class LoadStep:
     forces_N: Array
     image: str | None
     line: int | None = None
+    displacement_std_m: float | None = None
 
 
 @dataclass(frozen=True)

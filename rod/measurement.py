@@ -88,6 +88,8 @@ class MeasuredStep:
         ``mounted``, ``loading`` or ``unloading``.
     displacement : m or None
         By the log, from the mounted position.
+    displacement_std : m or None
+        How far the log scatters there; None where it does not tell, as with one sample or a setpoint.
     force, force_std : N
         At the time of the photo; compression positive.
     chord, chord_std : m or None
@@ -117,6 +119,7 @@ class MeasuredStep:
     hold_times: Array | None = None
     hold_forces: Array | None = None
     picture_centre: tuple[float, float] | None = None
+    displacement_std: float | None = None
 
 
 @dataclass(frozen=True)

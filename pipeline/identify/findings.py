@@ -72,7 +72,8 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
         return
     chord = np.array([s.chord for s in both], dtype=float)
     moved = np.array([s.displacement for s in both], dtype=float)
-    std = np.hypot([s.chord_std or 0.0 for s in both], settings.displacement_std_m)
+    logged = np.hypot([s.displacement_std or 0.0 for s in both], settings.displacement_std_m)
+    std = np.hypot([s.chord_std or 0.0 for s in both], logged)
     zero = np.average(chord + moved, weights=1.0 / std**2)
     off = chord + moved - zero
     worst = int(np.argmax(np.abs(off) / std))

@@ -66,6 +66,7 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         hold_times=step.times_s if step.times_s.size else None,
         hold_forces=step.forces_N if step.forces_N.size else None,
         picture_centre=None if line is None else picture_centre(line, px_per_m),
+        displacement_std=step.displacement_std_m,
     )
 
 

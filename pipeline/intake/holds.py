@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import InputError
 from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
+from pipeline.intake.holdplace import HoldPlaces, hold_places
 from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
@@ -25,6 +26,13 @@ from pipeline.intake.specimenfile import LogSpec
 from pipeline.records import Array, Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
 from pipeline.units import quantity
+
+SPREAD = 8.0
+"""Standard deviations of the scatter that the samples of a hold may lie apart: 1,000 of them do so by 6.5."""
+
+
+SAME = 4.0
+"""Standard deviations of a place: two holds further apart are at two places."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,11 @@ def load_steps(
         line, force = samples.lines[wild[0]], quantity(float(samples.forces[wild[0]]), "N")
         message = f"{len(wild)} forces are off by more than the largest of all holds and were left out"
         return steps, (doubtful("log/wild-force", f"{name}: {message} (first: line {line}, {force})"), *findings)
-    positions = [_position(samples, displacements, run) for run in runs]
+    places = hold_places(
+        [displacements[run.rows] for run in runs], [_at_photo(samples, run) for run in runs], settings=settings
+    )
+    positions = places.place
+    same = max(tolerance, SAME * max((std for std in places.std if std is not None), default=0.0))
     means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
     sign, signed = force_sign(means, np.array(positions), spec, name=name, settings=settings)
     forces = sign * samples.forces
@@ -73,7 +85,7 @@ def load_steps(
         [_hold(samples, forces, run) for run in runs], resolution=samples.resolution, settings=settings
     )
     if samples.branches is None:
-        branches, directed = inferred_branches(positions, fitted.force, tolerance, name=name, settings=settings)
+        branches, directed = inferred_branches(positions, fitted.force, same, name=name, settings=settings)
     else:
         branches, directed = [samples.branches[run.first] for run in runs], []
     steps = tuple(
@@ -88,11 +100,14 @@ def load_steps(
             forces_N=forces[run.rows],
             image=next((image for image in samples.images[run.rows] if image), None),
             line=samples.lines[run.first],
+            displacement_std_m=scatter,
         )
-        for run, branch, position, force, std in zip(runs, branches, positions, fitted.force, fitted.std, strict=True)
+        for run, branch, position, scatter, force, std in zip(
+            runs, branches, positions, places.std, fitted.force, fitted.std, strict=True
+        )
     )
-    within = _hold_findings(samples, displacements, runs, tolerance, name)
-    order = order_findings(steps, tolerance, name=name)
+    within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
+    order = order_findings(steps, same, name=name)
     return steps, (
         *moved,
         *turned,
@@ -100,6 +115,7 @@ def load_steps(
         *signed,
         *directed,
         *_fit_findings(fitted, name, settings),
+        *_place_findings(places, tolerance, name),
         *within,
         *order,
     )
@@ -182,10 +198,9 @@ def _rows_with_photo(samples: Samples, run: Run) -> list[int]:
     return [row for row in named if samples.images[row] == samples.images[named[0]]]
 
 
-def _position(samples: Samples, displacements: Array, run: Run) -> float:
-    """Displacement at the photo, or the median of the hold."""
-    rows = _rows_with_photo(samples, run) or list(range(run.first, run.last))
-    return float(np.median(displacements[rows]))
+def _at_photo(samples: Samples, run: Run) -> NDArray[np.bool_]:
+    """Which rows of a hold name its (first) photo, (n,)."""
+    return np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run))
 
 
 def _photo_time(samples: Samples, run: Run) -> float | None:
@@ -241,14 +256,25 @@ def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> It
         yield inferred("log/force-std", f"{name}: no repeated samples; standard deviation of a force taken as {share}")
 
 
+def _place_findings(places: HoldPlaces, tolerance: float, name: str) -> Iterator[Finding]:
+    """A displacement that scatters by more than holds are told apart by."""
+    if places.sigma > tolerance:
+        largest = max(std for std in places.std if std is not None)
+        message = (
+            f"the displacement scatters by {places.sigma * 1e3:.2g} mm from sample to sample; that of a step "
+            f"is known to {largest * 1e3:.2g} mm"
+        )
+        yield inferred("log/displacement-noise", f"{name}: {message}")
+
+
 def _hold_findings(
-    samples: Samples, displacements: Array, runs: Sequence[Run], tolerance: float, name: str
+    samples: Samples, displacements: Array, runs: Sequence[Run], most: float, name: str
 ) -> Iterator[Finding]:
-    """Contradictions within a hold: a displacement that moves, more than one photo."""
+    """Contradictions within a hold: a displacement that moves by more than ``most`` (m), more than one photo."""
     for run in runs:
         place = f"{name}, line {samples.lines[run.first]}"
         spread = float(np.ptp(displacements[run.rows]))
-        if spread > 5.0 * tolerance:
+        if spread > most:
             message = (
                 f"the displacement moves by {spread * 1e3:.3g} mm within step {run.step}; that at the photo was taken"
             )

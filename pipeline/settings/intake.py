@@ -59,6 +59,20 @@ class IntakeSettings(BaseModel):
         0.75, gt=0.5, le=1.0, description="of the loaded steps; so many of one sign decide the sign of the log"
     )
 
+    # Displacement at the time of the photo
+    place_min_changes: int = Field(
+        8,
+        gt=1,
+        description="changes from sample to sample, over all holds; fewer tell the scatter of the displacement worse "
+        "than to a third",
+    )
+    place_wander: float = Field(
+        1.5,
+        gt=1,
+        description="times the scatter from sample to sample; a hold whose samples lie wider about their median moves, "
+        "and only the sample at the photo says where the bearing stood",
+    )
+
     # Force at the time of the photo
     trend_degree_max: int = Field(
         4, ge=0, description="degree of the polynomial in time; relaxation over a hold is followed to 1 % by degree 4"

@@ -142,9 +142,12 @@ def _imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Ar
                 chord += sign * c * model.nuisance(u, name)
         return chord, by
     moved = data.step.displacement or 0.0
+    if (own := f"moved/{data.step.step}") in model.nuisances:
+        by[model.index(own)] = -model.nuisances[own]
+        moved += model.nuisance(u, own)
     if model.zero is None:
         arc = _arc(model, u)
-        return float(arc.x[-1]) - moved, arc.x_by[-1] @ _chain(model, u, by)
+        return float(arc.x[-1]) - moved, by + arc.x_by[-1] @ _chain(model, u, np.zeros(model.size))
     by[model.index("zero")] = model.nuisances["zero"]
     return model.zero + model.nuisance(u, "zero") - moved, by
 

@@ -228,5 +228,7 @@ def fit_model(
     for d in data:
         if d.midline is not None:
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}
+        elif d.step.displacement_std:
+            nuisances[f"moved/{d.step.step}"] = d.step.displacement_std
     prior = prior or first_prior(knots)
     return FitModel(data, test.length, knots, prior, unit, elements, None if zero is None else zero[0], nuisances)

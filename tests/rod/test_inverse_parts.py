@@ -30,12 +30,14 @@ def model_of(test, count=5, **kind):
     return replace(fit_model(test, step_data(test, blocks=60), place_knots(2.0, 9.2, count), elements=80), **kind)
 
 
-@pytest.mark.parametrize("blind", [False, True])
-def test_jacobian_against_central_differences(blind):
+@pytest.mark.parametrize(("blind", "scatter"), [(False, None), (True, None), (True, 1e-4)])
+def test_jacobian_against_central_differences(blind, scatter):
     test = measured()
     if blind:
-        test = replace(test, steps=(*test.steps[:3], replace(test.steps[3], shape=None, chord=None, chord_std=None)))
+        last = replace(test.steps[3], shape=None, chord=None, chord_std=None, displacement_std=scatter)
+        test = replace(test, steps=(*test.steps[:3], last))
     model = model_of(test)
+    assert ("moved/3" in model.nuisances) == (scatter is not None)
     rng = np.random.default_rng(0)
     u = (
         model.start(LAW.tangent(model.knots), LAW.K0)

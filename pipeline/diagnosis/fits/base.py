@@ -6,15 +6,16 @@ one and the same law. Beside them, with the prior knowledge the measurement stat
 photos alike, the scale of the photos and the length of the cable. Every candidate cause is an addition to this.
 
 Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0
-(1/m), errors of the axes along and across the chord (m; only if the measurement states any), relative error of the
-stated px/mm, relative error of the stated length. A weak prior keeps the law smooth, ``int (d^2 log f / dt^2)^2 dt /
+(1/m), errors of the axes along and across the chord (m; only if the measurement states any), errors of the displacement
+of single steps (m; only where the log scatters, or has none), relative error of the stated px/mm, relative error of the
+stated length. A weak prior keeps the law smooth, ``int (d^2 log f / dt^2)^2 dt /
 tau^2`` with t from 0 to 1 over the control points (see `rod.inverse.knots`): without a photo of the force-free cable,
 K0 and the stiffness near K0 are else free to run away together.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,9 @@ AXES = ("left_along", "left_across", "right_along", "right_across", "parallax")
 
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
+
+MOVED = "displacement_"
+"""Begin of the name of the error of a step's displacement; its index follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,12 @@ class Base:
         K0 of the first guess.
     straight : bool
         K0 is held at zero (where the machinery starts from the poorest model).
+    moved : tuple of int
+        Indices of the steps whose displacement is not exact, in rising order.
+    moved_std : (k,) m
+        Prior knowledge of the errors of their displacements.
+    moved_first : (k,) m
+        First guess of those errors.
     """
 
     knots: Array
@@ -79,12 +89,16 @@ class Base:
     camera_foot_std: float = 0.0
     rest_slope: float = 1.0
     places: Array | None = None
+    moved: tuple[int, ...] = ()
+    moved_std: Array = field(default_factory=lambda: np.zeros(0))
+    moved_first: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         bend = () if self.straight else ("pre_curvature",)
-        return (*(f"stiffness_{i}" for i in range(len(self.knots))), *bend, *self.axes, "scale", "length")
+        moved = (f"{MOVED}{i}" for i in self.moved)
+        return (*(f"stiffness_{i}" for i in range(len(self.knots))), *bend, *self.axes, *moved, "scale", "length")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -98,8 +112,16 @@ class Base:
 
     def axis_errors(self, vector: Array) -> Array:
         """Errors (5,) of the axes in the order of `AXES`, m and relative."""
-        first = self.names.index("scale") - len(self.axes)
+        first = len(self.knots) + (not self.straight)
         return np.asarray(vector[first : first + len(AXES)]) if self.axes else np.zeros(len(AXES))
+
+    def shift(self, vector: Array, steps: int) -> Array | float:
+        """Errors (steps,) of the displacements, m; a plain zero where all are exact."""
+        if not self.moved:
+            return 0.0
+        shift = np.zeros(steps)
+        shift[list(self.moved)] = vector[-2 - len(self.moved) : -2]
+        return shift
 
     @property
     def pre_curvature_index(self) -> int | None:
@@ -108,12 +130,14 @@ class Base:
 
     @property
     def prior(self) -> Array:
-        """Prior knowledge as rows (m, p) of unit variance, around zero: scale, length, axes, smoothness."""
+        """Prior knowledge as rows (m, p) of unit variance, around zero: scale, length, axes, places, smoothness."""
         count, size = len(self.knots), len(self.names)
         rows = [np.eye(size)[-2] / self.scale_std, np.eye(size)[-1] / self.length_std]
         if self.axes:
             first = self.names.index(self.axes[0])
             rows.extend(self._axis_rows() @ np.eye(size)[first : first + len(self.axes)])
+        if self.moved:
+            rows.extend(np.eye(size)[-2 - len(self.moved) : -2] / self.moved_std[:, None])
         if count > 2:
             places = self.knots if self.places is None else self.places
             weight, mode = np.linalg.eigh(roughness(places))
@@ -135,18 +159,19 @@ class Base:
     @property
     def known(self) -> int:
         """Number of rows of prior knowledge that are not about the form of the law; they come first."""
-        return 2 + len(self.axes)
+        return 2 + len(self.axes) + len(self.moved)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
-        axes = np.full(len(self.axes), 1e-6 * facts.length)
-        return np.asarray(np.r_[np.full(len(self.knots), 1e-4), bend, axes, 1e-6, 1e-6])
+        places = np.full(len(self.axes) + len(self.moved), 1e-6 * facts.length)
+        return np.asarray(np.r_[np.full(len(self.knots), 1e-4), bend, places, 1e-6, 1e-6])
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
-        return np.asarray(np.r_[np.full(len(self.knots), np.log(stiffness)), rest, np.zeros(len(self.axes)), 0.0, 0.0])
+        law, axes = np.full(len(self.knots), np.log(stiffness)), np.zeros(len(self.axes))
+        return np.asarray(np.r_[law, rest, axes, self.moved_first, 0.0, 0.0])
 
     def pre_curvature(self, vector: Array) -> float:
         """K0, 1/m."""
@@ -157,15 +182,15 @@ class Base:
         ordinates = self.stiffness * np.exp(vector[: len(self.knots)])
         return Characteristic.from_ordinates(self.knots, ordinates, reading="tangent", abscissa="excess")
 
-    def model(self, vector: Array) -> Model:
-        """The model at a parameter vector."""
+    def model(self, vector: Array, *, steps: int = 0) -> Model:
+        """The model at a parameter vector; ``steps`` of the test, which count where displacements are not exact."""
         bending = BendingTest(
             self.length / (1.0 + float(vector[-1])),
             self.characteristic(vector),
             self.pre_curvature(vector),
             elements=self.elements,
         )
-        return Model(bending).observed(self.observer(vector))
+        return Model(bending, shift=self.shift(vector, steps)).observed(self.observer(vector))
 
     def observer(self, vector: Array) -> Observer:
         """First observer of every model: the camera with its scale, and the axes found on its photos."""
@@ -187,11 +212,19 @@ class Base:
 
 
 def start(
-    test: MeasuredTest, facts: Facts, *, knots: int, elements: int, smoothness: float, straight: bool = False
+    test: MeasuredTest,
+    facts: Facts,
+    *,
+    knots: int,
+    elements: int,
+    smoothness: float,
+    straight: bool = False,
+    exact: float = 0.0,
 ) -> Base:
     """Base model with its first guess: a constant stiffness by regression of photographed curvature on the moment P y.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
+    A displacement that is known to ``exact`` (m) or better has no error of its own.
 
     Raises
     ------
@@ -211,6 +244,7 @@ def start(
     if not slope > 0.0:  # a straight, force-free cable or a force of the wrong sign: any positive stiffness will do
         slope, rest = np.ptp(K) / max(float(np.max(np.abs(m))), 1e-30), 0.0
     reach = max(float(np.quantile(K, 0.995)) - rest, 0.2 * facts.curvature_scale)
+    moved = tuple(np.flatnonzero(facts.displacement_std > exact).tolist())
     return Base(
         knots=place_knots(0.0, reach, knots) if knots > 2 else np.linspace(0.0, reach, knots),
         stiffness=float(1.0 / slope),
@@ -224,4 +258,16 @@ def start(
         axis_std=test.axis_std,
         axis_parallax_std=test.axis_parallax_std,
         camera_foot_std=test.camera_foot_std,
+        moved=moved,
+        moved_std=facts.displacement_std[list(moved)],
+        moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),
     )
+
+
+def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: float) -> float:
+    """Guess of the error of a step's displacement, m: of one that no log states, by its photo and the natural chord."""
+    chord = test.steps[index].chord
+    if test.steps[index].displacement is not None or chord is None:
+        return 0.0
+    natural = test.length * float(np.sinc(0.5 * pre_curvature * test.length / np.pi))
+    return natural - chord - float(facts.displacement[index])

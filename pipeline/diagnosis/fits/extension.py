@@ -97,7 +97,7 @@ class Extension:
 
     def base_model(self, vector: Array) -> Model:
         """The base model at a vector, without the terms."""
-        return self.base.model(vector[: len(self.base.names)])
+        return self.base.model(vector[: len(self.base.names)], steps=len(self.facts.branch))
 
     def model(self, vector: Array, *, of: Model | None = None) -> Model:
         """The model at a vector; ``of`` is the base model there, where it is known already."""

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.observations.observation import Observation, residual
 from pipeline.diagnosis.observations.prediction import Model, Prediction
@@ -99,7 +100,8 @@ def _bending_derivatives(extension: Extension, vector: Array, here: Run, bent: l
     relative error of the length.
     """
     base, bending = extension.base, here.model.bending
-    names = ("ordinates", *(() if base.straight else ("pre_curvature",)), "length")
+    offset = ("displacement_offset",) if base.moved else ()
+    names = ("ordinates", *(() if base.straight else ("pre_curvature",)), *offset, "length")
     law = bending.characteristic
     # where a cause has put further control points into the law, a base ordinate moves them along the base spline
     share = base.law_directions(vector, law.knots if isinstance(law, Characteristic) else base.knots)
@@ -109,7 +111,20 @@ def _bending_derivatives(extension: Extension, vector: Array, here: Run, bent: l
     if (bend := base.pre_curvature_index) is not None:
         change[count, bend] = 1.0
     change[-1, -1] = -bending.length / (1.0 + vector[len(base.names) - 1])
-    return tuple(_combined(d, change) for d in base_derivatives(here, extension.facts, names))
+    every = base_derivatives(here, extension.facts, names)
+    return tuple(_combined(d, _with_own(change, base, step)) for step, d in enumerate(every))
+
+
+def _with_own(change: Array, base: Base, step: int) -> Array:
+    """The combinations for one step: the error of its displacement moves that step alone.
+
+    It comes before the length in both orders, and the offset of all displacements is what a single one does there.
+    """
+    if step not in base.moved:
+        return change
+    own = change.copy()
+    own[-2, base.moved.index(step) - len(base.moved) - 1] = 1.0
+    return own
 
 
 def _combined(d: Derivatives, change: Array) -> Derivatives:

@@ -93,7 +93,15 @@ def prepare(
     test = faults.test
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
-    base = start(test, facts, knots=knots, elements=settings.grid, smoothness=settings.roughness, straight=straight)
+    base = start(
+        test,
+        facts,
+        knots=knots,
+        elements=settings.grid,
+        smoothness=settings.roughness,
+        straight=straight,
+        exact=settings.displacement_std,
+    )
     fitted = _robust_fit(observation, base, facts, settings)
     if fitted.run.prediction is None:
         return fitted.advice
@@ -137,9 +145,7 @@ def scored(
         suspicion.sign,
         draws=settings.null_draws,
         rng=np.random.default_rng(settings.seed),
-        estimated=np.r_[
-            observation.rows.kind == 0, np.zeros(len(fitted.residual) - len(observation.rows.kind), dtype=bool)
-        ],
+        estimated=np.r_[observation.rows.force, np.zeros(len(fitted.residual) - observation.rows.count, dtype=bool)],
         freedom=observation.force_freedom,
     )
     limit = threshold(maxima, settings.false_alarm)
@@ -163,7 +169,7 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
     """The best of several starts: a wrong base model has false minima, and a start may lack equilibrium."""
     best: Fit | None = None
     shift = 0.1 * facts.curvature_scale
-    freedom = len(observation.rows.kind) - len(base.names)
+    freedom = observation.rows.count - len(base.names)
     for stiffness, bend in ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift)):
         found = fit(
             observation,

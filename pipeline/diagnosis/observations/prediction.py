@@ -30,7 +30,9 @@ class Facts:
     branch : tuple of str
         ``mounted``, ``loading`` or ``unloading``.
     displacement : (n,) m
-        By the log; from the photographed chord where the log has none.
+        By the log; from the photographed chord where the log has none. 0 at a mounted step within its own scatter.
+    displacement_std : (n,) m
+        Of each of them, as the log scatters; 0 where it is not told, and at rest.
     photo_time : (n,) s
         Time of the photo since the hold began; 0 where the log has no time.
     hold_times : tuple of (h,) s
@@ -54,6 +56,7 @@ class Facts:
 
     branch: tuple[str, ...]
     displacement: Array
+    displacement_std: Array
     photo_time: Array
     hold_times: tuple[Array, ...]
     clock: Array
@@ -91,10 +94,12 @@ def facts_of(test: MeasuredTest) -> Facts:
         begin.append(float(times[0]))
         holds.append(times - times[0])
         photo.append(float(step.time) - begin[-1] if timed and step.time is not None else 0.0)
+    displacement, scatter = _displacements(test)
     centre = [step.picture_centre or (0.5 * (step.chord or test.length), 0.5 * bow) for step in steps]
     return Facts(
         branch=tuple(step.branch for step in steps),
-        displacement=np.array([_displacement(test, i) for i in range(len(steps))]),
+        displacement=displacement,
+        displacement_std=scatter,
         photo_time=np.array(photo),
         hold_times=tuple(holds),
         clock=np.array(begin) - begin[0],
@@ -119,15 +124,40 @@ def _samples(step: MeasuredStep) -> int:
     return 1 if step.hold_forces is None else len(step.hold_forces)
 
 
-def _displacement(test: MeasuredTest, index: int) -> float:
-    """Displacement of a step by the log, else by its chord against the longest chord (or the length)."""
-    step = test.steps[index]
-    if step.displacement is not None:
-        return step.displacement
-    chords = [other.chord for other in test.steps if other.chord is not None]
-    if step.chord is None or not chords:
+UNLOGGED = 0.05
+"""Share of the length: how far the displacement of a step that no log states may be from what its photo says."""
+
+AT_REST = 4.0
+"""Standard deviations: a mounted step that the log shows nearer to zero is at zero, and free of force."""
+
+
+def _displacements(test: MeasuredTest) -> tuple[Array, Array]:
+    """Displacements (n,) and their standard deviations (n,), m.
+
+    Without a log it is the photos that say where the bearing stood: what a step then counts with is a mere start, and
+    its chord decides.
+    """
+    found = []
+    for step in test.steps:
+        std = step.displacement_std or 0.0
+        if step.displacement is None:
+            found.append((_by_chord(test, step), UNLOGGED * test.length))
+        elif step.branch == "mounted" and abs(step.displacement) <= AT_REST * std:
+            found.append((0.0, 0.0))
+        else:
+            found.append((step.displacement, std))
+    value, std = np.array(found).T
+    return value, std
+
+
+def _by_chord(test: MeasuredTest, step: MeasuredStep) -> float:
+    """Displacement of a step by its chord, m: from the force-free cable's, or else from the length."""
+    rest = [other.chord for other in test.steps if other.branch == "mounted" and other.chord is not None]
+    if step.chord is None:
+        if step.branch == "mounted":
+            return 0.0
         raise ValueError(f"step {step.step} has neither a displacement nor a photographed chord")
-    return max(chords) - step.chord
+    return (float(np.mean(rest)) if rest else test.length) - step.chord
 
 
 @dataclass(frozen=True, eq=False)

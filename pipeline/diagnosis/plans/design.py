@@ -171,6 +171,7 @@ def _facts(plan: Plan) -> Facts:
     return Facts(
         branch=tuple(branch for _, branch in steps),
         displacement=np.array([d for d, _ in steps]),
+        displacement_std=np.zeros(len(steps)),
         photo_time=np.full(len(steps), times[-1]),
         hold_times=(times,) * len(steps),
         clock=plan.cycle * np.arange(len(steps), dtype=float),

@@ -86,6 +86,7 @@ def more_steps(facts: Facts, displacements: list[float], branches: list[str]) ->
         facts,
         branch=(*facts.branch, *branches),
         displacement=np.r_[facts.displacement, displacements],
+        displacement_std=np.r_[facts.displacement_std, np.zeros(count)],
         photo_time=np.r_[facts.photo_time, np.full(count, facts.photo_time[-1])],
         hold_times=(*facts.hold_times, *[facts.hold_times[-1]] * count),
         clock=np.r_[facts.clock, facts.clock[-1] + cycle * np.arange(1, count + 1)],
