@@ -48,7 +48,11 @@ INSIDE = {
         ("diagnose",),
     ],
     "pipeline.diagnosis.observations": [("prediction", "noise"), ("simulation", "observation")],
-    "pipeline.diagnosis.statistics": [("score", "twins", "verdict", "pairs", "gain"), ("leftover",)],
+    "pipeline.diagnosis.statistics": [
+        ("score", "twins", "verdict", "pairs", "gain"),
+        ("smooth_fields", "photo_table"),
+        ("leftover",),
+    ],
     "pipeline.diagnosis.fits": [
         ("base",),
         ("extension",),

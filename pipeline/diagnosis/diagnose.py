@@ -8,7 +8,6 @@ that.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,12 @@ from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
 from pipeline.diagnosis.fits.faults import Faults, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
 from pipeline.diagnosis.presentation.part import present
-from pipeline.diagnosis.statistics.leftover import Leftover, smooth_fields, test_leftover
+from pipeline.diagnosis.statistics.leftover import Leftover, leftover_of
 from pipeline.diagnosis.statistics.pairs import pair_gains
+from pipeline.diagnosis.statistics.smooth_fields import smooth_fields
 from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.diagnosis.statistics.verdict import credible_set, probabilities, with_twins
 from pipeline.diagnosis.words import spoken
@@ -194,9 +195,9 @@ def _with_finer_law(bench: Workbench, accepted: Explanation, settings: Diagnosis
     return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 
-def _left_over(bench: Workbench, fitted: Any, settings: DiagnosisSettings) -> Leftover:
+def _left_over(bench: Workbench, fitted: Fit, settings: DiagnosisSettings) -> Leftover:
     fields = smooth_fields(bench.observation, bench.facts, rows=len(fitted.residual))
-    return test_leftover(
+    return leftover_of(
         fitted.residual,
         fitted.jacobian,
         fields,

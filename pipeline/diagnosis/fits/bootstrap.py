@@ -30,7 +30,7 @@ def widening(bench: Workbench, settings: DiagnosisSettings) -> float:
     if not settings.bootstrap:
         return 1.0
     rng = np.random.default_rng(settings.seed)
-    rows = len(bench.observation.rows.kind)
+    rows = bench.observation.rows.count
     scores, sign = bench.suspicion.scores, bench.suspicion.sign
     bent, straight = [], []
     for _ in range(settings.bootstrap):

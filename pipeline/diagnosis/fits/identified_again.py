@@ -187,9 +187,9 @@ def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = N
 def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:
     """Residual and its derivative: data, each kind as heavy as it fits, and all prior knowledge but that on the law."""
     base, facts = fitted.extension.base, fitted.extension.facts
-    count = len(observation.rows.kind)
+    count = observation.rows.count
     weight = np.ones(count)
-    for kind in (observation.rows.kind == 0, observation.rows.kind != 0):
+    for kind in (observation.rows.force, ~observation.rows.force):
         if np.any(kind):
             weight[kind] = 1.0 / np.sqrt(max(1.0, float(np.mean(fitted.residual[:count][kind] ** 2))))
     known = count + base.known

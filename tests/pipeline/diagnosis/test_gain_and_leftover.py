@@ -8,8 +8,8 @@ from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, predictive_root
-from pipeline.diagnosis.statistics.leftover import smooth_fields
-from pipeline.diagnosis.statistics.leftover import test_leftover as leftover_of
+from pipeline.diagnosis.statistics.leftover import leftover_of
+from pipeline.diagnosis.statistics.smooth_fields import smooth_fields
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -66,7 +66,7 @@ def test_what_the_kept_data_do_not_tell_counts_for_neither_model():
 def fields():
     test = hidden_test(Cable(), LOOP, largest=0.0138, seed=4)
     observation = observe(test, DiagnosisSettings())
-    rows = len(observation.rows.kind)
+    rows = observation.rows.count
     return observation, smooth_fields(observation, facts_of(test), rows=rows), rows
 
 
@@ -92,7 +92,7 @@ def test_axes_worse_than_stated_are_no_leftover(fields):
     for _ in range(60):
         noise = rng.standard_normal(rows)
         for photo in observation.photos:
-            own = np.flatnonzero((observation.rows.kind > 0) & (observation.rows.step == photo.step))
+            own = observation.rows.of_photo(photo.step)
             by_axes_errors = np.linalg.qr(photo.whiten @ by_axes(photo.sections, photo.chord))[0]
             noise[own] += 0.2 * by_axes_errors @ (by_axes_errors.T @ noise[own])
         p.append(p_value(fields, noise))
@@ -106,7 +106,7 @@ def test_a_smooth_leftover_of_eight_sigma_is_found(fields):
     for _ in range(40):
         field, place = np.zeros(rows), rng.uniform(0.03, 0.15)
         for photo in observation.photos:  # a bump at a random place that grows with the step
-            own = np.flatnonzero((observation.rows.kind > 0) & (observation.rows.step == photo.step))
+            own = observation.rows.of_photo(photo.step)
             bump = np.exp(-0.5 * ((photo.sections.s - place) / 0.02) ** 2)
             field[own] = photo.step * photo.whiten[:, 1:] @ bump
         found.append(p_value(fields, 8.0 * field / np.linalg.norm(field) + rng.standard_normal(rows)) < 0.003)
@@ -121,7 +121,7 @@ def test_one_shape_that_comes_and_goes_from_step_to_step_is_found(fields):
     for _ in range(40):
         field, phase = np.zeros(rows), rng.uniform(0.0, np.pi)
         for photo in observation.photos:
-            own = np.flatnonzero((observation.rows.kind > 0) & (observation.rows.step == photo.step))
+            own = observation.rows.of_photo(photo.step)
             waves = np.sin(5.0 * np.pi * photo.sections.s / 0.181 + phase) ** 3
             field[own] = rng.standard_normal() * photo.whiten[:, 1:] @ waves
         found.append(p_value(fields, 8.0 * field / np.linalg.norm(field) + rng.standard_normal(rows)) < 0.003)
