@@ -38,9 +38,9 @@ def with_more_forms(
     hopeless : float
         Chi-square above which the result is of no use.
     """
-    while len(fitted.extension.terms) < settings.shapes_most:
+    while len(fitted.extension.terms_of(cause)) < settings.shapes_most:
         more = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
-        fitting = np.array([term.variant.setting == setting for term in more.terms], dtype=bool)
+        fitting = np.array([may_join(term, fitted, setting) for term in more.terms], dtype=bool)
         fresh = fitting & np.array([term not in fitted.extension.terms for term in more.terms], dtype=bool)
         if fitted.chi2 - _loudest(more.statistic, fitting) ** 2 >= hopeless:
             break
@@ -56,6 +56,15 @@ def with_more_forms(
             break
         fitted = without_needless_forms(observation, added, cause, settings)
     return fitted
+
+
+def may_join(term: Term, fitted: Fit, setting: str) -> bool:
+    """Whether a form can be one of those that act together.
+
+    A form without a place of its own, put beside itself, is the same form again: what two opposite amounts of it remove
+    (two tilts, together a distortion of the lens) is the trace of another cause.
+    """
+    return term.variant.setting == setting and (bool(term.variant.tuned) or term not in fitted.extension.terms)
 
 
 def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> float:

@@ -4,6 +4,10 @@ A second cause is asked for where something scores beside the best single cause,
 single cause can on the exhaustive linear search (the best single cause may be neither of two that act together). Two
 causes may also hide each other: their scores cancel, and only the best pair stands out (`masking`).
 
+A pair has all forms of its causes, as a single cause has: without its lesser part a load at an angle left a wrong pair
+the better one. How much a second cause scores says little beside a first that leaves far more than noise, so then every
+significant one is tried; to be named it must remove ``pair_share`` in any case.
+
 The linear search is only a start, since one cause of a pair is judged rightly beside the right amount of the other
 alone: each cause of the best pair is taken out in turn, everything is scored beside the other as it is there, and what
 scores nearly as much is refitted in its place (`_exchanged`), until no exchange makes the pair better.
@@ -27,6 +31,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
+from pipeline.diagnosis.explanations.forms import with_more_forms
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.bootstrap import widening
 from pipeline.diagnosis.fits.fit import Fit, evaluated
@@ -88,18 +93,22 @@ def second_cause(
         return None, []
     limit = scored(bench.test, bench.observation, best.fitted, second, settings).limit
     least = max(limit**2, settings.pair_share * best.gain)
+    # forms of a cause that act together, and amounts far from linear, score less than they remove
+    settled = best.fitted.chi2 < settings.fits * len(best.fitted.residual)
+    announced = least if settled else limit**2
     linear = _linear_pairs(bench, settings)
     beyond = linear[0].gain - max(best.gain, bench.largest**2) if linear else 0.0
-    if not _composed(best) and max(float(second.statistic.max()) ** 2, beyond) <= least:
+    if not _composed(best) and max(float(second.statistic.max()) ** 2, beyond) <= announced:
         return None, []
     found = _refitted(bench, linear, settings, hopeless=best.fitted.chi2)
     found += _beside(bench, best, second, settings)
+    found = _with_all_forms(bench, found, settings)
 
     def acceptable(pair: Explanation) -> bool:
         beside_law = [c for c in pair.causes if suspicion.causes[c].name != "nonlinear_stiffness"]
         known = len(beside_law) != 1 or beside_law[0] in named
         possible = pair.impossible(suspicion.causes, settings.impossible) is None
-        return known and possible and _both_needed(pair, singles, suspicion, least)
+        return known and possible and _both_needed(pair, singles, suspicion, least, significant=limit**2)
 
     accepted = [pair for pair in found if acceptable(pair)]
     accepted += [pair for pair in _exchanged(bench, accepted, settings) if acceptable(pair)]
@@ -111,13 +120,18 @@ def _composed(single: Explanation) -> bool:
     return len(single.fitted.extension.terms) > 1
 
 
-def _both_needed(pair: Explanation, singles: list[Explanation], suspicion: Suspicion, least: float) -> bool:
-    """Whether either half would be missed: beside the other, and against all single causes that are simpler."""
+def _both_needed(
+    pair: Explanation, singles: list[Explanation], suspicion: Suspicion, least: float, *, significant: float
+) -> bool:
+    """Whether either half would be missed: beside the other, and against all single causes that are simpler.
+
+    Beside the other it need but be ``significant``: how much it removes there is known from the linear model alone.
+    """
     for cause in pair.causes:
         extension = pair.fitted.extension
         at = [extension.amounts_at[k] for k in extension.terms_of(suspicion.causes[cause])]
         amount, covariance = pair.fitted.vector[at], pair.fitted.covariance[np.ix_(at, at)]
-        if float(amount @ np.linalg.solve(covariance, amount)) <= least:
+        if float(amount @ np.linalg.solve(covariance, amount)) <= significant:
             return False
     refitted = {e.causes[0] for e in singles}
     simpler = [e.gain for e in singles if not _composed(e) or e.weighed.tuned < pair.weighed.tuned]
@@ -202,6 +216,31 @@ def _beside(bench: Workbench, best: Explanation, second: Suspicion, settings: Di
     return found
 
 
+def _with_all_forms(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
+    """The pairs with further forms of their causes, the best first; one that stays far above it is left as it is.
+
+    A load at an angle to the chord is no better than half of itself beside another cause, as it is alone.
+    """
+    every: dict[frozenset[int], Explanation] = {}
+    for pair in sorted(found, key=lambda e: -_worth(e)):
+        if frozenset(pair.causes) not in every:
+            rival = min((e.fitted.chi2 for e in every.values()), default=np.inf)
+            every[frozenset(pair.causes)] = _with_own_forms(bench, pair, settings, rival=rival)
+    return list(every.values())
+
+
+def _with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSettings, *, rival: float) -> Explanation:
+    """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square."""
+    fitted, hopeless = pair.fitted, rival + settings.refit_least
+    for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
+        if not kind.combines:
+            continue
+        settings_of = {term.variant.setting for term in fitted.extension.terms if term.cause is kind}
+        for setting in settings_of:
+            fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
+    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
+
+
 def _exchanged(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
     """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
     every, done = list(found), set[frozenset[int]]()
@@ -243,7 +282,8 @@ def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: Diag
             fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, tuned=False) or fitted
         if fitted is not None:
             causes = (cause, other) if place == 0 else (other, cause)
-            found.append(explanation_of(causes, bench.base, fitted, suspicion))
+            new = explanation_of(causes, bench.base, fitted, suspicion)
+            found.append(_with_own_forms(bench, new, settings, rival=pair.fitted.chi2))
     return found
 
 

@@ -41,7 +41,7 @@ def table(
             rows.append(_unseen_row(cause.name, cause.unit))
             continue
         found = refitted.get(index)
-        size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found)
+        size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found, loudest)
         detectable = detectable_amount(
             bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace
         )
@@ -52,7 +52,7 @@ def table(
                 z=float(scores.z[loudest]),
                 p_adjusted=float(p_values[loudest]),
                 estimate=_finite(size.estimate),
-                std=_finite(size.std),
+                std=size.std if size.std < UNKNOWN * cause.plausible(bench.facts) else 0.0,
                 unit=cause.unit,
                 minimal_detectable=detectable if np.isfinite(detectable) else None,
                 surviving_fraction=float(scores.surviving[loudest]),
@@ -75,8 +75,15 @@ class _Size(NamedTuple):
     gain: float | None
 
 
-def _as_refitted(bench: Workbench, found: Explanation) -> _Size:
+UNKNOWN = 1e3
+"""Plausible sizes; a std beyond them says that the data do not determine the amount, and 0 is what the table takes for
+that."""
+
+
+def _as_refitted(bench: Workbench, found: Explanation, direction: int) -> _Size:
+    """By the refit; where it ended at zero its form has no trace, and the std is that of the score."""
     estimate, std = found.amount(bench.suspicion.causes[found.causes[0]])
+    std = float(bench.suspicion.scores.std[direction]) if estimate == 0.0 else std
     return _Size(estimate, std, stiffness_change(bench.base, found.fitted), found.gain)
 
 
@@ -93,7 +100,7 @@ def _unseen_row(name: str, unit: str) -> CauseRow:
 
 
 def _finite(value: float) -> float:
-    """A number that JSON can hold; what is invisible has an infinite std, and nothing of its trace survives."""
+    """A number that JSON can hold."""
     return value if np.isfinite(value) else 0.0
 
 

@@ -13,9 +13,11 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.explanations import refit
 from pipeline.diagnosis.explanations.explanation import explanation_of
+from pipeline.diagnosis.explanations.forms import may_join
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
+from pipeline.diagnosis.fits.extension import Term
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import prepare
@@ -32,6 +34,15 @@ def prepared(cable, seed):
 @pytest.fixture(scope="module")
 def plain():
     return prepared(Cable(), 6)
+
+
+def test_a_form_stands_beside_itself_only_where_its_place_is_its_own(plain):
+    """Two opposite tilts of a camera together distort like a lens, which is no tilt; two spots are two spots."""
+    for name, again in (("camera_tilt", False), ("stiffness_varying", True)):
+        cause = next(cause for cause in CATALOGUE if cause.name == name)
+        term = Term(cause, cause.variants(plain.facts)[-1])
+        fitted = SimpleNamespace(extension=SimpleNamespace(terms=(term,)))
+        assert may_join(term, fitted, "") is again
 
 
 def test_two_elements_that_slip_are_found_as_two():

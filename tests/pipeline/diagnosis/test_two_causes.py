@@ -11,7 +11,7 @@ from fixtures.hidden import THREE, Protocol, Reading, hidden_test
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations import two_causes
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, masking
+from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, _with_all_forms, masking
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.statistics.pairs import Pair
@@ -75,6 +75,22 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     (wrong,) = _refitted(bench, [given], SETTINGS, hopeless=bench.base.chi2)
     best = max(_exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
     assert best.causes == (lens, decay) and best.gain > wrong.gain + 16.0
+
+
+def test_each_half_of_a_pair_has_all_its_forms():
+    """A load at an angle to the chord beside a wrong lens: with its louder part alone neither half is right."""
+    steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
+    cable = Cable(load=(-0.06, 0.06))
+    test = hidden_test(cable, steps, largest=0.0138, seed=21, reading=Reading(lens=0.012))
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=4, refine=False)
+    names = [cause.name for cause in CATALOGUE]
+    load, lens = names.index("in_plane_load"), names.index("lens_distortion")
+    given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)
+    (half,) = _refitted(bench, [given], SETTINGS, hopeless=np.inf)
+    (whole,) = _with_all_forms(bench, [half], SETTINGS)
+    assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SETTINGS.shape_gain
+    amount, std = whole.amount(CATALOGUE[lens])
+    assert abs(amount - 0.012) < 4.0 * std
 
 
 @pytest.mark.parametrize(("gain", "tried"), [(50.0, True), (15.0, False)])
