@@ -31,9 +31,44 @@ class CalibrationSettings(StageSettings):
     board_search_px: int = Field(
         2000, ge=500, description="px; long side at which the board is searched, corners are refined at full resolution"
     )
+    corner_reach: float = Field(
+        0.4, gt=0, lt=0.5, description="squares; how far from a corner its edges are fitted: before the next corner's"
+    )
+    corner_margin: float = Field(
+        0.9, gt=0, le=1, description="share of the white margin beside a ChArUco marker; the rest is the marker's blur"
+    )
+    corner_reach_px: float = Field(
+        20.0,
+        gt=4,
+        description="px; longer edges hardly help, and a lens bends them: 1 % of barrel by 0.005 px over 20 px",
+    )
+    corner_pixels: int = Field(36, ge=12, description="pixels; nine unknowns of a corner, each from four")
+    corner_blur_px: float = Field(
+        1.5, gt=0, description="px; blur at the start, wide enough to reach the edge from a pixel"
+    )
+    corner_step_px: float = Field(1e-3, gt=0, description="px; a tenth of what noise leaves at best")
+    corner_contrast: float = Field(
+        2.0, gt=0, description="half the step from black to white over the rms that the fit leaves; noise of 10 % has 4"
+    )
+    corner_move: float = Field(
+        0.15, gt=0, description="squares; a corner found farther from its start is another thing"
+    )
     lens_photos: int = Field(10, ge=3, description="photos; from so many on they may show the board in any position")
-    lens_sigmas: float = Field(3.0, gt=0, description="sigmas; a weaker lens term adds more error than it removes")
+    usual_lens: float = Field(
+        0.02, gt=0, description="relative; standard deviation of k1 at half the diagonal among lenses nobody corrected"
+    )
+    corner_std_px: float = Field(
+        0.15, gt=0, description="px; corners of real boards off the plane, before they are fitted"
+    )
+    lens_sigmas: float = Field(
+        3.0, gt=0, description="sigmas; a weaker k2 or tangential term adds more error than it removes"
+    )
     max_board_rms_px: float = Field(0.5, gt=0, description="px; real boards reach 0.12 to 0.16 px, bent ones do not")
+    max_border_std: float = Field(
+        0.002,
+        gt=0,
+        description="relative, scale at the border against the middle; curvature is off by half of it, 0.1 %",
+    )
     one_plane_ratio: float = Field(
         1.5,
         gt=1,

@@ -54,7 +54,8 @@ class Lens:
         return np.asarray(np.linalg.solve(self.camera, homogeneous.T).T[:, :2], np.float64)
 
 
-def _project(matrix: Array, points: Array) -> Array:
+def project(matrix: Array, points: Array) -> Array:
+    """Points ``(n, 2)`` carried by a homography ``(3, 3)``."""
     image = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     return np.asarray(image[:, :2] / image[:, 2:])
 
@@ -81,12 +82,12 @@ class PlaneMap:
     def to_plane(self, uv: Array) -> Array:
         """Points ``(n, 2)`` in m of photo pixels ``(n, 2)``."""
         uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
-        return _project(self.homography, uv if self.lens is None else self.lens.undistort(uv))
+        return project(self.homography, uv if self.lens is None else self.lens.undistort(uv))
 
     def to_pixels(self, xy: Array) -> Array:
         """Photo pixels ``(n, 2)`` of points ``(n, 2)`` in m; inverse of `to_plane`."""
         back = np.asarray(np.linalg.inv(self.homography), np.float64)
-        uv = _project(back, np.asarray(xy, dtype=np.float64).reshape(-1, 2))
+        uv = project(back, np.asarray(xy, dtype=np.float64).reshape(-1, 2))
         return uv if self.lens is None else self.lens.distort(uv)
 
     def jacobian(self, uv: Array) -> Array:

@@ -1,0 +1,219 @@
+"""Corners of a board on one photo or more to the plane map: tilt, scale and lens in one fit.
+
+Photos that show the board in the plane of the cable, shifted or turned as one likes; one is enough. All corners
+together give the homography (tilt and scale) and the radial lens term ``k1``:
+
+``board (X, Y) -> moved in the plane -> H^-1 -> ideal pixel -> r (1 + k1 (r / R)^2) -> photo``
+
+R half the picture's diagonal. From ten photos on they may show the board in any position; then the lens comes from
+all of them (camera matrix, k1, k2, p1, p2) and the plane from the first by name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from pipeline.records import Array
+from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.vision.scale.plane import Lens, PlaneMap, project
+
+
+@dataclass(frozen=True)
+class BoardView:
+    """Corners of the board on one photo: ``board_m`` (n, 2) on the board, ``uv`` (n, 2) on the photo."""
+
+    name: str
+    board_m: Array
+    uv: Array
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class PlaneFit:
+    """Plane map of the board's surface, and how sure it is.
+
+    Attributes
+    ----------
+    plane : PlaneMap
+    rms_px : float px
+        Of the corners off the fit.
+    scale_std, border_std : float
+        Relative standard deviations of the scale in the middle of the picture, and of its change from there to the
+        border.
+    distance_m : float or None
+        Of the camera, if the photos tell.
+    lens_source : str
+    """
+
+    plane: PlaneMap
+    rms_px: float
+    scale_std: float
+    border_std: float
+    distance_m: float | None
+    lens_source: str
+
+
+def fit_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
+    """Plane map of the board's surface from one photo or more."""
+    flat = _fit_plane_views(views, settings)
+    if len(views) < settings.lens_photos:
+        return flat
+    free = _fit_free_views(views, settings)
+    # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
+    return free if flat.rms_px > settings.one_plane_ratio * free.rms_px else flat
+
+
+def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
+    """All photos show the board in one plane: one homography, one radial term, a rigid move for each further photo."""
+    middle, radius = _picture(views[0])
+    start, moves = _start(views, middle, radius)
+    fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), settings.usual_lens, settings)
+    homography, lens = _plane_parts(fit.x, middle, radius)
+    source = f"lens k1 = {fit.x[0]:+.4f} ± {np.sqrt(fit.covariance[0, 0]):.4f} at half the diagonal"
+    return PlaneFit(PlaneMap(homography, lens), fit.rms, *_scale_stds(fit, middle, radius), None, source)
+
+
+def _picture(view: BoardView) -> tuple[Array, float]:
+    """Middle of the picture and half its diagonal, px."""
+    width, height = view.size
+    return np.array([0.5 * (width - 1), 0.5 * (height - 1)]), 0.5 * float(np.hypot(width, height))
+
+
+def _plane_parts(x: Array, middle: Array, radius: float) -> tuple[Array, Lens]:
+    """Homography from pixels and lens, of the parameters of `_least_squares`."""
+    homography = np.append(x[1:9], 1.0).reshape(3, 3) @ np.array(
+        [[1 / radius, 0, -middle[0] / radius], [0, 1 / radius, -middle[1] / radius], [0, 0, 1]]
+    )
+    camera = np.array([[radius, 0.0, middle[0]], [0.0, radius, middle[1]], [0.0, 0.0, 1.0]])
+    return homography, Lens(camera, np.array([x[0], 0.0, 0.0, 0.0, 0.0]))
+
+
+def _scale_stds(fit: _Solution, middle: Array, radius: float) -> tuple[float, float]:
+    """Relative standard deviations of the scale in the middle and of its change to the border, by all parameters.
+
+    A board that leaves the middle out, or that hardly tells the lens, tells the scale there by extrapolation.
+    """
+    around = np.array([[u, v] for u in (-0.9, 0.0, 0.9) for v in (-0.9, 0.0, 0.9) if u or v])
+    places = np.vstack([middle, middle * (1.0 + around)])
+
+    def logarithms(x: Array) -> Array:
+        return np.log(PlaneMap(*_plane_parts(x, middle, radius)).local_scale(places))
+
+    steps = 1e-4 * fit.unit * np.eye(len(fit.x))
+    slopes = np.array([(logarithms(fit.x + step) - logarithms(fit.x - step)) / 2e-4 for step in steps])
+    change = slopes[:, 1:] - slopes[:, :1]
+    variance = np.mean(np.einsum("ij,ik,kj->j", change, fit.covariance, change))
+    return float(np.sqrt(slopes[:, 0] @ fit.covariance @ slopes[:, 0])), float(np.sqrt(variance))
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Parameters ``x``, their covariance in units of ``unit``, rms of the residuals in px and their number."""
+
+    x: Array
+    unit: Array
+    covariance: Array
+    rms: float
+
+
+def _start(views: list[BoardView], middle: Array, radius: float) -> tuple[Array, list[Array]]:
+    """Homography of the first photo and rigid moves of the others from matching by it."""
+    first = homography_of((views[0].uv - middle) / radius, views[0].board_m)
+    start = (first / first[2, 2]).ravel()[:8]
+    moves = []
+    for view in views[1:]:
+        plane = project(first, (view.uv - middle) / radius)
+        a, b = view.board_m - view.board_m.mean(axis=0), plane - plane.mean(axis=0)
+        turn = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
+        moves.append(np.array([turn, *(plane.mean(axis=0) - _rotation(turn) @ view.board_m.mean(axis=0))]))
+    return start, moves
+
+
+def homography_of(uv: Array, points: Array) -> Array:
+    """Homography ``(3, 3)`` that carries ``uv`` to ``points``, both ``(n, 2)``.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        All lie on one line or in one point.
+    """
+    matrix, _ = cv2.findHomography(uv, points)
+    if matrix is None or abs(matrix[2, 2]) < 1e-9:
+        raise np.linalg.LinAlgError
+    return np.asarray(matrix)
+
+
+def _rotation(turn: float) -> Array:
+    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+
+def _least_squares(views: list[BoardView], start: Array, lens_std: float, settings: CalibrationSettings) -> _Solution:
+    """Corners against the model, in px; the first parameter is k1.
+
+    A board that hardly tells the lens would have it bend the picture outside the board at will: lenses have k1 about
+    zero with the standard deviation ``lens_std``, and that is one more observation.
+    """
+    middle, radius = _picture(views[0])
+    size = float(np.ptp(views[0].board_m))
+    scale = np.concatenate([[1.0], np.array([size, size, size, size, size, size, 1.0, 1.0])])
+    scale = np.concatenate([scale, *[np.array([1.0, size, size])] * (len(views) - 1)])
+
+    def corners(q: Array) -> Array:
+        x = q * scale
+        to_picture = np.linalg.inv(np.append(x[1:9], 1.0).reshape(3, 3))
+        parts = []
+        for i, view in enumerate(views):
+            points = view.board_m
+            if i:
+                turn, *shift = x[9 + 3 * (i - 1) : 12 + 3 * (i - 1)]
+                points = points @ _rotation(turn).T + shift
+            ideal = project(to_picture, points)
+            shown = ideal * (1.0 + x[0] * (ideal**2).sum(axis=1, keepdims=True))
+            parts.append((shown * radius + middle - view.uv).ravel())
+        return np.concatenate(parts)
+
+    std, q = settings.corner_std_px, start / scale
+    for _ in range(2):  # the second time with the corners' own scatter
+        used = std
+
+        def residual(q: Array, used: float = used) -> Array:
+            return np.append(corners(q), used / lens_std * q[0])
+
+        found = least_squares(residual, q, x_scale="jac", loss="soft_l1", f_scale=3.0 * used, max_nfev=60)
+        q, error = np.asarray(found.x), corners(np.asarray(found.x))
+        # of most of them: a corner mistaken for another thing shall not widen what it is judged by
+        std = max(1.4826 * float(np.median(np.abs(error))), settings.corner_step_px)
+    rms = float(np.sqrt(error @ error / max(len(error) - len(q), 1)))
+    slopes = np.asarray(found.jac)
+    slopes[-1] *= rms / used
+    return _Solution(q * scale, scale, np.asarray(np.linalg.pinv(slopes.T @ slopes)) * rms**2, rms)
+
+
+def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
+    """Ten or more positions: camera matrix and lens from all, the plane from the first photo."""
+    objects = [np.column_stack([v.board_m, np.zeros(len(v.board_m))]).astype(np.float32) for v in views]
+    images = [v.uv.astype(np.float32).reshape(-1, 1, 2) for v in views]
+    simple = cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K2 | cv2.CALIB_ZERO_TANGENT_DIST
+    fits = [
+        cv2.calibrateCameraExtended(objects, images, views[0].size, np.eye(3), np.zeros(5), flags=flags)
+        for flags in (simple, cv2.CALIB_FIX_K3)
+    ]
+    # k2 and the tangential terms run wild outside the board unless the corners really show them.
+    drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
+    rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > settings.lens_sigmas**2 * 3 else fits[0]
+    lens = Lens(np.asarray(camera, np.float64), np.asarray(distortion, np.float64).ravel()[:5])
+    ideal = replace(views[0], uv=lens.undistort(views[0].uv))
+    rotation, _ = cv2.Rodrigues(turns[0])
+    # The board's z axis points away from or toward the camera; the distance from the plane is the same.
+    distance = float(abs(rotation[:, 2] @ np.ravel(shifts[0])))
+    middle, radius = _picture(views[0])
+    lens_std = float(np.ravel(stds)[4]) * (radius / float(lens.camera[0, 0])) ** 2  # fx, fy, cx, cy, k1
+    fit = _least_squares([ideal], np.append(0.0, _start([ideal], middle, radius)[0]), lens_std, settings)
+    plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
+    # OpenCV counts distances, here as above coordinates.
+    source = f"lens from {len(views)} photos"
+    return PlaneFit(plane, float(rms) / np.sqrt(2.0), *_scale_stds(fit, middle, radius), distance, source)
