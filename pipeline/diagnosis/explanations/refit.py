@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
@@ -119,27 +119,6 @@ def fit_terms(
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
     return best
-
-
-def fit_from(
-    observation: Observation,
-    extension: Extension,
-    start: Array,
-    near: Fit,
-    settings: DiagnosisSettings,
-    *,
-    hopeless: float = np.inf,
-) -> Fit:
-    """A refit as the settings ask for it, its equilibria sought from those of a fitted neighbour."""
-    return fit(
-        observation,
-        extension,
-        start,
-        iterations=settings.iterations,
-        tolerance=settings.tolerance,
-        near=near.run,
-        hopeless=hopeless,
-    )
 
 
 def linear_start(observation: Observation, added: Addition) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.fits.fit import fit
+from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.statistics.score import admissible, score
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -37,14 +37,7 @@ def widening(bench: Workbench, settings: DiagnosisSettings) -> float:
         # the data of the base model's own prediction plus noise: the residual at the fit becomes pure noise
         noise = rng.standard_normal(rows)
         drawn = replace(bench.observation, added=noise - bench.base.residual[:rows])
-        found = fit(
-            drawn,
-            bench.base.extension,
-            bench.base.vector,
-            iterations=settings.iterations,
-            tolerance=settings.tolerance,
-            near=bench.base.run,
-        )
+        found = fit_from(drawn, bench.base.extension, bench.base.vector, bench.base, settings)
         if found.run.prediction is not None and found.converged:
             z = score(found.residual, found.jacobian, bench.suspicion.columns, visible=settings.visible).z
             bent.append(float(admissible(z, sign).max()))

@@ -22,6 +22,7 @@ from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Model
 from pipeline.diagnosis.observations.simulation import Run, run
+from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]
 
@@ -159,6 +160,27 @@ def fit(
         damping = 0.1 * damping if damping > 1e-4 else 0.0
     advice = "" if converged else "the fit did not settle"
     return Fit(extension, state.vector, state.run, state.residual, jacobian, converged, advice)
+
+
+def fit_from(
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    near: Fit,
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float = np.inf,
+) -> Fit:
+    """A fit as the settings ask for it, its equilibria sought from those of a fitted neighbour; see `fit`."""
+    return fit(
+        observation,
+        extension,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        near=near.run,
+        hopeless=hopeless,
+    )
 
 
 def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:

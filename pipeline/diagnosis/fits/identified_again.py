@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.extended import law_of
 from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import Fit, evaluated, fit
+from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import with_knots
 from pipeline.diagnosis.observations.observation import Observation
@@ -120,9 +120,7 @@ def _fit(
     observation: Observation, extension: Extension, vector: Array, near: Fit, settings: DiagnosisSettings
 ) -> Fit | None:
     """Fit from a vector; None where that has no equilibrium."""
-    found = fit(
-        observation, extension, vector, iterations=settings.iterations, tolerance=settings.tolerance, near=near.run
-    )
+    found = fit_from(observation, extension, vector, near, settings)
     return None if found.run.prediction is None else found
 
 

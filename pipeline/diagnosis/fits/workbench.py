@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
-from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.fit import Fit, fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
@@ -118,9 +118,9 @@ def prepare(
             test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
         )
         spread = with_knots(fitted, len(base.knots)) if len(base.knots) > 2 else (fitted.extension, fitted.vector)
-        again = _fit(observation, *spread, settings, near=fitted)
+        again = fit_from(observation, *spread, fitted, settings)
         if again.run.prediction is None:  # knots elsewhere may let the moment fall between them
-            again = _fit(observation, fitted.extension, fitted.vector, settings, near=fitted)
+            again = fit_from(observation, fitted.extension, fitted.vector, fitted, settings)
         fitted = again
     suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     while (
@@ -150,19 +150,6 @@ def scored(
     )
     limit = threshold(maxima, settings.false_alarm)
     return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
-
-
-def _fit(
-    observation: Observation, extension: Extension, vector: Array, settings: DiagnosisSettings, *, near: Fit
-) -> Fit:
-    return fit(
-        observation,
-        extension,
-        vector,
-        iterations=settings.iterations,
-        tolerance=settings.tolerance,
-        near=near.run,
-    )
 
 
 def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
@@ -225,5 +212,5 @@ def with_finer_law(observation: Observation, fitted: Fit, settings: DiagnosisSet
 def with_more_knots(observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, more: int = 1) -> Fit | None:
     """The model with ``more`` control points, fitted again; None where that has no equilibrium."""
     extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + more)
-    finer = _fit(observation, extension, vector, settings, near=fitted)
+    finer = fit_from(observation, extension, vector, fitted, settings)
     return None if finer.run.prediction is None else finer
