@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import spot_between
-from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
@@ -22,14 +21,7 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def with_more_forms(
-    observation: Observation,
-    fitted: Fit,
-    cause: Cause,
-    setting: str,
-    settings: DiagnosisSettings,
-    *,
-    hopeless: float,
-    effort: Effort = TO_THE_END,
+    observation: Observation, fitted: Fit, cause: Cause, setting: str, settings: DiagnosisSettings, *, hopeless: float
 ) -> Fit:
     """The model with as many further forms of a cause as remove ``shape_gain`` each, and as may get below ``hopeless``.
 
@@ -45,10 +37,8 @@ def with_more_forms(
     settings : DiagnosisSettings
     hopeless : float
         Chi-square above which the result is of no use.
-    effort : Effort
-        No form is begun after it.
     """
-    while len(fitted.extension.terms_of(cause)) < settings.shapes_most and not effort.spent:
+    while len(fitted.extension.terms_of(cause)) < settings.shapes_most:
         more = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
         fitting = np.array([may_join(term, fitted, setting) for term in more.terms], dtype=bool)
         fresh = fitting & np.array([term not in fitted.extension.terms for term in more.terms], dtype=bool)
