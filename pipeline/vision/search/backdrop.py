@@ -131,8 +131,10 @@ def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     """Covariance of the ground's colours, without cable and objects."""
     # some ten thousand cells tell a standard deviation to one percent
     stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
-    sample = residual[::stride, ::stride].reshape(-1, residual.shape[2]).astype(np.float64)
-    spread = _MAD_TO_STD * np.median(np.abs(sample), axis=0) + settings.min_ground_std
-    calm = np.all(np.abs(sample) < 3.0 * spread, axis=1)
-    covariance = np.atleast_2d(np.cov(sample[calm], rowvar=False)) if calm.sum() > sample.shape[1] + 1 else 0.0
+    sample = residual[::stride, ::stride].reshape(-1, residual.shape[2])
+    off = np.abs(sample)
+    spread = _MAD_TO_STD * np.median(off, axis=0) + settings.min_ground_std
+    calm = sample[np.all(off < 3.0 * spread, axis=1)]
+    enough = len(calm) > sample.shape[1] + 1
+    covariance = np.atleast_2d(np.cov(calm, rowvar=False, dtype=np.float64)) if enough else 0.0
     return covariance + settings.min_ground_std**2 * np.eye(sample.shape[1])

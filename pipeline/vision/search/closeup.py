@@ -58,8 +58,7 @@ def take_closeup(
     grey = np.zeros((high[1] - low[1], high[0] - low[0]), np.float32)
     scaled = (np.asarray(weights) / photo.full_scale).astype(np.float32)
     window = photo.pixels[low[1] : high[1], low[0] : high[0]]
-    for left, top in _tiles(path_px - low, margin, (grey.shape[1], grey.shape[0])):
-        rows, columns = slice(top, top + _TILE), slice(left, left + _TILE)
+    for rows, columns in _stretches(path_px - low, margin, (grey.shape[1], grey.shape[0])):
         part = window[rows, columns]
         if part.ndim == 2:
             np.multiply(part, scaled[0], out=grey[rows, columns])
@@ -77,13 +76,19 @@ def take_closeup(
     )
 
 
-def _tiles(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[int, int]]:
-    """Corners (left, top) of the tiles that the corridor of half width ``margin`` touches."""
+def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[slice, slice]]:
+    """Rows and columns of the tiles that the corridor of half width ``margin`` touches, side by side ones together."""
     reach = np.arange(-np.ceil(margin / _TILE), np.ceil(margin / _TILE) + 1) * min(margin, _TILE)
     u, v = (np.add.outer(path[:, axis], reach).clip(0, size[axis] - 1) // _TILE for axis in (0, 1))
-    touched = np.zeros((size[1] // _TILE + 1, size[0] // _TILE + 1), bool)
-    touched[v.astype(int)[:, None, :], u.astype(int)[:, :, None]] = True
-    return [(int(column) * _TILE, int(row) * _TILE) for row, column in np.argwhere(touched)]
+    touched = np.zeros((size[1] // _TILE + 1, size[0] // _TILE + 1), np.int8)
+    touched[v.astype(int)[:, None, :], u.astype(int)[:, :, None]] = 1
+    edges = np.diff(np.pad(touched, ((0, 0), (1, 1))), axis=1)
+    return [
+        (slice(row * _TILE, (row + 1) * _TILE), slice(first * _TILE, last * _TILE))
+        for (row, first), (_, last) in zip(
+            np.argwhere(edges == 1).tolist(), np.argwhere(edges == -1).tolist(), strict=True
+        )
+    ]
 
 
 def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:

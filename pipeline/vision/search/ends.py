@@ -147,9 +147,12 @@ def led_on(body: Array, outward: Array, reach: float, width: float, *, base: flo
     along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
     # counted from the end: a loop may come back beside it
     last = np.cumprod((along > -base * width)[::-1])[::-1].astype(bool)
-    parabola = np.polynomial.Polynomial.fit(along[last], aside[last], 2)
+    unit = base * width
+    powers = np.vander(along[last] / unit, 3)
+    parabola = np.linalg.lstsq(powers, aside[last], rcond=None)[0]
     steps = np.linspace(0.0, reach, max(2, round(reach) + 1))[1:]
-    return np.vstack([body, body[-1] + steps[:, None] * outward + parabola(steps)[:, None] * across])
+    turned = np.vander(steps / unit, 3) @ parabola
+    return np.vstack([body, body[-1] + steps[:, None] * outward + turned[:, None] * across])
 
 
 def _half_level(profile: Array, along: Array, width: float, stroke: float) -> float | None:
