@@ -18,7 +18,7 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, PPoly
 
 from pipeline.records import Array
 
@@ -112,15 +112,12 @@ def _penalty(spline: BSpline, edges: Array, order: int) -> Array:
 
 
 class _Nodes(NamedTuple):
-    """Grid nodes, angles and tangents on the whole grid, and the pieces of x, y and theta.
-
-    ``pieces`` ``(cells, 4, 3)``: coefficients by power of the share of the cell.
-    """
+    """Grid nodes, angles and tangents on the whole grid, and cubics of x, y and theta between the nodes."""
 
     s: Array
     theta: Array
     tangent: Array
-    pieces: Array
+    pieces: PPoly[np.float64]
 
 
 @dataclass(frozen=True)
@@ -150,24 +147,23 @@ class PlaneCurve:
         points = self.point + _integrate(tangent, frame.grid, frame.anchor)
         # Cubic Hermite pieces of the position, for the tangents are known; of the angle parabolas through both ends and
         # the middle of the cell.
-        width = np.diff(nodes)[:, None]
-        step, first, last = np.diff(points, axis=0), width * tangent[:-2:2], width * tangent[2::2]
-        pieces = np.zeros((len(step), 4, 3))
-        pieces[:, 0, :2], pieces[:, 1, :2] = points[:-1], first
-        pieces[:, 2, :2], pieces[:, 3, :2] = 3 * step - 2 * first - last, first + last - 2 * step
+        width = np.diff(nodes)
+        wide = width[:, None]
+        step, first, last = np.diff(points, axis=0) / wide, tangent[:-2:2], tangent[2::2]
         begin, middle, end = theta[:-2:2], theta[1::2], theta[2::2]
-        pieces[:, 0, 2] = begin
-        pieces[:, 1, 2], pieces[:, 2, 2] = 4 * middle - 3 * begin - end, 2 * (begin + end) - 4 * middle
-        return _Nodes(nodes, theta, tangent, pieces)
+        pieces = np.zeros((4, len(width), 3))  # by falling power of the distance from the cell's first node
+        pieces[0, :, :2], pieces[1, :, :2] = (first + last - 2 * step) / wide**2, (3 * step - 2 * first - last) / wide
+        pieces[2, :, :2], pieces[3, :, :2] = first, points[:-1]
+        pieces[1, :, 2], pieces[2, :, 2] = (begin + end - 2 * middle) / width**2, (4 * middle - 3 * begin - end) / width
+        pieces[1, :, 2] *= 2.0
+        pieces[3, :, 2] = begin
+        return _Nodes(nodes, theta, tangent, PPoly.construct_fast(pieces, nodes))
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """Points ``(n, 2)`` and angles ``(n,)`` at ``s``; beyond the range the curve goes on straight."""
         nodes, _, _, pieces = self._nodes
         inside = np.clip(s, nodes[0], nodes[-1])
-        cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
-        t = ((inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell]))[:, None]
-        c = pieces[cell]
-        found = c[:, 0] + t * (c[:, 1] + t * (c[:, 2] + t * c[:, 3]))
+        found = pieces(inside)
         where, angle = found[:, :2], found[:, 2]
         beyond = np.asarray(s) - inside
         if beyond.any():

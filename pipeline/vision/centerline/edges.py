@@ -100,11 +100,12 @@ def search_edges(
     t = np.arange(-reach, reach + 1.0)
     strip = straighten(ground, curve, s, t).reshape(count, block, len(t)).mean(axis=1)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
-    middle = _offset(np.nanmedian(rise, axis=0), t, half_width, tolerance, settings)
+    ok = np.isfinite(strip).all(axis=1)
+    usual = np.median(rise, axis=0) if ok.all() else np.nanmedian(rise, axis=0)  # the latter takes ten times as long
+    middle = _offset(usual, t, half_width, tolerance, settings)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
     sigma = settings.search_radii * half_width / 2.0 + 1.0
     edges = np.empty((count, 2))
-    ok = np.isfinite(strip).all(axis=1)
     for side, sign in ((0, -1.0), (1, 1.0)):
         near = np.exp(-0.5 * ((t - middle[side]) / sigma) ** 2)
         score = np.where(ok[:, None], np.maximum(sign * rise, 0.0), 0.0) * near
