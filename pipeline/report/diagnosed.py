@@ -77,7 +77,7 @@ def diagnosis_view(
         ],
         next_what=words.said(following.what).sentence if following else "",
         next_separates=_separates(following.separates, words) if following else "",
-        leftover=_sentences(part.leftover, words) if part.verdict != "adequate" else [],
+        leftover=_leftover(part, words, settings),
         figures=_figures(part, words, settings) if figures else {},
     )
 
@@ -152,11 +152,19 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     ]
 
 
-def _sentences(leftover: dict[str, Any] | None, words: Words) -> list[str]:
-    """Sentences of the leftover; its arrays are drawn."""
-    if not leftover:
+def _leftover(part: DiagnosisPart, words: Words, settings: ReportSettings) -> list[str]:
+    """Sentences on what is left where anything was found: where it sits, unless noise leaves as much."""
+    left = part.leftover
+    if not left or part.verdict == "adequate":
         return []
-    return [words.said(str(leftover[key])).sentence for key in ("message", "noise") if leftover.get(key)]
+    if _is_noise(left, settings):
+        return [words("leftover_noise", p=words.probability(left["p_value"], name="p"))]
+    return [words.said(str(left[key])).sentence for key in ("message", "noise") if left.get(key)]
+
+
+def _is_noise(leftover: dict[str, Any], settings: ReportSettings) -> bool:
+    """Whether noise leaves as much too often for a place and a pattern to mean anything."""
+    return float(leftover.get("p_value", 0.0)) > settings.leftover_p_value
 
 
 def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:
@@ -188,7 +196,8 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
     if before is not None and after is not None:
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
-    if part.verdict != "adequate" and pattern.get("shape_m") and pattern.get("s_m"):
+    told = part.verdict != "adequate" and not _is_noise(pattern, settings)
+    if told and pattern.get("shape_m") and pattern.get("s_m"):
         drawn["leftover"] = drawing(
             "leftover",
             lambda f: maps.draw_leftover(f, pattern["s_m"], pattern["shape_m"], words),
@@ -228,7 +237,7 @@ def _force_texts(before: ResidualMap, after: ResidualMap, words: Words) -> str:
     parts = []
     for residuals in (before, after):
         values = residuals.force_sigma
-        parts.append(", ".join(NOTHING if value is None else words.number(value, 2) for value in values))
+        parts.append("; ".join(NOTHING if value is None else words.number(value, 2) for value in values))
     return " → ".join(part for part in parts if part)
 
 

@@ -7,6 +7,7 @@ was wrong and what was done; evidence; what simulation programs need; data and p
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,15 @@ from pipeline.visited import best
 TEMPLATES = Path(__file__).parent / "templates"
 
 
+BETWEEN = re.compile(r"(?<=\d) (?=%)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))")
+"""Spaces inside a quantity: a share, a p value, a product of units."""
+
+
+def unbroken(value: Any) -> Any:
+    """A text whose quantities no line break takes apart; markup and what is no text stay as they are."""
+    return BETWEEN.sub("\u00a0", value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 @cache
 def environment() -> Environment:
     """Template engine of report and index: escapes everything, refuses names that do not exist."""
@@ -48,6 +58,7 @@ def environment() -> Environment:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=unbroken,
     )
     engine.filters["svg"] = lambda drawn: Markup(drawn.svg)
     return engine

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
-from pipeline.report.words import Words
+from pipeline.report.words import Said, Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit
@@ -43,7 +43,7 @@ def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawi
     if not parts:
         return None
     unit = figures.stiffness_unit(result, words)
-    lines = " ".join(
+    lines = [
         words(
             "fig_line_alt",
             way=words(f"way_{method}"),
@@ -51,14 +51,15 @@ def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawi
             last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
         )
         for method, curve in parts.items()
-    )
+    ]
+    read = " ".join(Said(line, words.language).sentence for line in lines)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
     return drawing(
         "characteristic",
         lambda figure: figures.draw_characteristic(figure, result, words, settings),
         size=(420.0, 310.0),
         title=words("fig_characteristic"),
-        description=words("fig_characteristic_alt", low=words.curvature(low), high=words.curvature(high), lines=lines),
+        description=words("fig_characteristic_alt", low=words.curvature(low), high=words.curvature(high), lines=read),
     )
 
 

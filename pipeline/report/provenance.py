@@ -14,6 +14,9 @@ from pipeline.units import suited
 # Shown in their own places, not in the list of plain facts.
 APART = ("clock", "command", "inputs_sha256", "settings")
 
+RELATIVE = ("scale", "parallax")
+"""What is fitted besides the law as a share of itself; all else of that kind is in m."""
+
 
 @dataclass(frozen=True)
 class Provenance:
@@ -87,6 +90,11 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
 
 
 def nuisance_rows(result: Result, words: Words) -> list[tuple[str, str]]:
-    """What was fitted besides stiffness and pre-curvature, in SI units: scale, length, place of the bearing axes."""
-    nuisance = result.inverse.nuisance if result.inverse else {}
-    return [(name.replace("_", " "), words.measured(value, std)) for name, (value, std) in nuisance.items()]
+    """What was fitted besides stiffness and pre-curvature: what all steps share, then what a step adds."""
+    rows = []
+    for name, (value, std) in (result.inverse.nuisance if result.inverse else {}).items():
+        shared, _, step = name.partition("/")
+        label = words.nuisance(shared) + (f", {words('step')} {step}" if step else "")
+        unit = words.unit("-" if shared in RELATIVE else "m", value, std)
+        rows.append((label, unit.text(value, std)))
+    return rows

@@ -108,6 +108,10 @@ class Words:
         """A fact of the provenance; a name the table does not have stays as it is."""
         return self._known(f"fact_{name}", name)
 
+    def nuisance(self, name: str) -> str:
+        """What was fitted besides the law; a name the table does not have stands with blanks."""
+        return self._known(f"nuisance_{name}", name.replace("_", " "))
+
     def _known(self, key: str, otherwise: str) -> str:
         row = _table()["words"].get(key)
         return str(row[LANGUAGES[self.language][0]]) if row else otherwise

@@ -7,8 +7,10 @@ from html.parser import HTMLParser
 import pytest
 
 from pipeline.report.canvas import page_colours
-from pipeline.report.document import report_html, write_report
+from pipeline.report.document import report_html, unbroken, write_report
 from pipeline.report.pdf import pdf_bytes
+from pipeline.report.provenance import nuisance_rows
+from pipeline.report.words import Words
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
 
@@ -147,6 +149,35 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert ('id="force-rest"' in page) == found
     assert ("Turn the cable end for end" in text) == (verdict != "adequate")
     assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
+
+
+@pytest.mark.parametrize(("p_value", "told"), [(0.897, True), (1e-4, False)])
+def test_leftover_that_noise_makes_has_no_place(diagnosed, p_value, told):
+    result = diagnosed("named")
+    left = diagnosed("unexplained").diagnosis.leftover | {"p_value": p_value}
+    page = report_html(
+        result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"leftover": left})}),
+        ReportSettings(language="de"),
+    )
+    assert ("So viel lässt der Zufall allein übrig (p = 0,9)" in Page(page).text) == told
+    assert ('id="leftover"' in page) != told
+
+
+def test_no_line_break_takes_a_quantity_apart(page):
+    told = unbroken("hysteresis (4.59 mN m, 2 N m²) removes 94 % on steps in N mm (p < 0.01)")
+    assert told == "hysteresis (4.59 mN\u00a0m, 2 N\u00a0m²) removes 94\u00a0% on steps in N mm (p\u00a0<\u00a00.01)"
+    assert re.findall(r"\d %|\bp [<=]", " ".join(Page(page).texts)) == []
+
+
+def test_what_was_fitted_besides_has_names_and_units(full_result):
+    fitted = {"length": (-4e-5, 9e-5), "scale": (0.0013, 0.0005), "left_along/3": (4.2e-6, 2.7e-6)}
+    inverse = full_result.inverse.model_copy(update={"nuisance": fitted})
+    rows = nuisance_rows(full_result.model_copy(update={"inverse": inverse}), Words("de"))
+    assert rows == [
+        ("Länge", "−40 ± 90\u00a0µm"),
+        ("Maßstab, relativ", "0,0013 ± 0,0005"),
+        ("linke Achse, längs der Sehne, Schritt 3", "4,2 ± 2,7\u00a0µm"),
+    ]
 
 
 def test_answer_is_that_of_the_extended_model(diagnosed):

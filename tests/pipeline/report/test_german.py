@@ -140,7 +140,7 @@ SEEN = could_have_been_seen(
             [["hysteresis"]],
             {},
             "Der Simulation fehlt: Hysterese (4,88 ± 0,17\u00a0mN m); auf Schritten, die das Modell nicht kannte, "
-            "beseitigt das 94 % der Abweichung, und f_EI ändert sich um 20 % (eff.).",
+            "beseitigt diese Erweiterung 94 % der Abweichung, und f_EI ändert sich um 20 % (Effektivwert).",
         ),
         (
             "class",
@@ -148,7 +148,7 @@ SEEN = could_have_been_seen(
             {"change": None},
             "Eine Ursache, die diese Daten nicht sicher benennen können: Lagerreibung, Hysterese oder bleibende "
             "Verformung (als Lagerreibung: 4,88 ± 0,17\u00a0mN m); auf Schritten, die das Modell nicht kannte, "
-            "beseitigt das 94 % der Abweichung.",
+            "beseitigt diese Erweiterung 94 % der Abweichung.",
         ),
         (
             "two_causes",
