@@ -79,7 +79,7 @@ class Potential:
         return q
 
     def free(self, *, x_imposed: bool = True, y_imposed: bool = True) -> NDArray[np.bool_]:
-        """Mask over q of what may move: all but the left axis, imposed components of the right one, and clamps."""
+        """Mask of q (size,), what may move: all but the left axis, imposed parts of the right one, and clamps."""
         free = np.ones(self.size, bool)
         free[:2] = False
         last = self.vertex_index[-1]
@@ -101,7 +101,7 @@ class Potential:
         return energy - float(np.sum(self._loads() * q[self._positions()]))
 
     def gradient(self, q: Array) -> Array:
-        """Derivative dV/dq, N for positions and N m for angles; at imposed positions the reactions."""
+        """Derivative dV/dq (size,), N for positions and N m for angles; at imposed positions the reactions."""
         rod, (stretch, shear, t, n) = self.rod, self._strains(q)
         axial, flexible = rod.flexibility
         h = rod.edges[self._stretching]

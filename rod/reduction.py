@@ -68,7 +68,7 @@ class Hold:
         return self.chord is not None, self.tip is None
 
     def reaction(self, R: Array) -> Array:
-        """The reaction with the components that are prescribed by force put in."""
+        """The reaction R (2,) N with the components that are prescribed by force put in."""
         if self.force is not None:
             return np.array([-self.force, R[1]])
         return R if self.tip is None else np.asarray(self.tip, float)

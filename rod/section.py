@@ -154,7 +154,7 @@ class Section:
         return K0[:1] if np.ptp(K0) == 0.0 else K0
 
     def virgin(self) -> tuple[Array, Array]:
-        """``relaxed`` and ``reached`` of the mounted cable."""
+        """``relaxed`` (friction elements, n) and ``reached`` (n,) of the mounted cable, 1/m."""
         elements = 0 if self.friction is None else self.friction.stick.size
         return np.repeat(self.pre_curvature[None], elements, axis=0), np.zeros_like(self.pre_curvature)
 
@@ -202,7 +202,7 @@ class Section:
         return with_set
 
     def advanced(self, K: Array, memory: Memory) -> tuple[Array, Array]:
-        """``relaxed`` and ``reached`` after a step that ended at curvature K."""
+        """``relaxed`` and ``reached``, as of `virgin`, after a step that ended at curvature K (n,) 1/m."""
         reached = np.maximum(memory.reached, K - self.pre_curvature)
         if self.friction is None:
             return memory.relaxed, reached

@@ -98,6 +98,6 @@ def evaluate(coefficients: Array, cardinal: Cardinal, u: Array) -> Array:
 
 
 def slope(coefficients: Array, cardinal: Cardinal, u: Array) -> Array:
-    """Derivative of a piecewise polynomial, arguments as in `evaluate`."""
+    """Derivative of a piecewise polynomial; arguments and shape as in `evaluate`."""
     powers = np.arange(1, coefficients.shape[0]).reshape((-1,) + (1,) * (coefficients.ndim - 1))
     return evaluate(coefficients[1:] * powers, cardinal, u)

@@ -39,7 +39,7 @@ class LogCurve:
     log_covariance: Array
 
     def common_grid(self, other: LogCurve) -> Array | None:
-        """Curvatures that both visited, 1/m; None if there are none."""
+        """Curvatures (n,) 1/m over what both visited; None if there is none."""
         low, high = max(self.kappa[0], other.kappa[0]), min(self.kappa[-1], other.kappa[-1])
         return np.linspace(low, high, GRID) if high > low else None
 

@@ -120,7 +120,7 @@ class ComplianceCurve:
         return np.asarray(self.basis.slope(moment) @ self.coefficients)
 
     def excess(self, moment: ArrayLike) -> Array:
-        """int_0^m c dm = K - K0, 1/m; beyond the range of the basis with the compliance of its end.
+        """int_0^m c dm = K - K0, (n,) 1/m; beyond the range of the basis with the compliance of its end.
 
         Moments corrected for a common error of the axes leave that range: held at its end, the curve would refuse the
         correction that a photo with the largest moments asks for.
@@ -139,7 +139,7 @@ class ComplianceCurve:
         return np.asarray((1.0 - weight) * table[cell] + weight * table[cell + 1] + ends)
 
     def moment(self, excess: ArrayLike) -> Array:
-        """Inverse of `excess`: m for K - K0, N m."""
+        """Inverse of `excess`: m for K - K0 (n,), N m."""
         K, (low, high), (first, last) = np.asarray(excess, float), self.rise[[0, -1]], self._at_ends
         beyond = np.minimum(K - low, 0.0) / first + np.maximum(K - high, 0.0) / last
         return np.asarray(np.interp(K, self.rise, self.basis.moments) + beyond)

@@ -75,11 +75,11 @@ class MomentPoints:
 
     @property
     def moment(self) -> Array:
-        """Bending moment P y as photographed, N m."""
+        """Bending moment P y as photographed, (n,) N m."""
         return self.force * self.y
 
     def true_moment(self, errors: CommonErrors) -> Array:
-        """Bending moment P y with the common errors taken back, N m."""
+        """Bending moment P y with the common errors taken back, (n,) N m."""
         lift = errors.left_across * (1.0 - self.along) + errors.right_across * self.along
         return self.force * (self.y * (1.0 + errors.scale) + lift + errors.foot_across - errors.parallax * self.centre)
 

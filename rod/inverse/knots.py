@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def place_knots(low: float, high: float, count: int) -> Array:
-    """`count` knots over the visited range [low, high] 1/m, denser toward `low`, first and last on its ends.
+    """Knots (count,) 1/m over the visited range [low, high], denser toward `low`, first and last on its ends.
 
     Laws of stick and slip bend most near the rest curvature, and a natural spline is straightest at its first knot: the
     first interval gets half the width of the last.

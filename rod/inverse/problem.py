@@ -132,7 +132,7 @@ def first_fit(
 
 
 def rescaled(model: FitModel, trial: Evaluation) -> Array:
-    """Unknowns with the stiffness scaled to the forces: f -> c f leaves the shapes and multiplies the forces by c."""
+    """Unknowns (p,), stiffness scaled to the forces: f -> c f leaves the shapes and multiplies the forces by c."""
     pairs = [(s.data.step.force, s.simulated.force, s.data.step.force_std) for s in trial.steps if s.force is not None]
     measured, simulated, std = np.array(pairs).T
     c = float(np.sum(measured * simulated / std**2) / np.sum((simulated / std) ** 2))

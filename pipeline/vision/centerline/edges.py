@@ -56,7 +56,7 @@ def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Float32
 
 
 def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
-    """Sections whose pixels up to ``reach`` px on both sides are in the picture."""
+    """Mask (n,) of the sections whose pixels up to ``reach`` px on both sides are in the picture."""
     where, angle = curve.at(s)
     height, width = ground.grey.shape
     inside = np.ones(len(s), dtype=bool)

@@ -86,7 +86,7 @@ class Sections:
 
 
 def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cover, ...]) -> NDArray[np.bool_]:
-    """Sections whose points at ``offset`` from the path on both sides lie outside every cover."""
+    """Mask (n,) of the sections whose points at ``offset`` px from the path on both sides lie outside every cover."""
     where, angle = curve.at(s)
     free = np.ones(len(s), dtype=bool)
     for cover in covers:

@@ -145,12 +145,12 @@ class _Diagonal:
         return np.asarray(self.gamma2 + np.multiply.outer(weight, 1.0 - self.gamma2))
 
     def weights(self) -> Array:
-        """Weights of the penalty over all that can matter."""
+        """Weights (w,) of the penalty over all that can matter."""
         ratio = np.sort(np.maximum(self.gamma2, _FLOOR) / np.maximum(1.0 - self.gamma2, _FLOOR))[: -self.null]
         return np.exp(np.linspace(np.log(0.1 * ratio[0]), np.log(1e3 * ratio[-1]), _GRID))
 
     def criterion(self, weights: Array) -> tuple[Array, Array]:
-        """Restricted likelihood, -2 log, and sigma squared at every weight."""
+        """Restricted likelihood, -2 log, and sigma squared at every weight, (w,) each."""
         share = self.shrinkage(weights)
         freedom = self.count - self.null
         # Without noise nothing is left but rounding, which must not become the logarithm of zero.

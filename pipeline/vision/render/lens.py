@@ -125,7 +125,7 @@ class Camera:
         return du * gain + 0.5 * (self.width - 1), dv * gain + 0.5 * (self.height - 1)
 
     def undistort(self, u: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
-        """Inverse of `distort`: undistorted pixels counted from the middle."""
+        """Inverse of `distort`: undistorted pixels (n,) counted from the middle."""
         du, dv = (
             np.asarray(u, dtype=float) - 0.5 * (self.width - 1),
             np.asarray(v, dtype=float) - 0.5 * (self.height - 1),

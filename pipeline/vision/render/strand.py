@@ -113,7 +113,7 @@ class Strand:
     overhang_m: float = 0.0
 
     def on_table(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Table coordinates of chord-frame points."""
+        """Table coordinates (n,) of points (n,) in the chord frame, m."""
         c, q = np.cos(self.angle_rad), np.sin(self.angle_rad)
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         return self.place_m[0] + c * x - q * y, self.place_m[1] + q * x + c * y

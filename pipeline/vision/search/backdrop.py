@@ -62,11 +62,11 @@ class Standout:
         return np.asarray(self.residual @ (weights / std).astype(np.float32))
 
     def to_cells(self, uv: Array) -> Array:
-        """Cells of photo pixels."""
+        """Cells (n, 2) of photo pixels (n, 2), ``(u, v)``."""
         return (np.asarray(uv) - self.offset_px - (self.reduction - 1) / 2.0) / self.reduction
 
     def to_pixels(self, cells: Array) -> Array:
-        """Photo pixels of cells."""
+        """Photo pixels (n, 2) of cells (n, 2), ``(u, v)``."""
         return np.asarray(cells) * self.reduction + (self.reduction - 1) / 2.0 + self.offset_px
 
 

@@ -58,7 +58,7 @@ class CrossCut:
 
     @cached_property
     def seen_widths(self) -> Array:
-        """Widths of the sections on which both edges are seen."""
+        """Widths (k,) of the sections on which both edges are seen, cells."""
         return self.width[np.isfinite(self.width)]
 
     @cached_property
@@ -68,7 +68,7 @@ class CrossCut:
 
 
 def smooth_path(path: Array, sigma: float) -> Array:
-    """Resample a path to points one cell apart and smooth it; the ends stay in place."""
+    """Resample a path (n, 2) to points one cell apart, (m, 2), and smooth it; the ends stay in place."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     grid = np.linspace(0.0, s[-1], max(3, round(s[-1]) + 1))
     even = np.column_stack([np.interp(grid, s, path[:, 0]), np.interp(grid, s, path[:, 1])])

@@ -58,7 +58,7 @@ def find_end(
 
 
 def straight_body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
-    """The path without the piece at its end that runs into a corner, and the direction in which it leaves there."""
+    """The path (n, 2) without the piece at its end that runs into a corner, and the direction (2,) in which it ends."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     count = int(np.searchsorted(s, s[-1] - trimmed))
     body = path[: max(3, count)]
@@ -142,7 +142,7 @@ def settle_end(
 
 
 def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
-    """The body and a parabola through its last ``base`` widths, ``reach`` onward, in the unit of the body."""
+    """The body (n, 2) and a parabola through its last ``base`` widths, ``reach`` onward, in the unit of the body."""
     across = np.array([-outward[1], outward[0]])
     along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
     # counted from the end: a loop may come back beside it

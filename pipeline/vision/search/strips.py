@@ -207,7 +207,7 @@ def _continues(first: Array, second: Array, width: float, settings: Segmentation
 
 
 def end_direction(path: Array, width: float) -> Array:
-    """Unit vector in which the path leaves at its last point, over three widths, without the last half width."""
+    """Unit vector (2,) that leaves a path (n, 2) at its last point, over three widths, without the last half width."""
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     far, near = np.searchsorted(s, [s[-1] - 3.5 * width, s[-1] - 0.5 * width])
     piece = path[max(far, 0) : max(near, far + 2)]
