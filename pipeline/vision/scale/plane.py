@@ -27,27 +27,35 @@ class Lens:
 
     def distort(self, uv: Array) -> Array:
         """Photo pixels ``(n, 2)`` of the pixels a camera without distortion would have shown."""
-        x, y = self._rays(uv).T
-        k1, k2, p1, p2, k3 = self.distortion
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        shown_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-        shown_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-        return np.asarray(np.column_stack([shown_x, shown_y, np.ones_like(x)]) @ self.camera.T[:, :2])
+        return self._pixels(self._bent(self._rays(uv)))
 
     def undistort(self, uv: Array) -> Array:
         """Inverse of `distort` (n, 2), by fixed-point steps.
 
         Each step leaves about three times the relative distortion of the error: at 5 % twenty steps reach rounding.
         """
-        uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
-        ideal = uv.copy()
+        shown = self._rays(np.asarray(uv, dtype=np.float64).reshape(-1, 2))
+        least = 1e-9 / float(np.abs(self.camera[:2, :2]).max())  # of a pixel
+        ideal = shown.copy()
         for _ in range(60):
-            miss = uv - self.distort(ideal)
+            miss = shown - self._bent(ideal)
             ideal += miss
-            if np.abs(miss).max(initial=0.0) < 1e-9:
+            if np.abs(miss).max(initial=0.0) < least:
                 break
-        return ideal
+        return self._pixels(ideal)
+
+    def _bent(self, rays: Array) -> Array:
+        """Rays ``(n, 2)`` as the lens shows them."""
+        x, y = rays.T
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        shown_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        shown_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.column_stack([shown_x, shown_y])
+
+    def _pixels(self, rays: Array) -> Array:
+        return np.asarray(rays @ self.camera[:2, :2].T + self.camera[:2, 2])
 
     def _rays(self, uv: Array) -> Array:
         homogeneous = np.column_stack([uv, np.ones(len(uv))])
@@ -96,8 +104,9 @@ class PlaneMap:
         The map is smooth over hundreds of pixels, so a step of one pixel leaves a relative error below 1e-6.
         """
         uv = np.asarray(uv, dtype=np.float64).reshape(-1, 2)
-        columns = [(self.to_plane(uv + step) - self.to_plane(uv - step)) / 2.0 for step in np.eye(2)]
-        return np.stack(columns, axis=-1)
+        steps = np.vstack([np.eye(2), -np.eye(2)])[:, None]
+        forward_u, forward_v, back_u, back_v = self.to_plane((uv + steps).reshape(-1, 2)).reshape(4, -1, 2)
+        return np.stack([forward_u - back_u, forward_v - back_v], axis=-1) / 2.0
 
     def local_scale(self, uv: Array) -> Array:
         """Scale ``(n,)`` in px/m at photo pixels: inverse square root of the area of a pixel."""
