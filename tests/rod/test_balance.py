@@ -44,7 +44,7 @@ def test_result_scales_with_the_stiffness(EI0):
     graph = law_of(measured(law=replace(LAW, EI0=EI0, EI1=0.3 * EI0)))
     unit = law_of(measured())
     assert np.allclose(graph.tangent / EI0, unit.tangent / LAW.EI0, rtol=1e-6)
-    assert np.allclose(graph.tangent_std / EI0, unit.tangent_std / LAW.EI0, rtol=1e-5)
+    assert np.allclose(graph.tangent_std / EI0, unit.tangent_std / LAW.EI0, rtol=1e-5)  # where the iteration ended
     assert graph.pre_curvature == pytest.approx(unit.pre_curvature, rel=1e-7)
 
 
@@ -54,8 +54,8 @@ def test_secant_and_tangent_are_readings_of_one_moment_curve():
     away = graph.kappa - K0 > 0.5
     assert np.allclose(graph.secant[away], graph.moment[away] / (graph.kappa[away] - K0), rtol=1e-12)
     slope = np.gradient(graph.moment, graph.kappa)[1:-1]
-    assert np.allclose(slope, graph.tangent[1:-1], rtol=3e-3)
-    assert graph.secant[0] == pytest.approx(graph.tangent[0], rel=1e-2)
+    assert np.allclose(slope, graph.tangent[1:-1], rtol=1e-3)  # central differences over 61 points
+    assert graph.secant[0] == pytest.approx(graph.tangent[0], rel=1e-9)  # the limit, where the moment is zero
 
 
 def test_constant_stiffness_is_found_constant():
@@ -187,7 +187,7 @@ def test_pointwise_graph_is_exact_on_an_exact_shape():
     kappa, ratio = pointwise_graph(step)
     good = np.isfinite(ratio) & (kappa > 2.5) & (kappa < 0.9 * kappa.max())
     assert good.sum() > 30
-    assert np.allclose(ratio[good], LAW.tangent(kappa[good]), rtol=1e-2)
+    assert np.allclose(ratio[good], LAW.tangent(kappa[good]), rtol=1e-3)  # differences between neighbouring points
 
 
 def test_pointwise_graph_needs_a_photo():

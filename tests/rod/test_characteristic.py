@@ -28,6 +28,7 @@ def test_readings_of_table_1() -> None:
         (8.0, 2.316, 1.272, 3.076),
         (10.0, 2.000, 0.800, 2.846),
     ]:
+        # half the last printed digit
         assert 1e3 * table_1("secant").f(kappa) == pytest.approx(f, abs=5.1e-4)
         assert 1e3 * table_1("secant").tangent(kappa, 2.0) == pytest.approx(tangent, abs=5.1e-4)
         assert 1e3 * table_1("tangent").secant(kappa, 2.0) == pytest.approx(secant, abs=5.1e-4)

@@ -215,7 +215,7 @@ def test_score_at_zero_is_the_one_sided_derivative(name: str) -> None:
     once, twice = displaced(vary(test, h), None), displaced(vary(test, 2.0 * h), None)
     for step, d, a, b in zip(steps[1:], exact[1:], once[1:], twice[1:], strict=True):
         forward = (4.0 * a.force - b.force - 3.0 * step.force) / (2.0 * h)
-        assert forward == pytest.approx(d.force[0], rel=2e-4)
+        assert forward == pytest.approx(d.force[0], rel=2e-4)  # error of order h^2
 
 
 def test_all_parameters_in_one_call_are_the_single_ones() -> None:
