@@ -87,8 +87,10 @@ class Sections:
 
 def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cover, ...]) -> NDArray[np.bool_]:
     """Mask (n,) of the sections whose points at ``offset`` px from the path on both sides lie outside every cover."""
-    where, angle = curve.at(s)
     free = np.ones(len(s), dtype=bool)
+    if not covers:
+        return free
+    where, angle = curve.at(s)
     for cover in covers:
         for side in (-1.0, 1.0):
             point = where + side * offset * normals(angle)

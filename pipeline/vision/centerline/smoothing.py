@@ -167,7 +167,8 @@ class _Diagonal:
 def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, least: float) -> _Diagonal:
     """Diagonal form of whitened columns ``[design, data]``."""
     size = whitened.shape[1] - 1
-    triangle = np.asarray(np.linalg.qr(whitened, mode="r"))  # its last column holds the data: Q itself is never needed
+    triangle = np.zeros((size + 1, size + 1))  # its last column holds the data: Q itself is never needed
+    triangle[: len(whitened)] = np.linalg.qr(whitened, mode="r")  # the penalty tells what few data leave open
     r, data = triangle[:size, :size], triangle[:, size]
     stacked = np.zeros((size + len(penalty), size))
     stacked[:size] = r

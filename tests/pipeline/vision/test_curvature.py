@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import fresnel
 
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
-from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, initial_curve
+from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 
 LENGTH = 0.2
 
@@ -191,6 +191,19 @@ def test_a_gap_among_the_points_does_not_throw_away_what_lies_beyond():
     found = fit(walked, points, length=LENGTH - (s[-1] - walked[-1]))
     assert np.all(found.weight > 0.0)
     assert np.sqrt(np.mean(found.residual**2)) < 2e-7
+
+
+def test_fewer_points_than_parameters_are_followed():
+    """A short piece of cable between covers: the penalty tells what its points leave open."""
+    turn = np.linspace(0.1, 0.9, 14)
+    points = 0.2 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)])
+    frame = make_frame(0.0, LENGTH, intervals=16, order=3)
+    assert frame.size > len(points)
+    s = 0.2 * turn
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=3)
+    # two steps from a start that is the circle but for its chords
+    assert_allclose(path.at(path.foot(points, s))[0], points, atol=1e-5 * LENGTH)
+    assert_allclose(path.curvature(s), 5.0, rtol=1e-3)
 
 
 def test_a_break_follows_a_point_load():
