@@ -15,6 +15,7 @@ from pipeline.intake.columns import Columns, find_columns
 from pipeline.intake.dialect import decode
 from pipeline.intake.holds import load_steps
 from pipeline.intake.noted import inferred
+from pipeline.intake.response import check_response
 from pipeline.intake.samples import read_samples
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.records import Finding, LoadStep
@@ -49,7 +50,7 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> Force
     ------
     InputError
         Codes ``file/...`` and ``log/...``: not readable, empty, no columns of force and displacement, a cell that is no
-        number, a notation that can be read in two ways.
+        number, a notation that can be read in two ways, a force that stands still.
     """
     text, encoding = decode(
         read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
@@ -57,6 +58,7 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> Force
     columns, rows = find_columns(text, spec, path=path, settings=settings)
     samples = read_samples(rows, columns, spec, path=path, settings=settings)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
+    check_response(steps, path=path, settings=settings)
     return ForceLog(steps, columns, encoding, (*_reading(columns, encoding, path), *samples.findings, *findings))
 
 

@@ -86,6 +86,18 @@ class IntakeSettings(BaseModel):
         description="of the largest median force of a hold; a sample further from those of its hold is no noise and no "
         "relaxation of a cable",
     )
+    still_force_sigma: float = Field(
+        4.0,
+        gt=0,
+        description="standard deviations; a log none of whose forces differs by more from one and the same tells of no "
+        "cable: of a test that could be used the largest force has hundreds",
+    )
+    still_force_relative: float = Field(
+        2e-3,
+        gt=0,
+        description="of the largest force; without a mounted step forces must change by more over three steps: half "
+        "the travel over the length, for a travel of 2 % at least three times this",
+    )
     force_std_relative: float = Field(
         3e-3, gt=0, description="of the largest force; where no hold has repeated samples: a load cell of class 0.5"
     )

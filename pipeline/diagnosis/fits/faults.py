@@ -1,12 +1,12 @@
 """Faults of the data, told apart from causes: a mixed-up photo is not physics.
 
 Before anything is fitted, photographed chords are held against the displacement log (order of photos, unit), photos
-against each other (doubled), traced against stated length, and forces against what a cable can do (unit, sign). After
-the base fit, each photo and each hold is left out in turn, to first order: where the rest then agrees with the model
-and no cause explains as much, that one item is at fault, not the model.
+against each other (doubled), traced against stated length, forces against what a cable can do (unit, sign) and against
+each other (stuck). After the base fit, each photo and each hold is left out in turn, to first order: where the rest
+then agrees with the model and no cause explains as much, that one item is at fault, not the model.
 
-Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/unit``,
-``log/unit``, ``length/traced``.
+Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/stuck``,
+``force/unit``, ``log/unit``, ``length/traced``.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.stuck_forces import stuck_forces
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import Finding
 from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.units import quantity
 from rod.measurement import MeasuredShape, MeasuredTest
 
 Array = NDArray[np.float64]
@@ -63,7 +65,7 @@ class Faults:
 def faults_of_input(test: MeasuredTest, settings: DiagnosisSettings) -> Faults:
     """Faults that show without any fit."""
     found = Faults(test)
-    for check in (_unit_of_displacement, _doubled_photos, _order_of_photos, _traced_length, _forces):
+    for check in (_unit_of_displacement, _doubled_photos, _order_of_photos, _traced_length, _forces, _stuck):
         found = found.joined(check(found, settings))
     return found
 
@@ -237,6 +239,21 @@ def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
         )
         return Faults(test, (Finding("force/unit", "warning", message),))
     return Faults(test)
+
+
+def _stuck(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """Forces that stand still while the bearing moves."""
+    test = found.test
+    stuck = stuck_forces(test.steps)
+    if not stuck:
+        return Faults(test)
+    names = ", ".join(str(test.steps[i].step) for i in stuck)
+    read = quantity(float(np.mean([test.steps[i].force for i in stuck])), "N")
+    message = (
+        f"the force of steps {names} stands still at {read}: the load cell was at the end of its range, or its channel "
+        "froze; these forces are left out, repeat the test with a larger range"
+    )
+    return Faults(test, (Finding("force/stuck", "warning", message),), forces=frozenset(stuck))
 
 
 @dataclass(frozen=True)
