@@ -119,10 +119,12 @@ def inverse_part(found: Identification) -> InversePart:
 def _choice(evidence: dict[int, float], used: int) -> str:
     """How the number of control points was chosen, in words."""
     best = max(evidence, key=lambda count: evidence[count])
-    others = ", ".join(f"{n}: {plain(value, 2)}" for n, value in evidence.items() if n != best)
+    others = ", ".join(f"{n}: {plain(value, 2)}" for n, value in evidence.items() if n != best) or "none tried"
+    if used == best:
+        return f"{used} control points have the largest evidence; log evidence of other numbers against it: {others}"
     return (
         f"{used} control points: {best} have the largest evidence, the others hold laws that are no splines; "
-        f"log evidence of other numbers against it: {others or 'none tried'}"
+        f"log evidence of other numbers against it: {others}"
     )
 
 

@@ -1,8 +1,8 @@
 """``report.pdf``: the same answer and the same figures on two to four A4 pages, for the archive.
 
-The same input gives the same bytes: no clock, no random names. Pages: the answer; mechanics; photos with their
-centerlines and where the numbers come from; the diagnosis, if there was one. Photos beyond the number in the settings
-are in report.html.
+The same input gives the same bytes: no clock, no random names. Pages: the answer; mechanics; the diagnosis, if there
+was one; photos with their centerlines and where the numbers come from. Photos beyond the number in the settings are in
+report.html.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
 from pipeline.report.canvas import LIGHT, Area, style
 from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
-from pipeline.report.document import simulation_texts
+from pipeline.report.document import simulation_texts, unbroken
 from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
@@ -101,7 +101,7 @@ class Sheet:
 def _lines(text: str, size: float, bold: bool = False) -> list[str]:
     """Lines of a paragraph over the width of the page."""
     width = PAGE[0] - 2.0 * MARGIN
-    return textwrap.wrap(printable(text), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]
+    return textwrap.wrap(printable(unbroken(text)), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]
 
 
 @cache
