@@ -256,6 +256,7 @@ def test_truth_knows_the_pre_curvature_and_law_that_were_used(tmp_path: Path) ->
     D = np.array(truth["law"]["excess_per_m"])
     law = 0.0075 * D + 0.0105 * 4.5 * np.tanh(D / 4.5)
     assert np.array(truth["law"]["moment_Nm"]) == pytest.approx(law, abs=1e-12)
+    # central differences
     assert np.gradient(law, D)[5:-5] == pytest.approx(truth["law"]["tangent_Nm2"][5:-5], rel=2e-3)
     assert "ei0" not in small(tmp_path / "b", {"nonlinear_stiffness": 0.01}).truth
 

@@ -40,7 +40,7 @@ def test_errors_of_the_characteristic(figures, way, median, worst):
 
 
 def test_pre_curvature(figures):
-    assert figures["inverse"]["K0 rms 1/m"] < 0.03
+    assert figures["inverse"]["K0 rms 1/m"] < 0.03  # promised; found are 0.019
 
 
 @pytest.mark.parametrize("way", ["inverse", "balance"])
