@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion
+from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.friction_in_law import shared
+from pipeline.diagnosis.explanations.friction_in_law import LAW, shared
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
@@ -76,7 +77,8 @@ def diagnose(
     known = None if identification is None else curve_of(identification.inverse)
     conclusion = conclude(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
-    return part, (*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ()))
+    findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
+    return part, (*findings, *_search_ended(conclusion, settings))
 
 
 def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
@@ -99,8 +101,9 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects, weigh them, look for a second cause and for what is left."""
+    effort = Effort.of(settings.search_seconds)
     if bench.largest <= confirmed_limit(bench, settings):
-        return _concluded(bench, [], [], 0, masking(bench, settings), settings)
+        return _concluded(bench, [], [], 0, masking(bench, settings, effort), settings)
     found = _refitted(bench, settings)
     singles = [e for e in found if e.impossible(bench.suspicion.causes, settings.impossible) is None]
     impossible = [e for e in found if e not in singles and e.gain > max((s.gain for s in singles), default=0.0)]
@@ -118,9 +121,10 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
-    two, instead = second_cause(bench, singles, named, settings)
+    two, instead = second_cause(bench, singles, named, settings, effort)
+    curtailed = effort.spent
     concluded = _concluded(bench, singles, chance, len(members), two, settings)
-    return replace(concluded, instead=instead, impossible=impossible)
+    return replace(concluded, instead=instead, impossible=impossible, curtailed=curtailed)
 
 
 def _concluded(
@@ -136,9 +140,32 @@ def _concluded(
     if accepted is not None:
         accepted = _with_finer_law(bench, accepted, settings)
     left = _left_over(bench, bench.base if accepted is None else accepted.fitted, settings)
-    share = settings.explained_share * (0.0 if accepted is None else accepted.gain)
-    alien = left.p_value < settings.alien_false_alarm and left.excess > share
+    names = [bench.suspicion.causes[k].name for k in accepted.causes] if accepted and two else []
+    both = len(names) == 2 and LAW not in names  # another control point of the law is no second cause
+    alien = left.p_value < settings.alien_false_alarm and (
+        left.excess > settings.explained_share * _removed(accepted, singles if both else [])
+        or (both and not _fits(accepted, settings))
+    )
     return Conclusion(singles, chance, members, accepted, two, left, alien)
+
+
+def _fits(accepted: Explanation | None, settings: DiagnosisSettings) -> bool:
+    """Whether an explanation leaves little more than noise.
+
+    Two causes with all their forms come close to much that they are not: five strong pairs that left more than twice
+    the noise had a wrong name in them, the right ones left the noise.
+    """
+    if accepted is None:
+        return False
+    fitted = accepted.fitted
+    return fitted.chi2 < settings.fits * (len(fitted.residual) - fitted.extension.size)
+
+
+def _removed(accepted: Explanation | None, singles: list[Explanation]) -> float:
+    """Chi-square that the accepted causes remove; of two what the second does, which has to explain what one leaves."""
+    if accepted is None:
+        return 0.0
+    return accepted.gain - max((e.gain for e in singles), default=0.0)
 
 
 def _members(
@@ -223,6 +250,17 @@ def _too_large(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSett
         )
         return (Finding("diagnosis/impossible-size", "warning", message),)
     return ()
+
+
+def _search_ended(conclusion: Conclusion, settings: DiagnosisSettings) -> tuple[Finding, ...]:
+    """That not every pair was tried, where the search for two causes was ended."""
+    if not conclusion.curtailed:
+        return ()
+    message = (
+        f"the search for two causes was ended after {settings.search_seconds:.0f} s of computing: "
+        "another pair of causes may explain the data better"
+    )
+    return (Finding("diagnosis/search-ended", "warning", message),)
 
 
 def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

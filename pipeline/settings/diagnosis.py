@@ -99,6 +99,12 @@ class DiagnosisSettings(BaseModel):
         " the place of one of two",
     )
     exchange_most: int = Field(4, description="rivals refitted in the place of one of two causes at most; time")
+    search_seconds: float = Field(
+        40.0,
+        gt=0,
+        description="processor time, s, after which the search for two causes begins nothing further; searches that"
+        " found their pair took 5 to 30 s, what comes before and after takes 10 to 20 s of the minute it all may take",
+    )
     pair_prior: float = Field(
         0.1, description="probability of two causes against one of as many free numbers, before the data are looked at"
     )

@@ -33,6 +33,8 @@ class Conclusion:
         Causes of pairs that may stand instead of a single cause of several forms.
     impossible : list of Explanation
         Single causes that would remove more than the accepted one, but only at a size that such a cause cannot have.
+    curtailed : bool
+        Whether the search for two causes was ended before its end.
     """
 
     singles: list[Explanation]
@@ -44,6 +46,7 @@ class Conclusion:
     alien: bool
     instead: list[int] = field(default_factory=list)
     impossible: list[Explanation] = field(default_factory=list)
+    curtailed: bool = False
 
     @property
     def names(self) -> list[int]:

@@ -21,7 +21,13 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def with_more_forms(
-    observation: Observation, fitted: Fit, cause: Cause, setting: str, settings: DiagnosisSettings, *, hopeless: float
+    observation: Observation,
+    fitted: Fit,
+    cause: Cause,
+    setting: str,
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float,
 ) -> Fit:
     """The model with as many further forms of a cause as remove ``shape_gain`` each, and as may get below ``hopeless``.
 
@@ -78,11 +84,13 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause, 
     A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
     """
     while len(own := fitted.extension.terms_of(cause)) > 1:
+        enough = fitted.chi2 + settings.shape_gain
         shorter = [
-            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, settings) for form in own
+            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, settings, hopeless=enough)
+            for form in own
         ]
         simplest = min(shorter, key=lambda one: one.chi2 if one.run.prediction is not None else np.inf)
-        if simplest.run.prediction is None or simplest.chi2 - fitted.chi2 > settings.shape_gain:
+        if simplest.run.prediction is None or simplest.chi2 > enough:
             break
         fitted = simplest
     return fitted

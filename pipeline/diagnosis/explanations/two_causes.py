@@ -30,11 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
 from pipeline.diagnosis.explanations.forms import with_more_forms
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.bootstrap import widening
-from pipeline.diagnosis.fits.fit import Fit, evaluated
+from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, null_pair_gain, pair_gains
@@ -73,7 +74,7 @@ class TwoCauses:
 
 
 def second_cause(
-    bench: Workbench, singles: list[Explanation], named: set[int], settings: DiagnosisSettings
+    bench: Workbench, singles: list[Explanation], named: set[int], settings: DiagnosisSettings, effort: Effort
 ) -> tuple[TwoCauses | None, list[int]]:
     """Pairs that are significant beyond the best single cause and of which neither half can be dropped.
 
@@ -100,7 +101,7 @@ def second_cause(
     beyond = linear[0].gain - max(best.gain, bench.largest**2) if linear else 0.0
     if not _composed(best) and max(float(second.statistic.max()) ** 2, beyond) <= announced:
         return None, []
-    found = _refitted(bench, linear, settings, hopeless=best.fitted.chi2)
+    found = _refitted(bench, linear, settings, hopeless=best.fitted.chi2, effort=effort)
     found += _beside(bench, best, second, settings)
     found = _with_all_forms(bench, found, settings)
 
@@ -111,7 +112,7 @@ def second_cause(
         return known and possible and _both_needed(pair, singles, suspicion, least, significant=limit**2)
 
     accepted = [pair for pair in found if acceptable(pair)]
-    accepted += [pair for pair in _exchanged(bench, accepted, settings) if acceptable(pair)]
+    accepted += [pair for pair in _exchanged(bench, accepted, settings, effort) if acceptable(pair)]
     return _weighed(bench, accepted, settings, [e for e in singles if _composed(e)])
 
 
@@ -139,7 +140,7 @@ def _both_needed(
     return pair.gain - max(simpler, default=0.0) > least
 
 
-def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
+def masking(bench: Workbench, settings: DiagnosisSettings, effort: Effort = TO_THE_END) -> TwoCauses | None:
     """Two causes of which neither scores because each takes the other's trace away; None where no pair stands out."""
     linear = _linear_pairs(bench, settings)
     if not linear or linear[0].gain < settings.masked_least:
@@ -161,7 +162,8 @@ def masking(bench: Workbench, settings: DiagnosisSettings) -> TwoCauses | None:
     limit *= widening(bench, settings) ** 2
     if linear[0].gain <= limit:
         return None
-    found = _exchanged(bench, _refitted(bench, linear, settings, hopeless=bench.base.chi2), settings)
+    found = _refitted(bench, linear, settings, hopeless=bench.base.chi2, effort=effort)
+    found = _exchanged(bench, found, settings, effort)
     law = [k for k, cause in enumerate(suspicion.causes) if cause.name == "nonlinear_stiffness"]
     found = [e for e in found if e.impossible(suspicion.causes, settings.impossible) is None]
     return _weighed(bench, [e for e in found if e.gain > limit and not set(law) & set(e.causes)], settings, [])[0]
@@ -183,12 +185,19 @@ def _linear_gain(suspicion: Suspicion, cause: int) -> float:
 
 
 def _refitted(
-    bench: Workbench, pairs: list[Pair], settings: DiagnosisSettings, *, hopeless: float
+    bench: Workbench,
+    pairs: list[Pair],
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float,
+    effort: Effort = TO_THE_END,
 ) -> list[Explanation]:
-    """The pairs, fitted in full from their linear amounts."""
+    """The pairs, fitted in full from their linear amounts; the best two in any case."""
     suspicion, found = bench.suspicion, []
     z, norm, unit = suspicion.scores.z, suspicion.scores.norm, suspicion.scores.unit
-    for pair in pairs:
+    for rank, pair in enumerate(pairs):
+        if rank > 1 and effort.spent:
+            break
         one, other = pair.first, pair.second
         c = float(unit[:, one] @ unit[:, other])
         amounts = tuple(
@@ -230,29 +239,52 @@ def _with_all_forms(bench: Workbench, found: list[Explanation], settings: Diagno
 
 
 def _with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSettings, *, rival: float) -> Explanation:
-    """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square."""
-    fitted, hopeless = pair.fitted, rival + settings.refit_least
+    """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square.
+
+    Of causes whose forms are directions (a load, a tilt); a form with a place of its own is tuned instead.
+    """
+    fitted, hopeless, facts = pair.fitted, rival + settings.refit_least, bench.facts
     for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-        if not kind.combines:
+        if not kind.combines or any(form.tuned for form in kind.variants(facts)):
             continue
-        settings_of = {term.variant.setting for term in fitted.extension.terms if term.cause is kind}
-        for setting in settings_of:
+        for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
             fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
     return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
 
 
-def _exchanged(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
+def _exchanged(
+    bench: Workbench, found: list[Explanation], settings: DiagnosisSettings, effort: Effort = TO_THE_END
+) -> list[Explanation]:
     """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
     every, done = list(found), set[frozenset[int]]()
     for _ in range(EXCHANGES):
         best = max(every, key=_worth, default=None)
-        if best is None or frozenset(best.causes) in done:
+        if best is None or effort.spent:
+            break
+        if frozenset(best.causes) in done:
             break
         done.add(frozenset(best.causes))
+        if not best.fitted.converged:
+            best = _settled(bench, best, settings)
+            every.append(best)
         for place in (0, 1):
-            every += _in_place_of(bench, best, place, settings)
+            every += _in_place_of(bench, best, place, settings, effort)
     return every[len(found) :]
 
+
+def _settled(bench: Workbench, pair: Explanation, settings: DiagnosisSettings) -> Explanation:
+    """A pair whose fit ran out of steps, fitted on from where it stands: beside a half-way cause scores mislead."""
+    fitted = pair.fitted
+    for _ in range(ATTEMPTS):
+        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted, settings)
+        gained, fitted = fitted.chi2 - further.chi2, further
+        if fitted.converged or gained < settings.shape_gain:
+            break
+    return explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
+
+
+ATTEMPTS = 3
+"""Fits at most that go on where the last one ran out of steps."""
 
 EXCHANGES = 2
 """Rounds at most; the second is for what the first has put right."""
@@ -263,7 +295,9 @@ def _worth(explanation: Explanation) -> float:
     return 0.5 * explanation.gain - explanation.weighed.tuned
 
 
-def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings) -> list[Explanation]:
+def _in_place_of(
+    bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings, effort: Effort
+) -> list[Explanation]:
     """The pair with one of its causes replaced by whatever scores nearly as much beside the other."""
     suspicion, other, found = bench.suspicion, pair.causes[1 - place], []
     rest = _without(bench, pair.fitted, pair.causes[place])
@@ -275,11 +309,16 @@ def _in_place_of(bench: Workbench, pair: Explanation, place: int, settings: Diag
     near = settings.model_copy(update={"refit_margin": settings.exchange_margin, "refit_most": settings.exchange_most})
     for cause in candidates(beside, near):
         direction = beside.best(cause)
+        if effort.spent:
+            break
         if cause in pair.causes or direction is None:
             continue  # itself, or further forms of the other cause: that is a single cause
         fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2)
         if fitted is not None and not fitted.converged:  # kinks: the form as it is scored does not stall
-            fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, tuned=False) or fitted
+            held = fit_terms(
+                bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2, tuned=False
+            )
+            fitted = held if held is not None and held.chi2 < fitted.chi2 else fitted
         if fitted is not None:
             causes = (cause, other) if place == 0 else (other, cause)
             new = explanation_of(causes, bench.base, fitted, suspicion)

@@ -10,6 +10,7 @@ from fixtures.continuum import Cable
 from fixtures.hidden import THREE, Protocol, Reading, hidden_test
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations import two_causes
+from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, _with_all_forms, masking
 from pipeline.diagnosis.fits.faults import faults_of_input
@@ -61,6 +62,11 @@ def test_its_prior_alone_does_not_keep_a_pair_out_of_the_class(bench):
     two, instead = _weighed(bench, [explanation(PAIR, 397.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
     assert two is None and instead == [0, 1]
     assert _weighed(bench, [explanation(PAIR, 397.0, 2)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
+
+
+def test_a_search_whose_time_is_spent_begins_nothing(bench):
+    assert _exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1.0)) == []
+    assert not Effort().spent
 
 
 def test_a_wrong_half_of_a_pair_is_exchanged():
