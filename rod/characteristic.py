@@ -192,10 +192,6 @@ class Characteristic:
         solution = np.linalg.lstsq(columns / scales, m, rcond=None)[0] / scales
         return cls(at, solution[: at.size], reading, even, abscissa)
 
-    def with_ordinates(self, ordinates: ArrayLike) -> Characteristic:
-        """Same knots and conventions with other ``ordinates`` (p,) N m^2."""
-        return Characteristic(self.knots, np.asarray(ordinates, float), self.reading, self.even, self.abscissa)
-
     # The moment curve -------------------------------------------------------------------------------------------------
 
     @property

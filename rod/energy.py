@@ -10,7 +10,7 @@ psi is the energy per length of the section, int_{K0}^{K} m dk (the printed Eq. 
 printed all forces would halve), with friction or plastic set the incremental potential of the step. Equilibria are
 minima of V under the imposed positions; reactions are dV/d(imposed position).
 `rod.equilibrium` finds them after exact elimination of r (`rod.reduction`), because EA and GA of a real cable make this
-Hessian ill-conditioned; here it serves as definition, stationarity check and proof of a minimum.
+Hessian ill-conditioned; here it serves as definition, and to check that equilibria are stationary points and minima.
 
 Units: m, rad, N, J; load and positions in the chord frame, K positive toward +y.
 
@@ -24,7 +24,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cholesky_banded
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -154,18 +153,6 @@ class Potential:
         for place, (angle, support, rest, slip, _) in zip((at[0], at[-1]), self._ends(q[at]), strict=True):
             band[0, place] += support.moment_at(angle, rest, slip)[1]
         return band
-
-    def is_minimum(self, q: Array, free: NDArray[np.bool_]) -> bool:
-        """Whether the Hessian on the free unknowns is positive definite, by banded Cholesky factorisation."""
-        band = self.hessian(q)
-        for k in range(1, HALF_BANDWIDTH + 1):
-            band[k, : self.size - k] *= free[k:] & free[: self.size - k]
-        band[0, ~free] = band[0].max()
-        try:
-            cholesky_banded(band, lower=True)
-        except LinAlgError:
-            return False
-        return True
 
     def stored(self, q: Array) -> float:
         """Recoverable part of V at the end of the step, J: V without what friction and set dissipate."""

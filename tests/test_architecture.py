@@ -22,7 +22,6 @@ ROD = [
     ("iteration", "bending_test"),
     ("parameters",),
     ("sensitivity",),
-    ("information",),
     ("inverse", "balance", "paper_fit"),
     ("paper",),
 ]

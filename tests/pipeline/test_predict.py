@@ -92,7 +92,7 @@ def test_bands_are_those_of_sampled_cables(result):
     forces, rises = [], []
     for _ in range(150):
         change = model.factor @ rng.standard_normal(model.factor.shape[1])
-        law = model.characteristic.with_ordinates(model.characteristic.ordinates + change[:-1])
+        law = replace(model.characteristic, ordinates=model.characteristic.ordinates + change[:-1])
         K0 = model.pre_curvature + change[-1]
         chord = 2.0 / K0 * np.sin(K0 * LENGTH / 2) - 8e-3
         bent = uniform_equilibrium(law, length=LENGTH, chord=chord, pre_curvature=K0)

@@ -99,7 +99,7 @@ def test_the_band_is_that_of_cables_drawn_from_the_joint_covariance():
         change = model.factor @ drawn
         other = replace(
             model,
-            characteristic=model.characteristic.with_ordinates(model.characteristic.ordinates + change[:-1]),
+            characteristic=replace(model.characteristic, ordinates=model.characteristic.ordinates + change[:-1]),
             pre_curvature=model.pre_curvature + change[-1],
             forms=tuple(moved(form, form.factor @ drawn) for form in model.forms),
         )
