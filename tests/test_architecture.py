@@ -63,7 +63,7 @@ INSIDE = {
         ("identified_again", "heldout", "bootstrap"),
     ],
     "pipeline.diagnosis.explanations": [
-        ("explanation", "candidates", "refit"),
+        ("explanation", "candidates", "refit", "effort"),
         ("forms",),
         ("single_cause", "two_causes", "friction_in_law"),
         ("conclusion",),
