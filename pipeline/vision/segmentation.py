@@ -11,6 +11,8 @@ The cable is the longest strip of the right width; known bearings decide between
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -18,6 +20,7 @@ from pipeline.records import Array, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.bearings.axes import SoughtCovers
 from pipeline.vision.judgement import Cable, judge_strip, refused
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
@@ -50,6 +53,7 @@ def find_cable(
     RoughCable or Rejected
     """
     cable = Cable() if cable is None else cable
+    cable = replace(cable, bearings=replace(cable.bearings, sought=SoughtCovers()))
     if near is not None:
         found = _find_in(photo, settings, cable, _surroundings(near, photo, settings.segmentation))
         if isinstance(found, RoughCable):

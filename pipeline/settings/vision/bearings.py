@@ -93,6 +93,12 @@ class BearingSettings(StageSettings):
         description="radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is"
         " one away, an end led astray by the cover's shadow two",
     )
+    same_end_radii: float = Field(
+        0.1,
+        gt=0,
+        description="radii of a cover, and rad; strips of one photo that end so near and alike show one cover or none:"
+        " a tenth of what a mask's end is allowed to be off",
+    )
     same_radius: float = Field(
         0.04, gt=0, lt=1, description="relative; covers of one rig are turned alike, light and blur move a rim less"
     )

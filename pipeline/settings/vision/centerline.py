@@ -194,12 +194,19 @@ class CurveSettings(StageSettings):
         5.0, gt=0, description="ratio; below it false edges win and the errors are not Gaussian"
     )
     patterned_contrast_to_noise: float = Field(
-        2.0,
+        1.65,
         gt=0,
-        description="ratio, where the width is surely constant; strands of two colours scatter by half their contrast",
+        description="ratio, where the width is surely constant; strands of two colours scatter by half their contrast,"
+        " and by a tenth of it more with the shade between them",
     )
     sure_width_scatter: float = Field(
         0.04, gt=0, description="relative, robust; edges sought in noise scattered by 0.09, in coarse texture by 0.2"
+    )
+    quiet_width_scatter: float = Field(
+        0.07,
+        gt=0,
+        description="relative, robust, where the pixels are quiet: strands that swell the outline reach 0.065,"
+        " twisted pairs 0.1, coarse texture 0.2",
     )
     min_measured_share: float = Field(
         0.6, gt=0, le=1, description="of the visible sections; with fewer both edges were not found on a cable"

@@ -8,19 +8,43 @@ Units: px.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_again, find_cover
-from pipeline.vision.bearings.rim import Radius
+from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass
+class SoughtCovers:
+    """Covers sought on one photo: the strips of all its readings end at a few places, each is searched once."""
+
+    done: list[tuple[CableEnd, Radius, float, Circle | None]] = field(default_factory=list)
+
+    def at(
+        self, photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
+    ) -> Circle | None:
+        """As `find_cover`, or what it said of an end that is the same within ``settings.same_end_radii``."""
+        near, about = settings.same_end_radii, settings.same_radius
+        for other, sought, width, circle in self.done:
+            if (
+                np.hypot(*(end.place - other.place)) < near * radius.px
+                and np.hypot(*(end.outward - other.outward)) < near
+                and abs(sought.px - radius.px) < about * radius.px
+                and abs(width - width_px) < 2.0 * about * width_px
+            ):
+                return circle
+        circle = find_cover(photo, end, radius, width_px, settings)
+        self.done.append((end, radius, width_px, circle))
+        return circle
 
 
 @dataclass(frozen=True)
@@ -37,12 +61,15 @@ class BearingHints:
         Axes by the user.
     seen : tuple of Bearing
         Covers of a neighbouring photo, where they are to be expected on this one.
+    sought : SoughtCovers
+        What was found or not on this photo already.
     """
 
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
     seen: tuple[Bearing, ...] = ()
+    sought: SoughtCovers = field(default_factory=SoughtCovers, compare=False)
 
     def cover_radius(self, width_px: float) -> float | None:
         """Expected radius of a cover in px; None if there are no covers."""
@@ -54,7 +81,7 @@ class BearingHints:
 def find_bearings(
     photo: Photo, ends: tuple[CableEnd, CableEnd], width_px: float, hints: BearingHints, settings: BearingSettings
 ) -> tuple[Bearing | None, Bearing | None]:
-    """Axes at the two ends of the cable, in the order of ``ends``; None where a cover should be and is not found."""
+    """Axes at the two ends of the cable, in the order of ``ends``; None from the first cover on that is not found."""
     if hints.given_px is not None:
         return _assign_given(ends, hints.given_px, settings)
     radius = hints.cover_radius(width_px)
@@ -62,12 +89,14 @@ def find_bearings(
         return _visible_end(ends[0], width_px, settings), _visible_end(ends[1], width_px, settings)
     std = settings.radius_std if hints.cover_px is not None else settings.radius_std_by_cable
     expected = Radius(radius, std)
-    circles = [
-        find_again(photo, end, hints.seen, expected, settings) or find_cover(photo, end, expected, width_px, settings)
-        for end in ends
-    ]
-    first, second = (circle.as_bearing(settings.sure_rim) if circle is not None else None for circle in circles)
-    return first, second
+    axes: list[Bearing | None] = [None, None]
+    for k, end in enumerate(ends):
+        circle = find_again(photo, end, hints.seen, expected, settings)
+        circle = circle or hints.sought.at(photo, end, expected, width_px, settings)
+        if circle is None:
+            break  # one is not enough, whatever the other would be
+        axes[k] = circle.as_bearing(settings.sure_rim)
+    return axes[0], axes[1]
 
 
 def _assign_given(

@@ -103,9 +103,10 @@ def _refusal(
         return Rejected(rough.image, code, reason, figure=figure)
 
     # chance gives no constant width: what then counts as noise is a pattern of the sheath or the ground
-    constant = scatter < options.sure_width_scatter
+    quiet = rough.contrast >= options.min_contrast_to_noise * rough.noise
+    constant = scatter < (options.quiet_width_scatter if quiet else options.sure_width_scatter)
     needed = options.patterned_contrast_to_noise if constant else options.min_contrast_to_noise
-    if ratio < needed <= rough.contrast / max(rough.noise, 1e-9) and not constant:
+    if ratio < needed and quiet and scatter >= options.sure_width_scatter:
         # the pixels are quiet enough: what is between them and a clean pair of edges is no noise
         return rejected(
             "photo/outline",

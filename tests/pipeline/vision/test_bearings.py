@@ -10,7 +10,8 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius, visible_ends
-from pipeline.vision.bearings.covers import Radius, find_cover
+from pipeline.vision.bearings.covers import find_cover
+from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
@@ -171,6 +172,27 @@ def test_dome_brighter_than_the_ground_on_one_side_and_darker_on_the_other_is_no
         # the shadow's centre lies 0.39 radii away; 3.5 standard deviations as for every other look
         assert np.all(np.abs(np.subtract(circle.center, true)) < 3.5 * circle.std)
         assert circle.std < 1.0
+
+
+def test_strips_that_end_alike_share_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = render(scene())
+    photo, radius = photo_of(picture), 0.006 * SCALE
+    places: list[CableEnd] = []
+
+    def searched(photo: Photo, end: CableEnd, *rest: object) -> Circle | None:
+        places.append(end)
+        return find_cover(photo, end, Radius(radius, 0.01), 41.0, STAGE)
+
+    monkeypatch.setattr("pipeline.vision.bearings.axes.find_cover", searched)
+    hints = BearingHints(cover_px=2.0 * radius)
+    for shift in (0.0, 0.05, 0.3):  # radii; the second is the same end, the third another
+        ends = tuple(rough_end(picture, side, radius) for side in (0, 1))
+        moved = tuple(replace(end, place=end.place + shift * radius * np.array([0.0, 1.0])) for end in ends)
+        axes = find_bearings(photo, moved, 41.0, hints, STAGE)
+        for axis, true in zip(axes, (picture.left_px, picture.right_px), strict=True):
+            assert axis is not None
+            assert np.hypot(*np.subtract(axis.center_px, true)) < 0.5
+    assert len(places) == 4
 
 
 def test_no_cover_is_no_circle() -> None:
