@@ -143,7 +143,7 @@ def _concluded(
     names = [bench.suspicion.causes[k].name for k in accepted.causes] if accepted and two else []
     both = len(names) == 2 and LAW not in names  # another control point of the law is no second cause
     alien = left.p_value < settings.alien_false_alarm and (
-        left.excess > settings.explained_share * _removed(accepted, singles if both else [])
+        left.excess > settings.explained_share * (accepted.gain if accepted else 0.0)
         or (both and not _fits(accepted, settings))
     )
     return Conclusion(singles, chance, members, accepted, two, left, alien)
@@ -159,13 +159,6 @@ def _fits(accepted: Explanation | None, settings: DiagnosisSettings) -> bool:
         return False
     fitted = accepted.fitted
     return fitted.chi2 < settings.fits * (len(fitted.residual) - fitted.extension.size)
-
-
-def _removed(accepted: Explanation | None, singles: list[Explanation]) -> float:
-    """Chi-square that the accepted causes remove; of two what the second does, which has to explain what one leaves."""
-    if accepted is None:
-        return 0.0
-    return accepted.gain - max((e.gain for e in singles), default=0.0)
 
 
 def _members(
