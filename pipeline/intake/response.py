@@ -13,30 +13,29 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import InputError
+from pipeline.intake.holdplace import MEDIAN_OF_NORMAL
 from pipeline.records import LoadStep
 from pipeline.settings.intake import IntakeSettings
 from pipeline.units import quantity
 
 
 def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSettings) -> None:
-    """Refuse a log whose force stands still while the bearing moves; a log of zeros says by itself that it has none.
+    """Refuse a log whose force stands still while the bearing moves.
 
     Raises
     ------
     InputError
         ``log/force-stands-still``.
     """
-    places = np.array([step.displacement_m for step in steps])
-    forces = np.array([step.force_N for step in steps])
-    samples = np.concatenate([step.forces_N for step in steps])
-    if np.ptp(places) == 0.0 or not samples.any():
+    loaded = [step for step in steps if step.branch != "mounted"]
+    still = steps if len(loaded) < len(steps) and _one_force(steps, settings) else loaded
+    places = [step.displacement_m for step in still]
+    if still is loaded and not _too_flat(loaded, places, settings):
         return
-    to_the_digit = len(steps) > 2 and float(np.ptp(samples)) == 0.0
-    if not to_the_digit and not _is_flat(steps, places, forces, settings):
-        return
-    way = f"{places.min() * 1e3:.4g} and {places.max() * 1e3:.4g} mm"
+    way = f"{min(places) * 1e3:.4g} and {max(places) * 1e3:.4g} mm"
+    read = quantity(float(np.mean([step.force_N for step in still])), "N")
     raise InputError(
-        f"the force stands still: all {len(steps)} steps between {way} read {quantity(float(np.mean(forces)), 'N')}",
+        f"the force stands still: {len(still)} steps between {way} read {read}",
         path=path,
         code="log/force-stands-still",
         remedy="check that the load cell is connected and within its range and that this column is its force, then "
@@ -44,14 +43,25 @@ def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSet
     )
 
 
-def _is_flat(steps: Sequence[LoadStep], places: np.ndarray, forces: np.ndarray, settings: IntakeSettings) -> bool:
-    """Whether one force explains all steps within their noise where a cable's would differ."""
-    std = np.array([step.force_std_N for step in steps])
-    apart = np.abs(forces - np.average(forces, weights=1.0 / std**2))
-    if np.any(apart > settings.still_force_sigma * std):
+def _one_force(steps: Sequence[LoadStep], settings: IntakeSettings) -> bool:
+    """Whether one force explains several steps at several places within their noise.
+
+    Medians, and the scatter about them: a wild sample that could not be left out is no noise that hides a cable.
+    """
+    if len({step.displacement_m for step in steps}) < 2:
         return False
-    at_rest = [step.branch == "mounted" for step in steps]
-    if any(at_rest):
-        return not all(at_rest)
-    changed = float(np.ptp(forces)) > settings.still_force_relative * float(np.max(np.abs(forces)))
-    return len(np.unique(places)) > 2 and not changed
+    middles = np.array([float(np.median(step.forces_N)) for step in steps])
+    repeated = [step.forces_N - middle for step, middle in zip(steps, middles, strict=True) if step.forces_N.size > 1]
+    std = np.array([step.force_std_N for step in steps])
+    if repeated:
+        sigma = float(np.median(np.abs(np.concatenate(repeated)))) / MEDIAN_OF_NORMAL
+        std = sigma / np.sqrt([step.forces_N.size for step in steps])
+    return bool(np.all(np.abs(middles - np.median(middles)) <= settings.still_force_sigma * std))
+
+
+def _too_flat(loaded: Sequence[LoadStep], places: Sequence[float], settings: IntakeSettings) -> bool:
+    """Whether the forces of three bent steps and more differ less than those of a cable would."""
+    forces = np.array([step.force_N for step in loaded])
+    if len(set(places)) < 3 or not _one_force(loaded, settings):
+        return False
+    return float(np.ptp(forces)) <= settings.still_force_relative * float(np.max(np.abs(forces)))

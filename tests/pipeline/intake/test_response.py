@@ -30,6 +30,12 @@ def test_a_force_that_stands_still_is_refused(specimen_folder, first, level, noi
     assert caught.value.code == "log/force-stands-still"
 
 
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_all_bent_steps_at_the_end_of_the_range_are_refused(specimen_folder, noise):
+    with pytest.raises(InputError, match="3 steps between 3 and 9 mm read 2"):
+        specimen_folder(log=text("mounted", [0.0, 2.0, 2.0, 2.0], noise=noise)).read()
+
+
 @pytest.mark.parametrize("first", FORCES)
 @pytest.mark.parametrize("samples", [1, 5])
 def test_a_force_that_answers_is_read(specimen_folder, first, samples):
