@@ -107,7 +107,8 @@ def _ahead(
                 continue
             alike = _alike(standout, more, width, usual, settings)
             scraps = max(scraps, int(alike.sum()))
-            stop = _end_of_more(more, alike, width, cut.contrast, settings)
+            # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
+            stop = min(_end_of_more(more, alike, width, cut.contrast, settings), len(ahead))
             if stop and (best is None or len(led) + stop > len(best)):
                 best = np.vstack([led, more.path[:stop]])
                 if stop > 0.8 * len(ahead):
@@ -147,7 +148,8 @@ def _may_go_on(
     darkest = np.maximum(light.mean(axis=2).min(axis=1), settings.beyond_darkest)
     strong = (-relief if cut.dark else relief) > (settings.beyond_contrast[0] * usual) * darkest[:, None]
     enough = 0.25 * width / (offsets[1] - offsets[0])
-    return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * len(ahead) / len(rows) > least)
+    length = float(np.hypot(*np.diff(ahead, axis=0).T).sum())
+    return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * length / (len(rows) - 1) > least)
 
 
 def _led_into_picture(

@@ -43,6 +43,12 @@ def _shaded(picture):
     return picture * cv2.GaussianBlur(np.where(np.arange(SIZE[1]) > 560, 0.4, 1.0)[None].repeat(SIZE[0], 0), (0, 0), 3)
 
 
+def _pooled(picture):
+    pool = np.zeros(SIZE, np.float32)
+    cv2.ellipse(pool, (640, 230), (60, 140), 20, 0, 360, 1.0, -1)
+    return picture * (1.0 - 0.45 * cv2.GaussianBlur(pool, (0, 0), 3))
+
+
 def _taped(picture):
     picture[:, 600:640] = 90.0
     return picture
@@ -52,7 +58,7 @@ def _length():
     return float(np.hypot(*np.diff(_bow(), axis=0).T).sum()) + WIDTH  # drawn with round ends
 
 
-@pytest.mark.parametrize("across", [_as_it_is, _ruled, _shaded, _taped])
+@pytest.mark.parametrize("across", [_as_it_is, _ruled, _shaded, _pooled, _taped])
 def test_no_piece_of_the_cable_passes_for_it(across):
     found = find_cable(_photo(across), VisionSettings())
     assert isinstance(found, RoughCable)
