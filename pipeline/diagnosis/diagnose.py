@@ -78,7 +78,7 @@ def diagnose(
     conclusion = conclude(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
     findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
-    return part, (*findings, *_search_ended(conclusion, settings))
+    return part, (*findings, *_search_ended(conclusion))
 
 
 def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
@@ -101,9 +101,10 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects, weigh them, look for a second cause and for what is left."""
-    effort = Effort.of(settings.search_seconds)
+    effort = Effort.of(settings.search_newton_steps)
     if bench.largest <= confirmed_limit(bench, settings):
-        return _concluded(bench, [], [], 0, masking(bench, settings, effort), settings)
+        masked = masking(bench, settings, effort)
+        return replace(_concluded(bench, [], [], 0, masked, settings), curtailed=effort.spent)
     found = _refitted(bench, settings)
     singles = [e for e in found if e.impossible(bench.suspicion.causes, settings.impossible) is None]
     impossible = [e for e in found if e not in singles and e.gain > max((s.gain for s in singles), default=0.0)]
@@ -155,10 +156,7 @@ def _fits(accepted: Explanation | None, settings: DiagnosisSettings) -> bool:
     Two causes with all their forms come close to much that they are not: five strong pairs that left more than twice
     the noise had a wrong name in them, the right ones left the noise.
     """
-    if accepted is None:
-        return False
-    fitted = accepted.fitted
-    return fitted.chi2 < settings.fits * (len(fitted.residual) - fitted.extension.size)
+    return accepted is not None and accepted.fitted.reduced_chi2 < settings.fits
 
 
 def _members(
@@ -245,12 +243,12 @@ def _too_large(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSett
     return ()
 
 
-def _search_ended(conclusion: Conclusion, settings: DiagnosisSettings) -> tuple[Finding, ...]:
+def _search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:
     """That not every pair was tried, where the search for two causes was ended."""
     if not conclusion.curtailed:
         return ()
     message = (
-        f"the search for two causes was ended after {settings.search_seconds:.0f} s of computing: "
+        "the search for two causes was ended before all pairs were tried, it took too long: "
         "another pair of causes may explain the data better"
     )
     return (Finding("diagnosis/search-ended", "warning", message),)

@@ -99,11 +99,12 @@ class DiagnosisSettings(BaseModel):
         " the place of one of two",
     )
     exchange_most: int = Field(4, description="rivals refitted in the place of one of two causes at most; time")
-    search_seconds: float = Field(
-        40.0,
+    search_newton_steps: int = Field(
+        40_000,
         gt=0,
-        description="processor time, s, after which the search for two causes begins nothing further; searches that"
-        " found their pair took 5 to 30 s, what comes before and after takes 10 to 20 s of the minute it all may take",
+        description="Newton steps after which the search for two causes begins nothing further, those of the refits of"
+        " single causes included; about 1,000 a second, and what comes before and after takes 10 to 20 s of the minute"
+        " it all may take; searches that found their pair took 5,000 to 30,000",
     )
     pair_prior: float = Field(
         0.1, description="probability of two causes against one of as many free numbers, before the data are looked at"
@@ -143,6 +144,11 @@ class DiagnosisSettings(BaseModel):
         description="share of the excess misfit of held-out steps that the extension of an unexplained specimen must"
         " remove for its f_EI to be the answer: with less, that of five specimens was 1.4 to 50 % off and the plain one"
         " 0.4 to 5 %; with more, that of three was 0.5 to 4 % off and the plain one 4 to 30 %",
+    )
+    extension_leaves: float = Field(
+        16.0,
+        description="reduced chi-square that such an extension may leave (4 sigma rms): with 240 and 850, f_EI of two"
+        " specimens was 56 and 690 % off and the plain one 27 %; the better ones leave 1 to 6",
     )
 
     same_level: float = Field(

@@ -9,26 +9,30 @@ told (`diagnose`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import process_time
 
 import numpy as np
+
+from pipeline.diagnosis.observations.work import newton_steps
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Processor time of this process, s, at which a search gives up; infinite for one that goes to its end."""
+    """Newton steps of this thread at which a search gives up; infinite for one that goes to its end.
+
+    Steps and no seconds: the same data must give the same names on every machine.
+    """
 
     end: float = np.inf
 
     @classmethod
-    def of(cls, seconds: float) -> Effort:
+    def of(cls, steps: int) -> Effort:
         """A search that begins now."""
-        return cls(process_time() + seconds)
+        return cls(newton_steps() + steps)
 
     @property
     def spent(self) -> bool:
         """Whether nothing further may be begun."""
-        return process_time() > self.end
+        return newton_steps() > self.end
 
 
 TO_THE_END = Effort()

@@ -71,6 +71,11 @@ class Fit:
         return float(self.residual @ self.residual)
 
     @property
+    def reduced_chi2(self) -> float:
+        """Chi-square per degree of freedom; 1 is noise."""
+        return self.chi2 / max(len(self.residual) - self.extension.size, 1)
+
+    @property
     def covariance(self) -> Array:
         """Covariance (p, p) of the parameters; invisible combinations get a huge variance, not an infinite one."""
         size = np.linalg.norm(self.jacobian, axis=0)

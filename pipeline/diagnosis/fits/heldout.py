@@ -58,9 +58,14 @@ def unproven(p_value: float, gain: GainPart | None, settings: DiagnosisSettings)
     return not shown and p_value < settings.unproven
 
 
-def removes_most(gain: GainPart | None, settings: DiagnosisSettings) -> bool:
-    """Whether the extension removes so much of the misfit of steps held out that its f_EI is the better one."""
-    return gain is not None and gain.heldout_excess_removed >= settings.extension_share
+def answers(gain: GainPart | None, reduced_chi2: float, settings: DiagnosisSettings) -> bool:
+    """Whether f_EI of an extension that leaves something unexplained is the better one all the same.
+
+    It must remove most of the misfit of steps held out, and what it leaves must not be many times the noise: of a
+    misfit of hundreds of sigma a wrong cause removes most as well, and bends f_EI for it.
+    """
+    removed = gain is not None and gain.heldout_excess_removed >= settings.extension_share
+    return removed and reduced_chi2 <= settings.extension_leaves
 
 
 def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_], settings: DiagnosisSettings) -> Fit:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
+from pipeline.diagnosis.observations.work import counted
 from rod.equilibrium import Branch, Equilibrium, solve
 from rod.sensitivity import Derivatives, derivatives
 
@@ -120,6 +121,7 @@ def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -
             start = near.steps[i] if near is not None and usable and near.steps[i].good else last
             hold = model.bending.hold("forces", 0.0) if free else model.bending.hold("displacements", displacement[i])
             here = solve(model.bending.rod, hold, memory=memory, start=start, branch=side, patient=patient)
+            counted(here.iterations)
             if not here.good:
                 return (here,)
             memory, last = here.after, here

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.friction_in_law import hidden_in_law
-from pipeline.diagnosis.fits.heldout import measured_gain, removes_most, unproven
+from pipeline.diagnosis.fits.heldout import answers, measured_gain, unproven
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -63,7 +63,8 @@ def present(
         blind_spots=blind_spots(bench, seen, settings),
         next_experiment=what_next(bench, conclusion, settings, unexplained=verdict == "unexplained"),
         extended=extended,
-        extended_refuted=verdict == "unexplained" and not removes_most(gain, settings),
+        extended_refuted=verdict == "unexplained"
+        and not (accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)),
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,

@@ -3,7 +3,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
-from pipeline.diagnosis.fits.heldout import removes_most, unproven
+from pipeline.diagnosis.fits.heldout import answers, unproven
 from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
@@ -140,11 +140,14 @@ def test_a_cause_that_fails_on_steps_held_out_does_not_explain_what_is_left(p_va
     assert not unproven(p_value, None, DiagnosisSettings())
 
 
-@pytest.mark.parametrize(("share", "expected"), [(0.6, False), (0.9, True), (None, False)])
-def test_an_unexplained_extension_answers_only_if_itremoves_most(share, expected):
+@pytest.mark.parametrize(
+    ("share", "leaves", "expected"),
+    [(0.6, 2.0, False), (0.9, 2.0, True), (0.9, 200.0, False), (None, 2.0, False)],
+)
+def test_an_unexplained_extension_answers_only_if_it_removes_most_and_leaves_little(share, leaves, expected):
     given = None
     if share is not None:
         given = GainPart(
             heldout_excess_removed=share, ci95=(0.5, 1.0), force_rmse_N=(1.0, 0.1), shape_rmse_m=(1.0, 0.1)
         )
-    assert removes_most(given, DiagnosisSettings()) is expected
+    assert answers(given, leaves, DiagnosisSettings()) is expected

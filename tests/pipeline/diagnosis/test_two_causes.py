@@ -8,6 +8,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import THREE, Protocol, Reading, hidden_test
+from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations import two_causes
 from pipeline.diagnosis.explanations.effort import Effort
@@ -15,6 +16,7 @@ from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, _with_all_forms, masking
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.statistics.pairs import Pair
 from pipeline.diagnosis.statistics.verdict import Weighed
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -64,9 +66,27 @@ def test_its_prior_alone_does_not_keep_a_pair_out_of_the_class(bench):
     assert _weighed(bench, [explanation(PAIR, 397.0, 2)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
 
 
-def test_a_search_whose_time_is_spent_begins_nothing(bench):
-    assert _exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1.0)) == []
+def test_a_search_whose_effort_is_spent_begins_nothing(bench):
+    assert _exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1)) == []
     assert not Effort().spent
+
+
+def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time():
+    """Effort is counted in Newton steps: how busy the machine is decides nothing."""
+    steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
+    test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=Reading(lens=2e-3, relaxation=(0.03, 7.0)))
+    hasty = SETTINGS.model_copy(update={"search_newton_steps": 1})
+    spent = []
+    for _ in range(2):
+        before = newton_steps()
+        _, findings = diagnose(test, None, hasty)
+        spent.append(newton_steps() - before)
+        assert [f.code for f in findings].count("diagnosis/search-ended") == 1
+    assert spent[0] == spent[1] > 100  # four equilibria of some three steps each, in tens of fits
+    before = newton_steps()
+    _, findings = diagnose(test, None, SETTINGS)
+    assert newton_steps() - before > spent[0]
+    assert "diagnosis/search-ended" not in [f.code for f in findings]
 
 
 def test_a_wrong_half_of_a_pair_is_exchanged():
