@@ -65,6 +65,8 @@ def diagnose(
     if _stands_still(test, settings):
         return _nothing_to_compare("the log gives one displacement for all steps"), ()
     faults = faults_of_input(test, settings)
+    if not faults.loaded_forces():
+        return _nothing_to_compare("no force under load can be used"), faults.findings
     bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
     if isinstance(bench, str):
         return _nothing_to_compare(bench), faults.findings

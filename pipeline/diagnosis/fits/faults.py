@@ -55,6 +55,11 @@ class Faults:
     photos: frozenset[int] = frozenset()
     forces: frozenset[int] = frozenset()
 
+    def loaded_forces(self) -> list[int]:
+        """Indices of the steps under load whose force may be used; without any, stiffness has no scale."""
+        steps = enumerate(self.test.steps)
+        return [i for i, step in steps if step.branch != "mounted" and step.force and i not in self.forces]
+
     def joined(self, other: Faults) -> Faults:
         """Both."""
         return Faults(

@@ -107,6 +107,17 @@ def test_without_forces_nothing_can_be_held_against_the_simulation(honest):
     assert part.verdict == "underpowered" and "all forces in the log are zero" in part.headline and findings == ()
 
 
+def test_without_a_live_force_under_load_nothing_can_be_held_against_the_simulation(honest):
+    """The channel froze after the force-free photo: its holds repeat to the digit and are left out, all of them."""
+    frozen = float(honest.steps[-1].force)
+    steps = tuple(
+        s if s.branch == "mounted" else replace(s, force=frozen, hold_forces=np.full(8, frozen)) for s in honest.steps
+    )
+    part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
+    assert part.verdict == "underpowered" and "no force under load" in part.headline
+    assert [f.code for f in findings] == ["force/stuck"]
+
+
 @pytest.mark.parametrize("displacement", [0.0, 5e-3])
 def test_a_log_that_stands_still_drives_no_simulation(honest, displacement):
     """It had run for minutes into a division by a travel of zero."""
