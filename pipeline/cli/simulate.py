@@ -23,7 +23,7 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
 @click.command(short_help="A virtual experiment as a specimen folder.")
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 @click.option(
-    "--hide", "effects", multiple=True, metavar="NAME=VALUE", callback=effect,
+    "--hide", "effects", multiple=True, metavar="NAME=VALUE[,VALUE]", callback=effect,
     help="Hide a cause, as `cablebend explain` names them; repeatable.",
 )  # fmt: skip
 @click.option(

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0 .. 10 1/m, as in the paper's Table 1
+ONE_SIDED = frozenset(
+    {"hysteresis", "plastic_set", "relaxation", "bearing_friction", "bearing_stiffness", "rigid_ends", "rig_compliance"}
+)  # their sizes cannot be negative, as in the catalogue of causes
 WIDTH = 0.08  # standard deviation of a local kink or soft spot, in lengths: the 15 mm of a splice on a cable of 181 mm
 
 
@@ -96,7 +99,9 @@ def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
         effect = _effect(name)
         values = tuple(float(v) for v in np.atleast_1d(given))
         if effect.counts and len(values) not in effect.counts:
-            raise ValueError(f"{name} takes {' or '.join(map(str, effect.counts))} values ({effect.values})")
+            count = " or ".join(map(str, effect.counts))
+            noun = "value" if effect.counts == (1,) else "values, separated by commas"
+            raise ValueError(f"{name} takes {count} {noun} ({effect.values}); {len(values)} given")
         setup = effect.apply(setup, values)
     return setup
 
@@ -107,7 +112,7 @@ def parse_effect(text: str) -> tuple[str, Values]:
     Raises
     ------
     ValueError
-        If it cannot be read; the message names the nearest known name.
+        If it cannot be read, or no such value can be; the message names the nearest known name.
     """
     name, equals, rest = text.partition("=")
     effect = _effect(name.strip())
@@ -117,6 +122,10 @@ def parse_effect(text: str) -> tuple[str, Values]:
         raise ValueError(f"{text!r} is not NAME=VALUE: {effect.name} takes {effect.values}") from error
     if not equals:
         raise ValueError(f"{text!r} has no value: {effect.name} takes {effect.values}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{text!r} is no finite number: {effect.name} takes {effect.values}")
+    if effect.name in ONE_SIDED and min(values) < 0.0:
+        raise ValueError(f"{text!r} is negative, which {effect.name} cannot be: it takes {effect.values}")
     return effect.name, values
 
 

@@ -277,7 +277,10 @@ def test_effects_are_read_from_text() -> None:
         parse_effect("bearing_fricton=1")
     with pytest.raises(ValueError, match="N m"):
         parse_effect("bearing_friction=much")
-    with pytest.raises(ValueError, match="takes 2 values"):
+    for impossible, told in (("hysteresis=-0.002", "is negative"), ("bearing_stiffness=nan", "no finite number")):
+        with pytest.raises(ValueError, match=told):
+            parse_effect(impossible)
+    with pytest.raises(ValueError, match=r"takes 2 values, separated by commas .*; 1 given"):
         bend(replace(BASE, effects={"in_plane_load": 1.0}))
 
 

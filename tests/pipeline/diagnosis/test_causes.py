@@ -14,6 +14,7 @@ from pipeline.diagnosis.causes.profile import spot_between
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.observations.simulation import run
+from pipeline.simulate.effects import ONE_SIDED
 
 CONTRACT = {
     "nonlinear_stiffness", "pre_curvature_varying", "stiffness_varying", "hysteresis", "plastic_set", "relaxation",
@@ -42,6 +43,10 @@ def made(bench, name, amount, variant=0):
 
 def test_catalogue_is_the_contract_without_the_base_model():
     assert set(BY_NAME) == CONTRACT
+
+
+def test_signs_are_those_that_can_be_hidden():
+    assert {cause.name for cause in CATALOGUE if cause.sign} == ONE_SIDED
 
 
 @pytest.mark.parametrize("name", sorted(CONTRACT))
