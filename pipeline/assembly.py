@@ -89,7 +89,7 @@ def assemble(
     gathered = [
         *specimen.findings,
         *traces.findings,
-        *(finding for photo in traces.photos if isinstance(photo, Centerline) for finding in photo.findings),
+        *(finding for photo in traces.photos for finding in photo_findings(photo)),
         *parts.findings,
         *findings,
     ]
@@ -158,6 +158,13 @@ def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) 
         for step in specimen.steps
         if step.image is not None
     ]
+
+
+def photo_findings(photo: Centerline | Rejected) -> tuple[Finding, ...]:
+    """What was noticed on a photo; of a rejected one, that it is and why."""
+    if isinstance(photo, Centerline):
+        return tuple(photo.findings)
+    return (Finding(photo.code, "warning", f"{photo.image}: {photo.reason.removeprefix(f'{photo.image}: ')}"),)
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
