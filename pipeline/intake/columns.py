@@ -82,17 +82,17 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
         ``log/empty``, ``log/no-header``, ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
     """
     separators = (spec.separator,) if spec.separator else SEPARATORS
-    best: tuple[int, int, str, list[Row]] | None = None
-    for separator in separators:
-        rows = cells(text, separator)
-        if not rows:
+    heads = {separator: cells(text, separator, most=settings.header_search_lines) for separator in separators}
+    best: tuple[int, int, str] | None = None
+    for separator, head in heads.items():
+        if not head:
             raise InputError("is empty", path=path, code="log/empty", remedy="export the forces again")
-        for row in range(min(len(rows), settings.header_search_lines)):
-            found = len(_roles(rows[row][1], spec))
+        for row, (_, names) in enumerate(head):
+            found = len(_roles(names, spec))
             if found > (best[0] if best else 1):
-                best = found, row, separator, rows
+                best = found, row, separator
     if best is None:
-        rows = max((cells(text, separator) for separator in separators), key=lambda rows: len(rows[0][1]))
+        rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
         raise InputError(
             f"no line names a force column and a displacement column (first line: {column_names(rows)})",
             path=path,
@@ -100,7 +100,8 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
             code="log/no-header",
             remedy='name the columns in [force_log] of specimen.toml: columns = {force = "...", displacement = "..."}',
         )
-    _, row, separator, rows = best
+    _, row, separator = best
+    rows = cells(text, separator)
     return _columns(rows, row, separator, spec, path), rows
 
 

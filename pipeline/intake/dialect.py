@@ -23,6 +23,8 @@ SEPARATORS = ("\t", ";", ",")
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
+PLAIN = {".": re.compile(r"[+-]?\d+(?:\.\d+)?", re.ASCII), ",": re.compile(r"[+-]?\d+(?:,\d+)?", re.ASCII)}
+EXPONENT = re.compile("[eE]")
 INFINITE = ("inf", "-inf", "+inf", "infinity")
 SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
 MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
@@ -79,15 +81,17 @@ def _no_text(path: Path) -> InputError:
     )
 
 
-def cells(text: str, separator: str) -> list[Row]:
-    """Lines that are not blank, split into stripped cells.
+def cells(text: str, separator: str, *, most: int | None = None) -> list[Row]:
+    """Lines that are not blank, the first ``most`` of them or all, split into stripped cells.
 
     Line by line, so that a stray quotation mark cannot swallow the rest of the file.
     """
-    rows = []
+    rows: list[Row] = []
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip(" \t;,"):
             continue
+        if len(rows) == most:
+            break
         if '"' in line and len(line) < csv.field_size_limit():
             parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
         else:
@@ -151,6 +155,8 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
 
     Missing values (see `is_missing`) are not numbers: ask for them before.
     """
+    if PLAIN[decimal].fullmatch(cell):  # nearly every cell of a long log: nothing to smooth, nothing grouped
+        return float(cell.replace(",", "."))
     token = cell.translate(SMOOTH)
     if not _fits(POINT if decimal == "." else COMMA, token):
         return None
@@ -160,7 +166,7 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
 
 def decimals(cell: str, decimal: Decimal) -> int:
     """Digits behind the decimal sign: the resolution of the log."""
-    mantissa = re.split("[eE]", cell.translate(SMOOTH), maxsplit=1)
+    mantissa = EXPONENT.split(cell.translate(SMOOTH), maxsplit=1)
     shift = int(mantissa[1]) if len(mantissa) > 1 else 0
     return len(mantissa[0].partition(decimal)[2].strip()) - shift
 
