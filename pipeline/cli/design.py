@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from pipeline.diagnosis.plans.design import Design
 
 
+LEGEND = """\
+plausible       a size that would surprise nobody on such a rig; visible: whether it would show
+survives        share of the cause's trace that f_EI, K0, scale and length cannot take up
+nearest twin    the cause with the most similar trace; 1.00: no test of this plan tells the two apart
+taken apart by  what is not in the plan yet and separates it from that twin"""
+
+
 @click.command(short_help="What a planned test could see.")
 @click.option(
     "--length-mm", default=181.0, show_default=True, type=POSITIVE, help="Cable length between the bearing axes."
@@ -125,3 +132,4 @@ def echo_outlook(found: Design) -> None:
         )
         table.add_row(*map(Text, cells))
     Console(width=None if Console().is_terminal else 180).print(table)
+    click.echo(LEGEND)

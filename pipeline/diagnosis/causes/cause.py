@@ -57,6 +57,9 @@ class Variant:
 
 
 PLAIN = (Variant(),)
+UNLOADING = "unloading in the same steps"
+FORCE_FREE_PHOTO = "a photo of the force-free cable"
+"""What settles a cause by a branch of the test itself; see `Cause.settled_by`."""
 
 
 class Cause(Protocol):

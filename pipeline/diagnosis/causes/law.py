@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.causes.cause import UNLOADING, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
@@ -89,7 +89,7 @@ class Hysteresis:
         "them; plastic set does not close the loop when the force is gone."
     )
     remedy: str = "Measure loading and unloading; cycle a few times first; report both branches."
-    settled_by: str = "unloading in the same steps"
+    settled_by: str = UNLOADING
 
     def plausible(self, facts: Facts) -> float:
         """A tenth of the largest moment."""

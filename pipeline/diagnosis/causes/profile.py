@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ class PreCurvatureVarying:
         "turned end for end, the cable takes it along, the table does not."
     )
     remedy: str = "Photograph the force-free cable; straighten it, or cut a piece away from the kink."
-    settled_by: str = "a photo of the force-free cable"
+    settled_by: str = FORCE_FREE_PHOTO
 
     def plausible(self, facts: Facts) -> float:
         """A change of direction of a tenth of a radian over the cable."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, PLAIN, UNLOADING, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
@@ -41,7 +41,7 @@ class BearingFriction:
         "nothing to do. Loading alone cannot show it: it is then a shift of K0."
     )
     remedy: str = "Unload in the same steps; clean, oil or replace the bearings; tap the rig before each photo."
-    settled_by: str = "unloading in the same steps"
+    settled_by: str = UNLOADING
 
     def plausible(self, facts: Facts) -> float:
         """Three percent of the largest moment."""
@@ -181,7 +181,7 @@ class DisplacementOffset:
     sign_means: str = "positive: the cable is pushed further than the log says"
     apart: str = "The same at every step, whatever the force; a yielding rig loses in proportion to the force."
     remedy: str = "Use the photographed chord; zero the log on the force-free, mounted cable."
-    settled_by: str = "a photo of the mounted, force-free cable"
+    settled_by: str = FORCE_FREE_PHOTO
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the travel."""

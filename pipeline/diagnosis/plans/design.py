@@ -23,7 +23,7 @@ from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.diagnosis.plans.next_experiment import Protocol, protocols
+from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.statistics.score import sigma_needed
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
@@ -92,7 +92,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class CausePlan:
-    """What the planned test would show of one cause; ``separated_by`` takes its nearest twin off."""
+    """What the planned test would show of one cause; ``separated_by``, not planned yet, takes its nearest twin off."""
 
     name: str
     unit: str
@@ -266,7 +266,9 @@ def _cause_plan(
     if closeness[index] > settings.twin_cosine:
         freed = [(other[index, twin[index]], protocol.what) for protocol, other in others]
         better = [pair for pair in freed if pair[0] < settings.twin_cosine]
-        separated = min(better)[1] if better else cause.settled_by
+        pair = (cause, suspicion.causes[twin[index]])
+        settled = [each.settled_by for each in pair if still_open(each, bench)]
+        separated = min(better)[1] if better else next(iter(settled), "")
     return CausePlan(
         name=cause.name,
         unit=cause.unit,

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, UNLOADING, Cause
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
@@ -54,6 +55,15 @@ def protocols(facts: Facts) -> list[Protocol]:
     return found
 
 
+def still_open(cause: Cause, bench: Workbench) -> bool:
+    """Whether what settles a cause was not made yet: there is no use in asking for a branch that the test has."""
+    if cause.settled_by == UNLOADING:
+        return not bench.facts.returns
+    if cause.settled_by == FORCE_FREE_PHOTO:
+        return all(bench.facts.branch[photo.step] != "mounted" for photo in bench.observation.photos)
+    return True
+
+
 def next_experiment(
     bench: Workbench, probable: Explanation, rivals: Sequence[Explanation], settings: DiagnosisSettings
 ) -> NextExperiment | None:
@@ -72,7 +82,8 @@ def next_experiment(
             return NextExperiment(what=protocol.what, separates=names)
         if best is None or apart > best[0]:
             best = (apart, protocol)
-    outside = [causes[cause] for cause in differing if causes[cause].seat != "cable"]
+    rivals_outside = (causes[cause] for cause in differing if causes[cause].seat != "cable")
+    outside = [cause for cause in rivals_outside if still_open(cause, bench)]
     if outside:
         return NextExperiment(what=f"{outside[0].settled_by} ({outside[0].name})", separates=names)
     assert best is not None

@@ -96,7 +96,9 @@ def what_next(
     if len(confused) > 1:
         return next_experiment(bench, confused[0], confused[1:], settings)
     if unexplained:
-        return NextExperiment(what="repeat the test with the cable turned end for end, and unload", separates=[])
+        turned = "turn the cable end for end and repeat the test"
+        unload = "repeat the test with the cable turned end for end, and unload"
+        return NextExperiment(what=turned if bench.facts.returns else unload, separates=[])
     if not bench.facts.returns:
         return NextExperiment(
             what="unload in the same steps, with photos", separates=["bearing_friction", "hysteresis", "plastic_set"]

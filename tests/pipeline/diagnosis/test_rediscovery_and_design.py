@@ -27,6 +27,7 @@ def plans():
     return {
         "loading": design(plan),
         "both ways": design(replace(plan, unload=True)),
+        "forces alone": design(replace(plan, photos=False)),
         "coarse": design(replace(plan, px_per_mm=5.5)),
     }
 
@@ -41,6 +42,16 @@ def test_friction_needs_the_way_back(plans):
         assert after.minimal_detectable < 0.2 * before.minimal_detectable
         assert after.surviving_fraction > 4.0 * before.surviving_fraction
     assert row(plans["loading"], "hysteresis").separated_by == "unload in the same steps, with photos"
+
+
+def test_nothing_is_asked_for_that_is_in_the_plan(plans):
+    """Both plans have the force-free photo, one has the way back."""
+    for name, made in (("loading", ["force-free cable"]), ("both ways", ["force-free cable", "unload"])):
+        asked = [cause.separated_by for cause in plans[name].causes if "after the test" not in cause.separated_by]
+        assert not [text for text in asked for what in made if what in text]
+    assert any(cause.separated_by == "a photo of the force-free cable" for cause in plans["forces alone"].causes)
+    assert row(plans["loading"], "pre_curvature_varying").nearest_twin == "in_plane_load"
+    assert row(plans["loading"], "pre_curvature_varying").separated_by == "a spirit level on the table"
 
 
 def test_force_gain_is_invisible_under_every_plan(plans):
