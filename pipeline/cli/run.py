@@ -75,7 +75,7 @@ def run(
 def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
-    from pipeline.intake.folder import find_specimens, find_undescribed
+    from pipeline.intake.folder import find_specimens, find_undescribed, misnamed
 
     specimens: dict[Path, None] = {}
     refused = []
@@ -86,7 +86,13 @@ def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[In
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
     for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
-        told = f"has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`"
+        other = misnamed(folder)
+        if other is None:
+            told = f"has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`"
+        elif folder in folders:
+            continue  # said above
+        else:
+            told = f"holds {other}, but no specimen.toml; write its name in small letters"
         click.echo(f"cablebend: {folder}: {told}.", err=True)
     return list(specimens), refused
 

@@ -43,6 +43,14 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
             )
         here = [folder for folder in _search(path, (), settings.search_depth) if os.path.lexists(folder / NAME)]
         if not here:
+            other = misnamed(path)
+            if other is not None:
+                raise InputError(
+                    f"holds {other}, but no {NAME}",
+                    path=path,
+                    code="folder/no-specimen",
+                    remedy=f"write its name in small letters: {NAME}",
+                )
             raise InputError(
                 f"holds no {NAME}, neither itself nor in its folders",
                 path=path,
@@ -51,6 +59,14 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
             )
         found.update(dict.fromkeys(here))
     return list(found)
+
+
+def misnamed(folder: Path) -> str | None:
+    """The file of a folder that differs from ``specimen.toml`` by capitals only; not every system takes it for that."""
+    try:
+        return next((e.name for e in folder.iterdir() if e.name != NAME and e.name.casefold() == NAME), None)
+    except OSError:
+        return None
 
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:

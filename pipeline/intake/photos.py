@@ -79,6 +79,10 @@ def no_photos(
     if other:
         told = f"{told}, only pictures of other kinds: {_some(other)}"
         remedy = "convert them to png or jpg at full size"
+    elsewhere = [entry for entry in _entries(folder) if any(map(_is_photo, _entries(folder / entry)))]
+    aside = [entry for entry in elsewhere if entry.casefold() not in FOLDERS]
+    if aside:
+        remedy = f"move the photos from {_some(aside)} into its folder images"
     return InputError(told, path=folder, code="folder/no-photos", remedy=remedy)
 
 

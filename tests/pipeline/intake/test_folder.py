@@ -259,3 +259,17 @@ def test_a_folder_somebody_forgot_to_describe_is_noticed(specimen_folder, tmp_pa
     (forgotten.path / "specimen.toml").unlink()
     assert find_specimens([tmp_path / "batch"], SETTINGS) == [tmp_path / "batch/described"]
     assert find_undescribed([tmp_path / "batch"], SETTINGS) == [forgotten.path]
+
+
+def test_a_description_in_capitals_is_told_as_such(specimen_folder, tmp_path):
+    folder = specimen_folder(name="cable")
+    (folder.path / "specimen.toml").rename(folder.path / "Specimen.TOML")
+    with pytest.raises(InputError, match=r"holds Specimen\.TOML, but no specimen\.toml; write its name in small"):
+        find_specimens([tmp_path / "cable"], SETTINGS)
+
+
+def test_photos_in_a_folder_that_is_not_searched_are_told_with_its_name(specimen_folder):
+    folder = specimen_folder(name="cable")
+    (folder.path / "images").rename(folder.path / "pictures of May")
+    with pytest.raises(InputError, match=r"move the photos from pictures of May into its folder images"):
+        read_specimen(folder.path, SETTINGS)
