@@ -140,8 +140,8 @@ class LensDistortion:
     limited: bool = True
     seat: str = "camera"
     needs: str = "the cable away from the centre of the picture"
-    summary: str = "The lens magnifies the rim of the picture otherwise than its centre (barrel or cushion)."
-    sign_means: str = "positive: cushion, the rim is shown too far out; negative: barrel"
+    summary: str = "The lens magnifies the rim of the picture more or less than its centre (pincushion or barrel)."
+    sign_means: str = "positive: pincushion, the rim is shown too far out; negative: barrel"
     apart: str = (
         "It bends straight lines, most near the rim: the ends of the cable and the bow change against the middle. "
         "camera_tilt is one-sided, scale_error uniform."
@@ -182,8 +182,10 @@ class CameraTilt:
     limited: bool = True
     seat: str = "camera"
     needs: str = "photos of different chords, or the cable's length"
-    summary: str = "The camera looks askew, so the scale changes across the picture."
-    sign_means: str = "positive: the scale falls toward the moved-to side (along x) or toward the bow (along y)"
+    summary: str = "The camera does not look straight down, so the scale changes across the picture."
+    sign_means: str = (
+        "positive: the scale falls toward the right bearing (along the chord) or toward the bow (across it)"
+    )
     apart: str = (
         "It makes one side of the picture larger than the other: left against right half, or bow against chord. "
         "A cable turned end for end keeps a tilt's trace and reverses that of a varying pre-curvature."

@@ -32,7 +32,7 @@ class NonlinearStiffness:
     summary: str = "The bending stiffness depends on curvature, or does so in another form than the spline allows."
     sign_means: str = "positive: stiffer at the named curvature than the spline between its control points"
     apart: str = "The same law then holds for every photo, both halves and both branches; no other cause keeps to that."
-    remedy: str = "None is needed: give the characteristic more control points, or bend in smaller steps."
+    remedy: str = "Nothing to mend: give the characteristic more control points, or bend in smaller steps."
     settled_by: str = "more displacement steps"
 
     def plausible(self, facts: Facts) -> float:

@@ -247,7 +247,7 @@ class InPlaneLoad:
     summary: str = "A load acts along the cable in the plane of the test: its weight on a tilted table, or a draught."
     sign_means: str = "positive: toward the right bearing (along) or toward the bow (across)"
     apart: str = (
-        "It loses weight against the bending moments as the force grows; a varying pre-curvature or stiffness goes "
+        "It matters less the larger the force; a varying pre-curvature or stiffness goes "
         "with the cable when that is turned end for end, a tilted table does not."
     )
     remedy: str = "Level the table; turn the cable end for end to check."
