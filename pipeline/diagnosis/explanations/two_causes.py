@@ -95,7 +95,7 @@ def second_cause(
     limit = scored(bench.test, bench.observation, best.fitted, second, settings).limit
     least = max(limit**2, settings.pair_share * best.gain)
     # forms of a cause that act together, and amounts far from linear, score less than they remove
-    settled = best.fitted.chi2 < settings.fits * len(best.fitted.residual)
+    settled = best.fitted.reduced_chi2 < settings.fits
     announced = least if settled else limit**2
     linear = _linear_pairs(bench, settings)
     beyond = linear[0].gain - max(best.gain, bench.largest**2) if linear else 0.0
@@ -109,7 +109,11 @@ def second_cause(
         beside_law = [c for c in pair.causes if suspicion.causes[c].name != "nonlinear_stiffness"]
         known = len(beside_law) != 1 or beside_law[0] in named
         possible = pair.impossible(suspicion.causes, settings.impossible) is None
-        return known and possible and _both_needed(pair, singles, suspicion, least, significant=limit**2)
+        # a loud cause of not quite the right form leaves some of its trace, but two that leave the noise where none
+        # alone does are both needed, however loud the first is
+        whole = not settled and pair.fitted.reduced_chi2 < settings.fits
+        enough = limit**2 if whole else least
+        return known and possible and _both_needed(pair, singles, suspicion, enough, significant=limit**2)
 
     accepted = [pair for pair in found if acceptable(pair)]
     accepted += [pair for pair in _exchanged(bench, accepted, settings, effort) if acceptable(pair)]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import THREE, Protocol, Reading, hidden_test
+from fixtures.hidden import LOOP, THREE, Protocol, Reading, hidden_test
+from fixtures.memory import Slipping
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations import two_causes
@@ -117,6 +118,17 @@ def test_each_half_of_a_pair_has_all_its_forms():
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SETTINGS.shape_gain
     amount, std = whole.amount(CATALOGUE[lens])
     assert abs(amount - 0.012) < 4.0 * std
+
+
+def test_a_weak_cause_beside_one_fifty_times_as_loud_is_needed_where_only_both_leave_the_noise():
+    """Friction of 7.7 mN m between the wires and a scale 0.8 % wrong: the second removes 2 % of what the first does."""
+    amount = 0.0077
+    cable = Cable(memory=Slipping((amount / 3.0, 2.0 * amount / 9.0), (1.0, 3.0)))  # slips at 1 and at 3 1/m
+    test = hidden_test(cable, LOOP, largest=0.0138, seed=4, reading=Reading(scale_error=0.008))
+    part, _ = diagnose(test, None, SETTINGS)
+    assert part.verdict == "two_causes" and {cause.name for cause in part.causes} == {"hysteresis", "scale_error"}
+    scale = next(cause for cause in part.causes if cause.name == "scale_error")
+    assert abs(scale.estimate - 0.008) < 4.0 * scale.std
 
 
 @pytest.mark.parametrize(("gain", "tried"), [(50.0, True), (15.0, False)])
