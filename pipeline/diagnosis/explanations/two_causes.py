@@ -263,9 +263,7 @@ def _exchanged(
     every, done = list(found), set[frozenset[int]]()
     for _ in range(EXCHANGES):
         best = max(every, key=_worth, default=None)
-        if best is None or effort.spent:
-            break
-        if frozenset(best.causes) in done:
+        if best is None or effort.spent or frozenset(best.causes) in done:
             break
         done.add(frozenset(best.causes))
         if not best.fitted.converged:
