@@ -149,8 +149,8 @@ def difference_hints(
     reading = np.interp(grid, inverse.kappa, inverse.secant / inverse.tangent) - 1.0
     stretch = first.onto(grid) @ inverse.gains["scale", -1] - second.onto(grid) @ balance.gains["scale", -1]
     hints = [
-        f"reading one curve as a secant and the other as a tangent would make {np.abs(reading).max():.0%}",
-        f"a scale wrong by 1 % would make {0.01 / test.scale_std * np.abs(stretch).max():.1%}",
+        f"reading one curve as a secant and the other as a tangent would make {100.0 * np.abs(reading).max():.0f} %",
+        f"a scale wrong by 1 % would make {1.0 / test.scale_std * np.abs(stretch).max():.1f} %",
         f"a pre-curvature that varies along the cable: the halves differ by {abs(halves_z):.1f} standard deviations",
     ]
     zeros = [s.chord + s.displacement for s in test.steps if s.chord is not None and s.displacement is not None]

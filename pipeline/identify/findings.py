@@ -89,7 +89,7 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
             )
             return
         slope = -np.polyfit(moved, chord, 1)[0]
-        approach = f"on the photos the bearings approach by {slope:.1%} of what the log says"
+        approach = f"on the photos the bearings approach by {100.0 * slope:.1f} % of what the log says"
         if slope < 0.0:
             approach = (
                 "on the photos the bearings move apart where the log pushes them together: is their order reversed?"
@@ -178,6 +178,6 @@ def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[
         yield Finding(
             "identify/agreement",
             "warning",
-            f"inverse and balance differ by {agreement.rms_relative:.1%} rms, more than their joint uncertainty "
-            f"({p_value(agreement.p_value)}); " + "; ".join(agreement.hints),
+            f"inverse and balance differ by {100.0 * agreement.rms_relative:.1f} % rms, more than their joint "
+            f"uncertainty ({p_value(agreement.p_value)}); " + "; ".join(agreement.hints),
         )

@@ -252,7 +252,9 @@ def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> It
         message = f"{name}: the force changes while a step is held; it was taken at the moment of the photo"
         yield inferred("log/trend", f"{message}, from a trend of degree {fitted.degree} in time")
     if fitted.source != FROM_SAMPLES:
-        share = f"{settings.force_std_relative:.1%} of the largest force, {quantity(float(fitted.std[0]), 'N')}"
+        share = (
+            f"{100.0 * settings.force_std_relative:.1f} % of the largest force, {quantity(float(fitted.std[0]), 'N')}"
+        )
         yield inferred("log/force-std", f"{name}: no repeated samples; standard deviation of a force taken as {share}")
 
 

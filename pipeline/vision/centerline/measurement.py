@@ -111,8 +111,9 @@ def _refusal(
         return rejected(
             "photo/outline",
             f"the cable's outline is no pair of smooth edges: the picture beside them is off by"
-            f" {sections.noise / sections.contrast:.0%} of their contrast, though its pixels are quiet, and the width"
-            f" varies by {scatter:.0%}; twisted pairs, bare strands and a sheath or ground of strong pattern do that",
+            f" {100.0 * sections.noise / sections.contrast:.0f} % of their contrast, though its pixels are quiet, and"
+            f" the width varies by {100.0 * scatter:.0f} %; twisted pairs, bare strands and a sheath or ground of"
+            " strong pattern do that",
         )
     if ratio < needed:
         return rejected(
@@ -129,16 +130,17 @@ def _refusal(
     if diameter is not None and abs(middle / diameter - 1.0) > options.max_width_error:
         return rejected(
             "photo/width",
-            f"what was traced is {middle / diameter:.0%} as wide as the cable: the cable is split"
+            f"what was traced is {100.0 * middle / diameter:.0f} % as wide as the cable: the cable is split"
             " along a highlight or shadow, or scale or diameter are wrong",
         )
     if scatter > options.max_width_scatter:
         return rejected(
-            "photo/width", f"the width of what was traced varies by {scatter:.0%} along it; a cable's does not"
+            "photo/width",
+            f"the width of what was traced varies by {100.0 * scatter:.0f} % along it; a cable's does not",
         )
     if sections.share < options.min_measured_share:
         return rejected(
-            "photo/contrast", f"both edges of the cable were found on {sections.share:.0%} of its length only"
+            "photo/contrast", f"both edges of the cable were found on {100.0 * sections.share:.0f} % of its length only"
         )
     return None
 

@@ -155,6 +155,6 @@ def _lost(rough: RoughCable, share: float) -> Rejected:
     return Rejected(
         rough.image,
         "photo/contrast",
-        f"both edges of the cable were found on {share:.0%} of its length only",
+        f"both edges of the cable were found on {100.0 * share:.0f} % of its length only",
         figure={"measured_share": share},
     )

@@ -120,7 +120,7 @@ def test_chord_against_displacement(measured, settings):
     short = with_steps(measured, lambda s: replace(s, displacement=1.02 * s.displacement))
     (finding,) = chord_findings(short, settings)
     assert finding.code == "identify/chord-displacement"
-    assert "97.9%" in finding.message or "98.0%" in finding.message  # 1 / 1.02 but for the photos' noise
+    assert "97.9 %" in finding.message or "98.0 %" in finding.message  # 1 / 1.02 but for the photos' noise
 
 
 def test_photos_in_reverse_order_are_asked_about(measured, settings):
