@@ -29,6 +29,7 @@ from pipeline.result import (
     Result,
     ScalePart,
     SpecimenPart,
+    leading,
 )
 from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
@@ -93,9 +94,10 @@ def assemble(
         *parts.findings,
         *findings,
     ]
+    told = [FindingPart(code=f.code, level=f.level, message=f.message) for f in unique(gathered)]
     return Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
-        headline=headline(parts, diagnosis, photos),
+        headline=headline(parts, diagnosis, photos, leading(told)),
         specimen=SpecimenPart(
             id=specimen.id,
             length_m=specimen.length_m,
@@ -116,16 +118,21 @@ def assemble(
         balance=parts.balance,
         agreement=parts.agreement,
         diagnosis=diagnosis,
-        findings=[FindingPart(code=f.code, level=f.level, message=f.message) for f in unique(gathered)],
+        findings=told,
         provenance=provenance(specimen, settings, command),
     )
 
 
-def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos: Sequence[PhotoPart]) -> str:
+def headline(
+    parts: IdentificationParts,
+    diagnosis: DiagnosisPart | None,
+    photos: Sequence[PhotoPart],
+    fault: FindingPart | None = None,
+) -> str:
     """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
 
     Where the diagnosis extended the model, what the extended model gives is the answer, unless the data refute it;
-    where no photo could be used, why the first was not.
+    where no photo could be used, why the first was not. A fault of the data comes before all that.
     """
     way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
     extended = None if diagnosis is None or refuted(diagnosis) else visited("extended", diagnosis.extended)
@@ -139,6 +146,7 @@ def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos
         for kappa, f, std in ((curve.kappa[i], curve.tangent[i], curve.tangent_std[i]) for i in (0, -1))
     )
     name = name if extended is None else "extended model"
+    lead = "" if fault is None else f"{fault.message[:1].upper()}{fault.message[1:].rstrip('.')}. "
     start = rounded(*((way.pre_curvature_per_m, way.pre_curvature_std_per_m) if extended is None else extended.rest()))
     answer = f"By the {name}, f_EI (tangent) goes from {low} to {high}; pre-curvature {start} 1/m"
     agrees = parts.agreement.compatible
@@ -147,7 +155,7 @@ def headline(parts: IdentificationParts, diagnosis: DiagnosisPart | None, photos
         answer += f"; both ways {'agree' if agrees else 'disagree beyond their bands'} ({share})"
     if diagnosis is not None:
         answer += f". {diagnosis.headline}"
-    return answer if answer.endswith(".") else f"{answer}."
+    return lead + (answer if answer.endswith(".") else f"{answer}.")
 
 
 def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import Result, leading
 from pipeline.settings import ReportSettings
 from pipeline.visited import best, pre_curvature, trusted
 
@@ -52,6 +52,8 @@ def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
     diagnosis = result.diagnosis
     if result.status == "failed":
         verdict, tone = words("status_failed"), "bad"
+    elif leading(result.findings) is not None:
+        verdict, tone = words("verdict_fault"), "bad"
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
     else:
@@ -160,9 +162,12 @@ def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str,
 
 
 def _advice(result: Result, words: Words) -> str:
-    """The next experiment, else the warnings, else nothing."""
+    """What to put right in the data, else the next experiment, else the warnings, else nothing."""
     if result.status == "failed":
         return words("next_refused" if _refused(result) else "next_failed")
+    fault = leading(result.findings)
+    if fault is not None:
+        return words.said(fault.message).sentence
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

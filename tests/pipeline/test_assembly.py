@@ -1,10 +1,16 @@
 """What the stages saw is gathered into a result: nothing that cost a photo is missing among the findings."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from pipeline.assembly import photo_findings
+from pipeline.assembly import headline, photo_findings
 from pipeline.records import Finding, Rejected
+from pipeline.report.answer import answer
 from pipeline.report.words import Words
+from pipeline.result import FindingPart, leading
+from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_result import measured_result
 
 ENDS = "the file ends before the picture does; copy it again"
 
@@ -14,3 +20,35 @@ def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name_once(reaso
     found = photo_findings(Rejected("images/b.png", "photo/truncated", reason))
     assert found == (Finding("photo/truncated", "warning", f"images/b.png: {ENDS}"),)
     assert Words("de").said(found[0].message).language == "de"
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return measured_result()
+
+
+UNIT = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
+
+
+@pytest.mark.parametrize(
+    ("code", "level", "leads"),
+    [
+        ("size/force", "error", True),
+        ("size/force", "warning", True),  # the scale of f_EI: no misfit would tell of it
+        ("force/gain", "error", True),
+        ("force/outlier", "warning", False),
+        ("identify/inverse-no-start", "error", False),  # said where the numbers would be
+    ],
+)
+def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads):
+    fault = FindingPart(code=code, level=level, message="the log is wrong")
+    assert (leading([fault]) is not None) == leads
+    told = answer(measured.model_copy(update={"findings": [fault]}), Words("en"), ReportSettings())
+    assert (told.advice == "The log is wrong") == leads and (told.tone == "bad") == leads
+
+
+def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
+    parts = SimpleNamespace(inverse=measured.inverse, balance=measured.balance, agreement=measured.agreement)
+    plain, led = headline(parts, None, []), headline(parts, None, [], UNIT)
+    assert led == f"The forces seem to be 1000 times too large. {plain}"
+    assert Words("de").said(led).language == "de"

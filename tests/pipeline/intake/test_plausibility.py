@@ -39,6 +39,39 @@ def test_force_off_by_a_thousand(length, diameter, force, factor):
     assert codes(length, diameter, factor * force, 0.07 * length) == ["size/force"]
 
 
+def found_for(EI, diameter):
+    """Findings of a cable of bending stiffness EI / (N m²) that is bent by a tenth of its length."""
+    force = 1.1 * np.pi**2 * EI / 0.181**2
+    return size_findings(0.181, diameter, steps(force, 0.018), settings=SETTINGS)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e-3, 1e3])
+def test_what_no_bar_of_steel_and_no_loose_wire_has_is_an_error(factor):
+    """A cable of 18 mN m² and 4.6 mm, as it is and with its forces a thousand times too large or small."""
+    found = found_for(0.012 * factor, 4.6e-3)
+    levels = {1.0: [], 1e-3: ["warning"], 1e3: ["error"]}[factor]  # 0.5 MPa: hardly a cable, but some soft cord
+    assert [finding.level for finding in found] == levels
+    if factor == 1e3:
+        assert "1000 times too large (mN taken for N, or N for kN)" in found[0].message
+        assert "steel" in found[0].message
+    if factor == 1e-3:
+        assert "1000 times too small (kN taken for N, or N for mN)" in found[0].message
+
+
+@pytest.mark.parametrize(("factor", "said"), [(101.97, "grams taken for N"), (1e6, "do not fit"), (1e-6, "loose")])
+def test_other_units_of_force(factor, said):
+    (finding,) = found_for(0.02 * factor, 4.6e-3)
+    assert finding.code == "size/force" and said in finding.message
+
+
+@pytest.mark.parametrize("diameter", [2e-3, 3e-3, 5e-3, 8e-3, 15e-3, 30e-3])
+@pytest.mark.parametrize("EI", [1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
+def test_no_cable_is_called_impossible(EI, diameter):
+    """All but those below 5 kPa, softer than a gel: 30 mm thick, 0.1 mN m² is no cable."""
+    modulus = EI / (np.pi * diameter**4 / 64.0)
+    assert modulus < 5e3 or not [finding for finding in found_for(EI, diameter) if finding.level == "error"]
+
+
 def test_the_figures_are_right():
     (finding,) = size_findings(0.2, 5e-3, steps(1000.0, 0.012), settings=SETTINGS)
     EI = float(re.search(r"pi\^2 = ([\d.]+)\u00a0N m²", finding.message)[1])
