@@ -198,7 +198,8 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
             "die Zelle berichtigen oder die Zeile entfernen.",
         ),
         (
-            "force.csv: no repeated samples; standard deviation of a force taken as 0.5 % of the largest force, 0.002 N",
+            "force.csv: no repeated samples; standard deviation of a force taken as 0.5 % of the largest force, "
+            "0.002 N",
             "force.csv: keine wiederholten Messwerte; als Standardabweichung einer Kraft gilt 0,5 % der größten Kraft, "
             "0,002 N",
         ),
