@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fixtures.photographed.renderer import photograph, random_look
 from pipeline.records import Centerline
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.measurement import measure_centerline
@@ -29,7 +30,6 @@ from tests.pipeline.vision.bow_scene import (
     rms,
     traced_errors,
 )
-from tests.pipeline.vision.second_renderer import photograph, random_look
 
 SCENES, SECOND = 50, 20
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from fixtures.photographed.renderer import photograph, random_look
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
@@ -20,7 +21,6 @@ from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.candidates import Reading, branches
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.segmentation import find_cable
-from tests.pipeline.vision.second_renderer import photograph, random_look
 
 SETTINGS = VisionSettings()
 SCALE = 5_500.0
