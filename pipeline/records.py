@@ -151,6 +151,7 @@ class Centerline:
     u_px, v_px : (n,) px
         The same points on the photo as displayed.
     kappa_std : (n,) 1/m
+        With what scale, tilt and lens leave open once the series is measured; ``shape`` holds the photo's own errors.
     position_std : (n,) m
         Along the normal.
     chord_m, chord_std_m : m

@@ -80,7 +80,7 @@ INSIDE = {
         ("picture_size",),
         ("series",),
     ],
-    "pipeline.vision.scale": [("plane",), ("calibration", "chord", "corners", "plane_fit"), ("board",)],
+    "pipeline.vision.scale": [("plane",), ("calibration", "chord", "corners", "plane_fit"), ("board", "doubt")],
     "pipeline.vision.search": [
         ("flanks", "strips", "backdrop"),
         ("crosscut",),

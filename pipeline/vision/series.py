@@ -35,6 +35,7 @@ from pipeline.vision.scale.calibration import (
     from_found,
     from_number,
 )
+from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
 from pipeline.vision.shots import Shot, find_cables, guarded, with_fixed_cover
@@ -101,6 +102,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     lines = without_lay(lines, specimen.diameter_m, settings.curve)
     lines, bow_findings = on_one_side(lines, specimen.diameter_m, settings.series)
+    lines = tuple(with_doubt_of_plane(line, calibration) if isinstance(line, Centerline) else line for line in lines)
     found, displacements = _told_by(shots, lines)
     findings = (
         *calibration.findings,

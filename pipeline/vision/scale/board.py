@@ -58,9 +58,11 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
             code="calibration/no-board",
             remedy="show the whole board from above, lying in the plane of the cable",
         ) from error
-    plane, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)
+    raised, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)
+    plane = _magnified(fit.plane, raised)
     middle = 0.5 * np.array([views[0].size], float)
-    std = float(np.sqrt(fit.scale_std**2 + stage.board_std**2 + height_std**2))
+    uniform = float(np.hypot(stage.board_std, height_std))
+    std = float(np.hypot(fit.scale_std, uniform))
     scale = Scale(float(plane.local_scale(middle)[0]), std, f"board photos ({len(views)}), {fit.lens_source}")
     if fit.rms_px > stage.max_board_rms_px:
         text = f"The board's corners lie {fit.rms_px:.2f} px rms off the fitted plane; is it flat and the photo sharp?"
@@ -71,7 +73,8 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
             "the middle, and curvature to about half of that. Show a board that fills the picture."
         )
         findings.append(Finding("calibration/border", "warning", text))
-    return Calibration(plane, scale, (*findings, *height_findings))
+    aside = tuple(_magnified(other, raised) for other in fit.aside)
+    return Calibration(plane, scale, (*findings, *height_findings), uniform, aside)
 
 
 def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[list[BoardView], list[Finding]]:
@@ -177,10 +180,14 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | Non
     return best
 
 
+def _magnified(plane: PlaneMap, factor: float) -> PlaneMap:
+    return PlaneMap(np.diag([factor, factor, 1.0]) @ plane.homography, plane.lens)
+
+
 def _raise_to_axis(
     fit: PlaneFit, distance_m: float | None, diameter_m: float, settings: CalibrationSettings
-) -> tuple[PlaneMap, float, tuple[Finding, ...]]:
-    """From the board's surface to the plane of the cable axis, half a diameter above."""
+) -> tuple[float, float, tuple[Finding, ...]]:
+    """Lengths in the plane of the cable axis, half a diameter above the board's surface, over those seen on that."""
     height = 0.5 * diameter_m
     distance = distance_m if distance_m is not None else fit.distance_m
     if distance is None:
@@ -189,8 +196,6 @@ def _raise_to_axis(
             f"The cable axis lies {1e3 * height:.1f} mm above the board and the camera's distance is unknown; "
             f"up to {100 * std:.1f} % of scale are counted as uncertainty. Give distance_mm in [camera]."
         )
-        return fit.plane, std, (Finding("calibration/height", "info", text),)
-    factor = 1.0 - height / distance
-    homography = np.diag([factor, factor, 1.0]) @ fit.plane.homography
+        return 1.0, std, (Finding("calibration/height", "info", text),)
     # the board's thickness and the user's reading of the distance are known to about a third of the height
-    return PlaneMap(homography, fit.plane.lens), height / distance / 3.0, ()
+    return 1.0 - height / distance, height / distance / 3.0, ()

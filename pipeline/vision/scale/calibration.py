@@ -25,17 +25,31 @@ _LENGTH = "length of the cable on the photos"
 
 @dataclass(frozen=True)
 class Calibration:
-    """Map from photo pixels to the plane of the cable axis, and what is known about its scale."""
+    """Map from photo pixels to the plane of the cable axis, and what is known about its scale.
+
+    Attributes
+    ----------
+    plane : PlaneMap
+    scale : Scale
+        In the middle of the picture; its standard deviation is all of it.
+    findings : tuple of Finding
+    uniform_std : relative
+        Part of that standard deviation which is the same everywhere: what ``aside`` does not hold.
+    aside : tuple of PlaneMap
+        Maps one standard deviation away along each principal direction of a fitted plane's covariance.
+    """
 
     plane: PlaneMap
     scale: Scale
     findings: tuple[Finding, ...] = ()
+    uniform_std: float = 0.0
+    aside: tuple[PlaneMap, ...] = ()
 
 
 def from_number(px_per_m: float, settings: CalibrationSettings) -> Calibration:
     """Scale as given in specimen.toml."""
     scale = Scale(px_per_m, settings.given_scale_std, "number given in specimen.toml")
-    return Calibration(PlaneMap.from_scale(px_per_m), scale)
+    return Calibration(PlaneMap.from_scale(px_per_m), scale, uniform_std=scale.std_relative)
 
 
 def from_found(
@@ -73,7 +87,7 @@ def from_found(
         )
     message = f"No scale is given; {scale.px_per_m / 1e3:.4g} px/mm follow from the {scale.source}."
     finding = Finding("scale/source", "info", message)
-    return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,))
+    return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,), scale.std_relative)
 
 
 def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: CalibrationSettings) -> float:

@@ -47,6 +47,8 @@ class PlaneFit:
     distance_m : float or None
         Of the camera, if the photos tell.
     lens_source : str
+    aside : tuple of PlaneMap
+        Maps one standard deviation away along each principal direction of the fit's covariance.
     """
 
     plane: PlaneMap
@@ -55,6 +57,7 @@ class PlaneFit:
     border_std: float
     distance_m: float | None
     lens_source: str
+    aside: tuple[PlaneMap, ...]
 
 
 def fit_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
@@ -74,7 +77,8 @@ def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> P
     fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), settings.usual_lens, settings)
     homography, lens = _plane_parts(fit.x, middle, radius)
     source = f"lens k1 = {fit.x[0]:+.4f} ± {np.sqrt(fit.covariance[0, 0]):.4f} at half the diagonal"
-    return PlaneFit(PlaneMap(homography, lens), fit.rms, *_scale_stds(fit, middle, radius), None, source)
+    aside = tuple(PlaneMap(*_plane_parts(fit.x + step, middle, radius)) for step in _steps_aside(fit))
+    return PlaneFit(PlaneMap(homography, lens), fit.rms, *_scale_stds(fit, middle, radius), None, source, aside)
 
 
 def _picture(view: BoardView) -> tuple[Array, float]:
@@ -108,6 +112,17 @@ def _scale_stds(fit: _Solution, middle: Array, radius: float) -> tuple[float, fl
     change = slopes[:, 1:] - slopes[:, :1]
     variance = np.mean(np.einsum("ij,ik,kj->j", change, fit.covariance, change))
     return float(np.sqrt(slopes[:, 0] @ fit.covariance @ slopes[:, 0])), float(np.sqrt(variance))
+
+
+def _steps_aside(fit: _Solution) -> Array:
+    """Steps ``(9, n)`` of the parameters along the principal directions of the covariance of lens and homography.
+
+    The other photos' own moves stay: they say nothing about the plane of the first.
+    """
+    values, vectors = np.linalg.eigh(fit.covariance[:9, :9])
+    steps = np.zeros((9, len(fit.x)))
+    steps[:, :9] = (vectors * np.sqrt(np.maximum(values, 0.0))).T * fit.unit[:9]
+    return steps
 
 
 @dataclass(frozen=True)
@@ -216,4 +231,20 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
     # OpenCV counts distances, here as above coordinates.
     source = f"lens from {len(views)} photos"
-    return PlaneFit(plane, float(rms) / np.sqrt(2.0), *_scale_stds(fit, middle, radius), distance, source)
+    aside = _aside_of(plane, fit, middle, radius)
+    return PlaneFit(plane, float(rms) / np.sqrt(2.0), *_scale_stds(fit, middle, radius), distance, source, aside)
+
+
+def _aside_of(plane: PlaneMap, fit: _Solution, middle: Array, radius: float) -> tuple[PlaneMap, ...]:
+    """The plane with a lens of its own, moved as `_steps_aside` moves a fit of corners without their distortion."""
+    if plane.lens is None:
+        return ()
+    # k1 counts from half the diagonal in the fit, from the focal length in the lens
+    share = (float(plane.lens.camera[0, 0]) / radius) ** 2
+    back = np.linalg.inv(_plane_parts(fit.x, middle, radius)[0]) @ plane.homography
+    aside = []
+    for step in _steps_aside(fit):
+        bent = plane.lens.distortion + np.r_[step[0] * share, np.zeros(4)]
+        moved = _plane_parts(fit.x + step, middle, radius)[0]
+        aside.append(PlaneMap(moved @ back, Lens(plane.lens.camera, bent)))
+    return tuple(aside)
