@@ -279,6 +279,14 @@ class ResidualMap(Part):
     data: dict[str, int] = Field({}, description="number of data by kind")
 
 
+class ForceCorrectionPart(Part):
+    """Forces of some steps that were wrong together: shown = factor * force + offset; a finding says why."""
+
+    steps: list[int]
+    factor: float
+    offset_N: float
+
+
 class DiagnosisPart(Part):
     """What the simulation gets wrong, and why."""
 
@@ -299,6 +307,7 @@ class DiagnosisPart(Part):
     twins: dict[str, dict[str, float]] = Field({}, description="cosines of confusable causes")
     left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
     left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
+    corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")
 
 
 class FindingPart(Part):

@@ -7,10 +7,11 @@ beside ``result.json``. A bad file of the user raises `InputError`; nature's ref
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.assembly import assemble
-from pipeline.diagnosis import diagnose
+from pipeline.diagnosis import diagnose, with_corrected_forces
 from pipeline.identify import Identification, identify, identify_without
 from pipeline.intake.folder import read_specimen
 from pipeline.records import Finding
@@ -47,10 +48,16 @@ def measure(folder: Path | str, settings: Settings | None = None, *, command: st
     traces = trace_series(specimen, settings.vision)
     identification = identify(specimen, traces, settings.identify)
     diagnosis, findings = _diagnosed(identification, settings)
-    if diagnosis is not None and (diagnosis.left_out_photos or diagnosis.left_out_forces):
+    if diagnosis is not None and _faulty(diagnosis):
+        test = with_corrected_forces(identification.test, diagnosis.corrected_forces)
         wrong = diagnosis.left_out_photos, diagnosis.left_out_forces
-        identification = identify_without(identification, *wrong, settings.identify)
+        identification = identify_without(replace(identification, test=test), *wrong, settings.identify)
     return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
+
+
+def _faulty(diagnosis: DiagnosisPart) -> bool:
+    """Whether some of the data must not be used as they stand."""
+    return bool(diagnosis.left_out_photos or diagnosis.left_out_forces or diagnosis.corrected_forces)
 
 
 def _diagnosed(identification: Identification, settings: Settings) -> tuple[DiagnosisPart | None, tuple[Finding, ...]]:

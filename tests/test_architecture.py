@@ -60,7 +60,7 @@ INSIDE = {
         ("search", "extended", "stuck_forces", "maps"),
         ("faults",),
         ("workbench",),
-        ("identified_again", "heldout", "bootstrap"),
+        ("identified_again", "heldout", "bootstrap", "force_breaks"),
     ],
     "pipeline.diagnosis.explanations": [
         ("explanation", "candidates", "refit", "effort"),

@@ -7,7 +7,7 @@ set; classes instead of forced names; pairs; what is left; the gain on held-out 
 
 from __future__ import annotations
 
-from pipeline.diagnosis.diagnose import diagnose
+from pipeline.diagnosis.diagnose import diagnose, with_corrected_forces
 from pipeline.diagnosis.words import explain
 
-__all__ = ["diagnose", "explain"]
+__all__ = ["diagnose", "explain", "with_corrected_forces"]

@@ -7,6 +7,7 @@ that.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +21,9 @@ from pipeline.diagnosis.explanations.friction_in_law import LAW, shared
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
-from pipeline.diagnosis.fits.faults import Faults, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.leftover import Leftover, leftover_of
@@ -33,7 +35,7 @@ from pipeline.diagnosis.words import spoken
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
-from pipeline.result import DiagnosisPart
+from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import amount_unit
 from rod.measurement import MeasuredTest
@@ -70,7 +72,7 @@ def diagnose(
     bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
     if isinstance(bench, str):
         return _nothing_to_compare(bench), faults.findings
-    fault = _item_at_fault(bench, settings)
+    fault = _data_at_fault(bench, settings)
     if fault is not None:
         knots = len(bench.base.extension.base.knots)
         again = prepare(faults.joined(fault), settings, knots=knots)
@@ -79,8 +81,20 @@ def diagnose(
     known = None if identification is None else curve_of(identification.inverse)
     conclusion = conclude(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
+    part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
     return part, (*findings, *_search_ended(conclusion))
+
+
+def with_corrected_forces(test: MeasuredTest, corrections: Sequence[ForceCorrectionPart]) -> MeasuredTest:
+    """The test with its forces as the diagnosis took them."""
+    for part in corrections:
+        test = ForceCorrection(tuple(part.steps), part.factor, part.offset_N).applied(test)
+    return test
+
+
+def _told(correction: ForceCorrection) -> ForceCorrectionPart:
+    return ForceCorrectionPart(steps=list(correction.steps), factor=correction.factor, offset_N=correction.offset)
 
 
 def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
@@ -256,13 +270,10 @@ def _search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:
     return (Finding("diagnosis/search-ended", "warning", message),)
 
 
-def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:
-    """One photo or force whose absence brings the rest to the noise, and removes more than any cause or pair can."""
-    item = worst_item(bench.observation, bench.base)
-    if item is None or item.gain - item.rows < settings.fault_sigma**2:
+def _data_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:
+    """A break in the forces, or one item, that removes more than any cause or pair can; None below the threshold."""
+    if bench.largest <= bench.limit:
         return None
-    freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
-    fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + settings.explained_share * item.gain
     scores = bench.suspicion.scores
     pairs = pair_gains(
         scores.z,
@@ -272,6 +283,16 @@ def _item_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | No
         collinear=settings.pair_collinear,
     )
     by_cause = max(bench.largest**2, float(pairs.max(initial=0.0)))
+    return force_break(bench, settings, by_cause=by_cause) or _item_at_fault(bench, settings, by_cause=by_cause)
+
+
+def _item_at_fault(bench: Workbench, settings: DiagnosisSettings, *, by_cause: float) -> Faults | None:
+    """One photo or force whose absence brings the rest to the noise, and removes more than any cause or pair can."""
+    item = worst_item(bench.observation, bench.base)
+    if item is None or item.gain - item.rows < settings.fault_sigma**2:
+        return None
+    freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
+    fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + settings.explained_share * item.gain
     better = item.gain - item.rows > by_cause + settings.fault_sigma**2
     return outlier_fault(bench.test, item) if fits and better else None
 

@@ -72,7 +72,7 @@ def identify_without(
     Parameters
     ----------
     found : Identification
-        With everything; its test stays what was measured.
+        With everything; its test stays what was measured, forces corrected or not.
     photos, forces : collections of int
         Steps whose photo, or force, is at fault. A shape without its force tells neither way the scale of f_EI, so a
         step without force is left out as a whole.

@@ -201,6 +201,12 @@ class DiagnosisSettings(BaseModel):
         description="share of the scatter of the sections; two photos that differ by less are one photo; light and "
         "ground that stay make two photos of one shape alike to an eighth",
     )
+    force_break: float = Field(
+        0.03,
+        gt=0,
+        description="factor less 1, or share of the largest force; a smaller change of all forces from one step on is "
+        "no switch of a range or lost zero, and what slips or creeps changes as much at once",
+    )
     stiffness_range: tuple[float, float] = Field(
         (1e-7, 100.0), description="N m^2; EI of cables spans 1e-5 to 1, two decades beyond that is a wrong unit"
     )

@@ -6,7 +6,7 @@ each other (stuck). After the base fit, each photo and each hold is left out in 
 then agrees with the model and no cause explains as much, that one item is at fault, not the model.
 
 Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/stuck``,
-``force/unit``, ``log/unit``, ``length/traced``.
+``force/unit``, ``log/unit``, ``length/traced``; see `force_breaks` for ``force/factor`` and ``force/zero-moved``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import Finding
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import quantity
-from rod.measurement import MeasuredShape, MeasuredTest
+from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,27 @@ UNITS = {
 
 
 @dataclass(frozen=True)
+class ForceCorrection:
+    """What was wrong with the forces of some steps: shown = factor * force + offset (N); steps by their numbers."""
+
+    steps: tuple[int, ...]
+    factor: float
+    offset: float
+
+    def applied(self, test: MeasuredTest) -> MeasuredTest:
+        """The test with these forces as they should have been."""
+        return replace(test, steps=tuple(self._corrected(s) if s.step in self.steps else s for s in test.steps))
+
+    def _corrected(self, step: MeasuredStep) -> MeasuredStep:
+        return replace(
+            step,
+            force=(step.force - self.offset) / self.factor,
+            force_std=step.force_std / abs(self.factor),
+            hold_forces=None if step.hold_forces is None else (step.hold_forces - self.offset) / self.factor,
+        )
+
+
+@dataclass(frozen=True)
 class Faults:
     """What is wrong with the data.
 
@@ -48,12 +69,15 @@ class Faults:
     findings : tuple of Finding
     photos, forces : frozenset of int
         Indices of steps whose photo, or force, is not to be used.
+    corrections : tuple of ForceCorrection
+        Those that ``test`` has got.
     """
 
     test: MeasuredTest
     findings: tuple[Finding, ...] = ()
     photos: frozenset[int] = frozenset()
     forces: frozenset[int] = frozenset()
+    corrections: tuple[ForceCorrection, ...] = ()
 
     def loaded_forces(self) -> list[int]:
         """Indices of the steps under load whose force may be used; without any, stiffness has no scale."""
@@ -63,7 +87,11 @@ class Faults:
     def joined(self, other: Faults) -> Faults:
         """Both."""
         return Faults(
-            other.test, (*self.findings, *other.findings), self.photos | other.photos, self.forces | other.forces
+            other.test,
+            (*self.findings, *other.findings),
+            self.photos | other.photos,
+            self.forces | other.forces,
+            (*self.corrections, *other.corrections),
         )
 
 

@@ -1,0 +1,99 @@
+"""Forces that change their factor, zero or sign during a test, in continuum data; what causes do is none of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
+from fixtures.hidden import hidden_test
+from pipeline.diagnosis import diagnose, with_corrected_forces
+from pipeline.diagnosis.diagnose import _data_at_fault
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+SETTINGS = DiagnosisSettings()
+
+
+@pytest.fixture(scope="module")
+def honest():
+    cable, reading = HIDE["force_gain"](0.0, Form())
+    return {name: hidden_test(cable, PROTOCOLS[name], largest=LARGEST, seed=31, reading=reading) for name in PROTOCOLS}
+
+
+def spoiled(test, change):
+    """The test with ``change(index, force)`` in place of its forces."""
+    steps = (
+        replace(s, force=float(change(i, s.force)), hold_forces=change(i, s.hold_forces))
+        for i, s in enumerate(test.steps)
+    )
+    return replace(test, steps=tuple(steps))
+
+
+def fault(test):
+    return _data_at_fault(prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=5), SETTINGS)
+
+
+@pytest.mark.parametrize("protocol", ["six", "loop"])
+@pytest.mark.parametrize("factor", [0.5, 0.9, 2.0])
+def test_a_factor_from_one_step_on(honest, protocol, factor):
+    found = fault(spoiled(honest[protocol], lambda i, force: force * (factor if i >= 3 else 1.0)))
+    (finding,) = found.findings
+    assert (finding.code, finding.level) == ("force/factor", "error")
+    assert "from step 3 on" in finding.message and "by a factor of" in finding.message
+    (correction,) = found.corrections
+    assert correction.steps == tuple(range(3, 7)) and correction.factor == pytest.approx(factor, rel=5e-3)
+    kept = [step.force for step in honest[protocol].steps]
+    assert [step.force for step in found.test.steps] == pytest.approx(kept, rel=5e-3)
+
+
+@pytest.mark.parametrize("turned", [{2}, {1, 2}, {4, 5, 6}])
+def test_forces_of_the_other_sign_are_turned_whichever_they_are(honest, turned):
+    found = fault(spoiled(honest["loop"], lambda i, force: -force if i in turned else force))
+    (finding,) = found.findings
+    assert (finding.code, finding.level) == ("force/sign", "warning")
+    assert found.corrections[0].steps == tuple(sorted(turned)) and found.corrections[0].factor == -1.0
+    assert f"steps {', '.join(map(str, sorted(turned)))} have the sign of tension" in finding.message
+
+
+@pytest.mark.parametrize("first", [2, 3])
+def test_a_zero_that_jumps(honest, first):
+    found = fault(spoiled(honest["loop"], lambda i, force: force + 0.3 * (i >= first)))
+    (finding,) = found.findings
+    assert (finding.code, finding.level) == ("force/zero-moved", "warning")  # it read zero before
+    assert f"from step {first} on" in finding.message
+    assert found.corrections[0].offset == pytest.approx(0.3, abs=0.04)
+
+
+def test_a_factor_and_a_zero_that_forces_of_one_size_do_not_tell_apart_are_both_named(honest):
+    found = fault(spoiled(honest["six"], lambda i, force: force + 0.3 * (i >= 3)))
+    (finding,) = found.findings
+    assert finding.level == "error" and "which these data do not tell apart" in finding.message
+    assert "by a factor of 1.09" in finding.message and "mN" in finding.message
+
+
+def test_one_bad_force_stays_one(honest):
+    found = fault(spoiled(honest["loop"], lambda i, force: force * (0.5 if i == 4 else 1.0)))
+    assert [finding.code for finding in found.findings] == ["force/outlier"] and found.forces == {4}
+
+
+CAUSES = [
+    ("hysteresis", 6e-3), ("bearing_friction", 5e-3), ("relaxation", 0.12), ("force_drift", 2e-3),
+    ("force_offset", 0.3), ("plastic_set", 0.08), ("rig_compliance", 5e-4),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "amount"), CAUSES)
+def test_no_cause_is_a_break(name, amount):
+    cable, reading = HIDE[name](amount, Form())
+    assert fault(hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=32, reading=reading)) is None
+
+
+def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces(honest):
+    test = spoiled(honest["six"], lambda i, force: force * (0.5 if i >= 4 else 1.0))
+    part, findings = diagnose(test, None, SETTINGS)
+    assert part.verdict == "adequate" and [finding.code for finding in findings] == ["force/factor"]
+    assert (part.left_out_forces, part.left_out_photos) == ([], [])
+    right = with_corrected_forces(test, part.corrected_forces)
+    assert np.array([s.force for s in right.steps]) == pytest.approx([s.force for s in honest["six"].steps], rel=5e-3)
