@@ -29,11 +29,10 @@ from pipeline.result import (
     Result,
     ScalePart,
     SpecimenPart,
-    leading,
 )
 from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
-from pipeline.visited import refuted, visited
+from pipeline.visited import leading, refuted, visited
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")

@@ -8,7 +8,6 @@ keep their names; more stands beside them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -316,17 +315,6 @@ class FindingPart(Part):
     code: str
     level: Literal["info", "warning", "error"]
     message: str
-
-
-def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The finding that comes before every number: with data at fault the numbers may be wrong, however well they fit.
-
-    An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
-    refused for stands where its numbers would be.
-    """
-    faults = [f for f in findings if not f.code.startswith("identify/")]
-    first = (f for f in faults if f.level == "error")
-    return next(first, next((f for f in faults if f.code == "size/force"), None))
 
 
 class Result(Part):

@@ -1,4 +1,4 @@
-"""The visited part of the characteristics of a result, and which of them is the answer.
+"""The visited part of the characteristics of a result, which of them is the answer, and what must be said before it.
 
 Only the visited range is ever used: below the pre-curvature and above the largest curvature no cable was looked at.
 All that reads a characteristic out of a result (report, prediction, comparison) reads it here. SI units, as in
@@ -7,12 +7,13 @@ All that reads a characteristic out of a result (report, prediction, comparison)
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.result import Curve, DiagnosisPart, Result
+from pipeline.result import Curve, DiagnosisPart, FindingPart, Result
 
 Array = NDArray[np.float64]
 METHODS = ("inverse", "balance", "extended")
@@ -122,3 +123,14 @@ def pre_curvature(result: Result, curve: Visited) -> tuple[float, float]:
     if part is None or part.pre_curvature_per_m is None or part.pre_curvature_std_per_m is None:
         return curve.rest()
     return part.pre_curvature_per_m, part.pre_curvature_std_per_m
+
+
+def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
+    """The finding that comes before every number: with data at fault the numbers may be wrong, however well they fit.
+
+    An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
+    refused for stands where its numbers would be.
+    """
+    faults = [f for f in findings if not f.code.startswith("identify/")]
+    first = (f for f in faults if f.level == "error")
+    return next(first, next((f for f in faults if f.code == "size/force"), None))

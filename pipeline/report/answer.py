@@ -9,9 +9,9 @@ import numpy as np
 
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
-from pipeline.result import Result, leading
+from pipeline.result import Result
 from pipeline.settings import ReportSettings
-from pipeline.visited import best, pre_curvature, trusted
+from pipeline.visited import best, leading, pre_curvature, trusted
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")

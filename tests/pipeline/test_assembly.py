@@ -8,8 +8,9 @@ from pipeline.assembly import headline, photo_findings
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import answer
 from pipeline.report.words import Words
-from pipeline.result import FindingPart, leading
+from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
+from pipeline.visited import leading
 from tests.pipeline.report.virtual_result import measured_result
 
 ENDS = "the file ends before the picture does; copy it again"

@@ -276,8 +276,8 @@ def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
     first = test.steps[found.steps[0]].step
     size = _size(found) if other is None else f"{_size(found)}, or {_size(other)}, which these data do not tell apart"
     message = (
-        f"from step {first} on all forces are off {size} against those before: a range was switched or a zero was lost; "
-        "f_EI goes by the forces before, and the later ones were corrected"
+        f"from step {first} on all forces are off {size} against those before: a range was switched or a zero was "
+        "lost; f_EI goes by the forces before, and the later ones were corrected"
     )
     if found.kind == "factor":
         message += f"; if it is the later ones that are right, f_EI is {plain(found.amount, 3)} times as large"
