@@ -73,7 +73,7 @@ INSIDE = {
     "pipeline.vision": [
         ("photo", "rough", "render"),
         ("scale", "search"),
-        ("bearings", "centerline", "preview"),
+        ("bearings", "centerline", "preview", "wholeness"),
         ("judgement",),
         ("segmentation",),
         ("shots",),

@@ -7,6 +7,7 @@ The checks run from what misleads most to what misleads least; each refusal says
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,12 +21,11 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.bands import by_diameter
-from pipeline.vision.search.beyond import follow, followed_in, goes_on, shaded
+from pipeline.vision.search.beyond import follow, followed_in, shaded
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across
 from pipeline.vision.search.ends import (
-    CableEnd,
     at_border,
     between_axes,
     find_end,
@@ -34,6 +34,7 @@ from pipeline.vision.search.ends import (
     without_specks,
 )
 from pipeline.vision.search.strips import Strip
+from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis
 
 _MAD_TO_STD = 1.4826
 
@@ -138,15 +139,19 @@ def _judge(
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
-    short = _check_reach(photo, standout, cut, axes, stage)
+    short = short_of_axis(standout, cut, axes, stage)
     if short is not None:
-        return short
+        return _goes_on_beyond(photo, short)
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = _cut(standout, path, reading, cable, stage)
-    refusal = _check_width(photo, cut, standout.reduction, cable, stage) or _check_ends(
-        photo, standout, cut, axes, stage
+    refusal = _check_width(photo, cut, standout.reduction, cable, stage)
+    if refusal is not None:
+        return refusal
+    others = [other for other in reading.strips if other is not strip]
+    more = goes_on_at(standout, cut, axes, stage) or rest_faced_at(
+        standout, cut, axes, others, stage, length_px=cable.length_px
     )
-    return refusal if refusal is not None else _assemble(photo, standout, cut, axes, cable, settings)
+    return _assemble(photo, standout, cut, axes, cable, settings) if more is None else _goes_on_beyond(photo, more)
 
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
@@ -201,7 +206,7 @@ def _axes(
         find_end(strip.path, reading, standout, cover, settings.bearings),
     )
     hidden = cover is not None or cable.bearings.given_px is not None
-    leaving = [end for end in ends if at_border(end, photo, width)]
+    leaving = [end.place for end in ends if at_border(end.place, photo, width)]
     if leaving and not hidden:
         return _leaves(photo, leaving[0])
     first, second = find_bearings(photo, ends, width, cable.bearings, settings.bearings)
@@ -219,14 +224,10 @@ def _axes(
     )
 
 
-def _leaves(photo: Photo, end: CableEnd) -> Rejected:
-    return refused(
-        photo,
-        "photo/leaves-frame",
-        f"the cable leaves the picture at ({end.place[0]:.0f}, {end.place[1]:.0f}) px",
-        u_px=float(end.place[0]),
-        v_px=float(end.place[1]),
-    )
+def _leaves(photo: Photo, place: Sequence[float] | Array) -> Rejected:
+    u, v = float(place[0]), float(place[1])
+    text = f"the cable leaves the picture at ({u:.0f}, {v:.0f}) px"
+    return refused(photo, "photo/leaves-frame", text, u_px=u, v_px=v)
 
 
 def _check_width(
@@ -234,6 +235,14 @@ def _check_width(
 ) -> Rejected | None:
     """Refuse a strip whose width is not the cable's, or not constant."""
     widths = cut.seen_widths * reduction
+    slender = float(np.hypot(*np.diff(cut.path, axis=0).T).sum()) / cut.usual_width
+    if cable.diameter_px is None and slender < stage.least_slenderness:
+        return refused(
+            photo,
+            "photo/width",
+            f"the strip is only {slender:.0f} times as long as it is wide, a cable that bends is longer",
+            slenderness=slender,
+        )
     if len(widths) < 0.5 * len(cut.width):
         share = len(widths) / len(cut.width)
         return refused(
@@ -261,36 +270,6 @@ def _check_width(
             f"the strip's width varies by {100 * scatter:.0f} %, a cable's does not",
             width_scatter=scatter,
         )
-    return None
-
-
-def _check_ends(
-    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
-) -> Rejected | None:
-    """Refuse a strip that is a piece of the cable only: beyond its visible end the cable goes on."""
-    width = cut.usual_width
-    for axis, at_start in zip(axes, (True, False), strict=True):
-        if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, stage, at_start=at_start):
-            return _goes_on_beyond(photo, axis.center_px)
-    return None
-
-
-def _check_reach(
-    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], stage: SegmentationSettings
-) -> Rejected | None:
-    """Refuse a strip that ends before an axis that the user gave: far from it, or while the cable goes on."""
-    width = cut.usual_width
-    path = standout.to_pixels(cut.path)
-    near, far = stage.beyond_least_widths * width * standout.reduction, stage.hidden_widths * width * standout.reduction
-    for axis, at_start in zip(axes, (True, False), strict=True):
-        distance = np.hypot(*(path - axis.center_px).T)
-        end = 0 if at_start else len(path) - 1
-        # a strip that passes the axis is nearest to it before its end
-        ahead = abs(int(np.argmin(distance)) - end) * standout.reduction < 0.5 * distance[end]
-        if axis.kind != "given" or not ahead or distance[end] < near:
-            continue
-        if distance[end] > far or goes_on(standout, cut, width, stage, at_start=at_start):
-            return _goes_on_beyond(photo, (float(path[end, 0]), float(path[end, 1])))
     return None
 
 
@@ -325,6 +304,10 @@ def _assemble(
     right, path = settle_end(axes[1], path, closeup, width, settings.bearings)
     left, backward = settle_end(axes[0], path[::-1], closeup, width, settings.bearings)
     axes, path = (left, right), backward[::-1]
+    ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
+    leaving = [place for place in ends if at_border(place, photo, width)]
+    if leaving:
+        return _leaves(photo, leaving[0])
     path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
         return refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")

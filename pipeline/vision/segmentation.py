@@ -32,6 +32,8 @@ Window = tuple[int, int, int, int]
 
 # Other readings of a photo that shows a crossing may well show one arm of it as a clean strip.
 _CONCLUSIVE = ("photo/crossing", "photo/two-candidates")
+# What is refused so looks like a cable that is not seen whole: something shorter elsewhere is not the cable either.
+_IN_PIECES = ("photo/hidden-end", "photo/two-candidates")
 
 
 def find_cable(
@@ -68,6 +70,7 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
     wanted = _wanted(standout, cable, stage)
     first: Rejected | None = None
     leaving: list[Array] = []
+    going_on: list[tuple[Rejected, Array]] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
             if first is not None:
@@ -77,11 +80,15 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
             )
         outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
         if isinstance(outcome, RoughCable):
-            return first if first is not None and _lies_on(outcome, leaving) else outcome
+            if first is not None and _lies_on(outcome, leaving):
+                return first
+            return _more_shown(outcome, going_on, settings) or outcome
         if outcome.code in _CONCLUSIVE:
             return outcome
         if outcome.code == "photo/leaves-frame":
             leaving.append(path)
+        if outcome.code == "photo/hidden-end":
+            going_on.append((outcome, path))
         first = outcome if first is None else first
     if first is None:
         raise ValueError("read_photo always gives a reading")
@@ -123,9 +130,14 @@ def _weigh(
                 "leave one cable in the picture"
             )
             outcome = refused(photo, "photo/two-candidates", text, candidates=float(len(alike)))
+        if isinstance(outcome, RoughCable):  # it may have been followed farther
+            area = 2.0 * outcome.half_width_px * outcome.length_px / standout.reduction**2
         verdicts.append((area, outcome, standout.to_pixels(rivals[chosen].path)))
     clear = [v for v in verdicts if isinstance(v[1], RoughCable) or v[1].code in _CONCLUSIVE]
     _, outcome, path = max(clear or verdicts, key=lambda verdict: verdict[0])
+    if isinstance(outcome, RoughCable):
+        going_on = [(v[1], v[2]) for v in verdicts if isinstance(v[1], Rejected) and v[1].code in _IN_PIECES]
+        outcome = _more_shown(outcome, going_on, settings) or outcome
     return outcome, path
 
 
@@ -137,19 +149,37 @@ def _length(outcome: RoughCable | Rejected) -> float:
     return outcome.length_px if isinstance(outcome, RoughCable) else 0.0
 
 
+def _more_shown(found: RoughCable, going_on: list[tuple[Rejected, Array]], settings: VisionSettings) -> Rejected | None:
+    """The refusal of a strip that another reading showed to go on: where this one ends, or longer and elsewhere."""
+    tree = cKDTree(found.path_px)
+    for refusal, path in going_on:
+        longer = float(np.hypot(*np.diff(path, axis=0).T).sum()) > found.length_px
+        elsewhere = float(np.median(tree.query(path)[0])) > found.half_width_px
+        at_end = refusal.code == "photo/hidden-end" and _ends_at(found, refusal, settings)
+        if at_end or (longer and elsewhere):
+            return refusal
+    return None
+
+
+def _ends_at(found: RoughCable, refusal: Rejected, settings: VisionSettings) -> bool:
+    """True if what was found ends, under no cover, where a strip was seen to go on."""
+    stage, width = settings.segmentation, 2.0 * found.half_width_px
+    place = np.array([refusal.figure["u_px"], refusal.figure["v_px"]])
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(found.path_px, axis=0).T))]
+    distance = np.hypot(*(found.path_px - place).T)
+    passed = along[int(np.argmin(distance))]  # a place that was passed is followed beyond
+    at_end = min(passed, along[-1] - passed) < stage.beyond_least_widths * width
+    return found.left.radius_px is None and at_end and bool(distance[[0, -1]].min() < stage.hidden_widths * width)
+
+
 def _whole(outcomes: list[RoughCable | Rejected], settings: VisionSettings) -> list[RoughCable | Rejected]:
     """The verdicts, but for a cable that ends where another strip is known to go on: it is the piece beyond."""
     going_on = [o for o in outcomes if isinstance(o, Rejected) and o.code == "photo/hidden-end"]
 
     def piece_of(found: RoughCable) -> Rejected | None:
-        reach = 2.0 * settings.segmentation.hidden_widths * found.half_width_px
-        for other in going_on:
-            place = np.array([other.figure["u_px"], other.figure["v_px"]])
-            if np.hypot(*(found.path_px[[0, -1]] - place).T).min() < reach:
-                return other
-        return None
+        return next((other for other in going_on if _ends_at(found, other, settings)), None)
 
-    return [(piece_of(o) or o) if isinstance(o, RoughCable) and o.left.radius_px is None else o for o in outcomes]
+    return [(piece_of(o) or o) if isinstance(o, RoughCable) else o for o in outcomes]
 
 
 def _apart(chosen: list[int], outcomes: list[RoughCable | Rejected]) -> list[int]:

@@ -86,6 +86,9 @@ class SegmentationSettings(StageSettings):
     max_length_ratio: float = Field(
         1.25, gt=1, description="ratio to the known length; longer strips are rails and edges of the table"
     )
+    least_slenderness: float = Field(
+        10.0, gt=0, description="widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten"
+    )
     rival_share: float = Field(
         0.5, gt=0, lt=1, description="share of the longest strip's length, and of the best contrast, of another rival"
     )
@@ -216,6 +219,21 @@ class SegmentationSettings(StageSettings):
         15.0,
         gt=0,
         description="widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm",
+    )
+    fading_share: float = Field(
+        0.5, gt=0, lt=1, description="of the step before an end that is left beyond it: covers leave less, glare more"
+    )
+    sheet_widths: float = Field(
+        60.0, gt=0, description="widths; a sheet of paper across a cable hides no more of it: 300 mm of 5 mm"
+    )
+    sheet_turn_deg: float = Field(
+        60.0, gt=0, lt=90, description="degrees against the chord; a cable turns by twice that at most under a sheet"
+    )
+    clamp_tail_share: float = Field(
+        0.1, gt=0, lt=1, description="of the strip's length; a cable's tail beyond a clamp is shorter, its rest longer"
+    )
+    whole_share: float = Field(
+        0.97, gt=0, lt=1, description="of the known length; a strip so long with free ends is the whole cable"
     )
     beyond_width_off: float = Field(
         0.15,

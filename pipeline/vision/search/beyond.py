@@ -21,7 +21,7 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
 from pipeline.vision.search.ends import led_on, straight_body
-from pipeline.vision.search.strips import Strip, thick_part
+from pipeline.vision.search.strips import Strip, end_direction, thick_part
 
 
 def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
@@ -40,6 +40,69 @@ def goes_on(standout: Standout, cut: CrossCut, width: float, settings: Segmentat
     """
     path = cut.path[::-1] if at_start else cut.path
     return _ahead(standout, cut, path, width, settings)[0] is not None
+
+
+def fades(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
+    """True if a strip goes on beyond its end hardly fainter than before: glare takes its contrast, it does not end.
+
+    Parameters as in `goes_on`.
+    """
+    path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
+    near = slice(round(0.75 * width), round(settings.beyond_least_widths * width))
+    before = float(np.median(step[::-1][near]))
+    _, ahead = _led_into_picture(standout, path, width, settings.beyond_leads_widths[0], settings)
+    if len(ahead) < near.stop or before <= 0.0:
+        return False
+    more = cut_across(standout, ahead[: near.stop + round(width)], width, settings, known=True, weights=cut.weights)
+    same = np.abs(more.width[near] / width - 1.0) < settings.beyond_width_off
+    faint = float(np.median(more.step[near])) > settings.fading_share * before
+    return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
+
+
+def rest_ahead(
+    standout: Standout, cut: CrossCut, others: list[Strip], settings: SegmentationSettings, *, at_start: bool
+) -> float | None:
+    """Gap in cells to another strip of the same look where an arc that leaves this one's end would go on, if any.
+
+    A sheet of paper hides more than `goes_on` looks across, and is no larger thing where it has the ground's colour.
+
+    Parameters
+    ----------
+    standout : Standout
+    cut : CrossCut
+        The strip's cross-cuts.
+    others : list of Strip
+    settings : SegmentationSettings
+    at_start : bool
+        The first point, else the last.
+    """
+    path, width = cut.path[::-1] if at_start else cut.path, cut.usual_width
+    leaving = end_direction(path, width)
+    usual = float(np.median(_weber(standout, cut, width, settings)))
+    facing = [
+        (float(np.hypot(*(rest[0] - path[-1]))), rest)
+        for other in others
+        for rest in (other.path, other.path[::-1])
+        if other.length > settings.min_partner_widths * width and _arc_joins(path[-1], leaving, rest, width, settings)
+    ]
+    for gap, rest in sorted(facing, key=lambda found: found[0]):
+        for known in {True, cut.known}:
+            more = cut_across(standout, rest, width, settings, known=known, weights=cut.weights)
+            if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual, settings)) > 0.5:
+                return gap
+    return None
+
+
+def _arc_joins(end: Array, leaving: Array, rest: Array, width: float, settings: SegmentationSettings) -> bool:
+    """True if an arc from an end (2,), which it leaves along ``leaving``, arrives at the start of ``rest`` along it.
+
+    An arc leaves its chord by the angle by which it comes back to it; a cable that bends unevenly by about that.
+    """
+    gap, arriving = rest[0] - end, -end_direction(rest[::-1], width)
+    if np.hypot(*gap) > settings.sheet_widths * width:
+        return False
+    out, back = (np.degrees(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)) for a, b in ((leaving, gap), (gap, arriving)))
+    return bool(max(abs(out), abs(back)) < settings.sheet_turn_deg and abs(out - back) < settings.joint_angle_deg)
 
 
 def follow(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array | None:

@@ -8,6 +8,7 @@ Photo pixels, unless cells (of the reduced photo) are said.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -65,9 +66,9 @@ def straight_body(path: Array, width: float, trimmed: float) -> tuple[Array, Arr
     return body, end_direction(body, width)
 
 
-def at_border(end: CableEnd, photo: Photo, width_px: float) -> bool:
-    """True if the end lies within a width of the picture's border, or a hundredth of the picture."""
-    u, v = end.place
+def at_border(place: Sequence[float] | Array, photo: Photo, width_px: float) -> bool:
+    """True if a place ``(u, v)`` lies within a width of the picture's border, or a hundredth of the picture."""
+    u, v = place
     reach = max(width_px, 0.01 * max(photo.size))
     return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < reach)
 

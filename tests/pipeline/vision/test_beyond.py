@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
@@ -77,6 +78,71 @@ def test_dense_rules_are_followed_across_or_refused(pitch):
         assert found.code in ("photo/hidden-end", "photo/contrast")
     else:
         assert found.length_px == pytest.approx(_length(), rel=0.005)
+
+
+def _papered(picture):
+    picture[:, 590:770] = 215.0
+    return picture
+
+
+@pytest.mark.parametrize("long", [None, 900.0, 700.0])
+def test_a_sheet_of_the_ground_s_colour_makes_no_end(long):
+    """It hides thirteen widths, and what is left beyond is a quarter of the strip before it: no rival of that."""
+    found = find_cable(_photo(_papered), VisionSettings(), cable=Cable(length_px=long))
+    assert isinstance(found, Rejected) and found.code == "photo/hidden-end"
+
+
+@pytest.mark.parametrize("grey", [90.0, 130.0])
+@pytest.mark.parametrize("width", [40, 60])
+def test_a_band_across_the_cable_does_not_pass_for_it(grey, width):
+    """Twice as wide as the cable and more: the larger area would speak for the photo, which shows the cable cut."""
+
+    def across(picture):
+        cv2.line(picture, (560, 40), (640, 520), grey, width, cv2.LINE_AA)
+        return picture
+
+    found = find_cable(_photo(across), VisionSettings())
+    if isinstance(found, Rejected):
+        assert found.code == "photo/hidden-end"
+    else:
+        assert found.length_px == pytest.approx(_length(), rel=0.005)
+
+
+@pytest.mark.parametrize("bright", [120.0, 150.0])
+def test_glare_that_takes_the_contrast_makes_no_end(bright):
+    def across(picture):
+        u, v = np.arange(SIZE[1]) - 860.0, np.arange(SIZE[0])[:, None] - 380.0
+        return np.minimum(picture + bright / (1.0 + np.exp((np.hypot(u, v) - 110.0) / 25.0)), 255.0)
+
+    found = find_cable(_photo(across), VisionSettings())
+    if isinstance(found, Rejected):
+        assert found.code in ("photo/hidden-end", "photo/contrast")
+    else:
+        assert found.length_px == pytest.approx(_length(), rel=0.005)
+
+
+@pytest.mark.parametrize("slender", [10.0, 0.1])
+@pytest.mark.shared
+def test_a_fold_of_the_cloth_is_no_cable(slender, shared_data):
+    """Eight times as long as wide, five times the noise; its end, put where its grey falls, is the picture's border."""
+    whole = load_photo(shared_data / "real" / "loop" / "white0.jpg", VisionSettings().photo)
+    settings = VisionSettings()
+    stage = settings.segmentation.model_copy(update={"least_slenderness": slender})
+    mirrored = Photo("mirrored.png", np.ascontiguousarray(whole.pixels[:, ::-1]), 8)
+    found = find_cable(mirrored, settings.model_copy(update={"segmentation": stage}))
+    assert isinstance(found, Rejected) and found.code in ("photo/contrast", "photo/leaves-frame")
+
+
+def test_a_thing_eight_times_as_long_as_wide_is_no_cable():
+    picture = np.full(SIZE, 215, np.uint8)
+    cv2.line(picture, (300, 260), (492, 300), 40, 24, cv2.LINE_AA)
+    found = find_cable(Photo("thing.png", picture, 8), VisionSettings())
+    assert isinstance(found, Rejected)
+    assert found.figure["slenderness"] == pytest.approx(8.5, abs=0.8)
+
+
+def test_another_piece_of_cable_in_line_is_none_of_one_that_is_whole():
+    assert isinstance(find_cable(_photo(_papered), VisionSettings(), cable=Cable(length_px=555.0)), RoughCable)
 
 
 def test_a_stroke_of_print_is_no_end():
