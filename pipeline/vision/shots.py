@@ -49,21 +49,34 @@ def find_cables(
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
         return shots, ()
+    most = settings.series.max_length_deviation
     if calibration is not None:
-        lengths = [shot.found.length_px for shot in found if isinstance(shot.found, RoughCable)]
-        ratio = float(np.median(lengths)) / (calibration.scale.px_per_m * specimen.length_m)
-        if abs(ratio - 1.0) <= settings.series.max_length_deviation:
+        # Ends lost here and there under covers leave the right length on the median too, not on each photo.
+        stated = calibration.scale.px_per_m * specimen.length_m
+        if _count_of_length(found, stated, most) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
     radius = cover_radius(_with_photos(specimen, ends, settings), settings.bearings)
-    if radius is None:
+    again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
+    if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
     text = (
         f"bearing_marker_mm is not given; round covers {2 * radius:.0f} px across are seen where the cable ends, their "
         "centres are taken for the bearing axes."
     )
-    again = _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     return again, (Finding("rig/covers-found", "info", text),)
+
+
+def _count_alike(shots: list[Shot], most: float) -> int:
+    """Number of photos whose cable is as long as on the median photo, to a relative deviation."""
+    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
+    return _count_of_length(shots, float(np.median(lengths)), most) if lengths else 0
+
+
+def _count_of_length(shots: list[Shot], length_px: float, most: float) -> int:
+    """Number of photos whose cable has a length (px) to a relative deviation."""
+    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
+    return sum(abs(length / length_px - 1.0) <= most for length in lengths)
 
 
 def _with_covers_by_length(
