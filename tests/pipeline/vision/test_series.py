@@ -216,7 +216,7 @@ def test_covers_of_a_diameter_nobody_gave_are_found(tmp_path: Path, diameter: fl
 
 
 def test_ends_lost_here_and_there_about_covers_are_no_ends_of_the_cable(tmp_path: Path) -> None:
-    """Slots of the cable's grey lead its strip across some covers: its length is right on the median, not on each photo."""
+    """Slots of the cable's grey lead its strip across covers: its length is right on the median, not on each photo."""
     camera = Camera(1150, 520, SCALE, look_at_m=(0.085, 0.022))
     specimen = series(tmp_path, given=RigSpec("left", None), camera=camera)
     for name, curve, start, slots in (
