@@ -86,14 +86,15 @@ def assemble(
     parts = identification_parts(identification)
     photos = photo_parts(specimen, traces, parts)
     measured = parts.inverse.converged or parts.balance.curve is not None
-    gathered = [
+    diagnosed = list(findings)
+    earlier = [
         *specimen.findings,
         *traces.findings,
         *(finding for photo in traces.photos for finding in photo_findings(photo)),
         *parts.findings,
-        *findings,
     ]
-    told = [FindingPart(code=f.code, level=f.level, message=f.message) for f in unique(gathered)]
+    gathered = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
+    told = [FindingPart(code=f.code, level=f.level, message=f.message) for f in gathered]
     return Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
         headline=headline(parts, diagnosis, photos, leading(told)),
@@ -177,6 +178,23 @@ def photo_findings(photo: Centerline | Rejected) -> tuple[Finding, ...]:
 def unique(findings: Iterable[Finding]) -> list[Finding]:
     """Findings in their order, each once: two stages may have seen the same thing."""
     return list(dict.fromkeys(findings))
+
+
+TOLD_BETTER = {
+    "photo/doubled": {"photo/doubled"},
+    "photo/order": {"identify/chord-displacement"},
+    "log/displacement": {"identify/chord-displacement"},
+    "log/unit": {"identify/chord-displacement", "scale/displacement"},
+    "length/traced": {"scale/length"},
+    "force/sign": {"identify/force-sign"},
+}
+"""Findings of the diagnosis, and those by which earlier rooms noticed the same without knowing what it is."""
+
+
+def without_those_told_better(earlier: Iterable[Finding], diagnosed: Iterable[Finding]) -> list[Finding]:
+    """Earlier findings but for those that the diagnosis has named."""
+    named = set[str]().union(*(TOLD_BETTER.get(finding.code, set()) for finding in diagnosed))
+    return [finding for finding in earlier if finding.code not in named]
 
 
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:

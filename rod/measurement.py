@@ -105,6 +105,8 @@ class MeasuredStep:
     picture_centre : (x, y) m or None
         Where the centre of the picture lies in the chord frame of this photo: lens distortion and camera tilt are
         counted from there.
+    picture : str or None
+        What the file of the photo holds, such as its hash: steps with the same have one and the same photo.
     """
 
     step: int
@@ -120,6 +122,7 @@ class MeasuredStep:
     hold_forces: Array | None = None
     picture_centre: tuple[float, float] | None = None
     displacement_std: float | None = None
+    picture: str | None = None
 
 
 @dataclass(frozen=True)

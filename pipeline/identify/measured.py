@@ -30,7 +30,13 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
     lines = {photo.image: photo for photo in traces.photos if isinstance(photo, Centerline)}
     floor = settings.force_std_floor_relative * max((abs(step.force_N) for step in specimen.steps), default=0.0)
     steps = tuple(
-        _step(step, lines.get(step.image) if step.image is not None else None, floor, traces.scale.px_per_m)
+        _step(
+            step,
+            lines.get(step.image) if step.image is not None else None,
+            floor,
+            traces.scale.px_per_m,
+            specimen.hashes.get(step.image or ""),
+        )
         for step in specimen.steps
     )
     diagonals = [
@@ -51,7 +57,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
     )
 
 
-def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float) -> MeasuredStep:
+def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float, picture: str | None) -> MeasuredStep:
     return MeasuredStep(
         step=step.step,
         branch=step.branch,
@@ -67,6 +73,7 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         hold_forces=step.forces_N if step.forces_N.size else None,
         picture_centre=None if line is None else picture_centre(line, px_per_m),
         displacement_std=step.displacement_std_m,
+        picture=None if line is None else picture,
     )
 
 

@@ -196,6 +196,12 @@ class DiagnosisSettings(BaseModel):
         0.15,
         description="share of the travel; mean mismatch of chord and displacement from which order or unit is doubted",
     )
+    displacement_mismatch: float = Field(
+        0.02,
+        gt=0,
+        description="share of the travel; mismatch of a single chord and its displacement from which that displacement "
+        "is doubted, in place of a photo or a cause: a fifth of a step of ten",
+    )
     doubled_share: float = Field(
         0.03,
         description="share of the scatter of the sections; two photos that differ by less are one photo; light and "

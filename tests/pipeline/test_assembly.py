@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.assembly import headline, photo_findings
+from pipeline.assembly import headline, photo_findings, without_those_told_better
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import answer
 from pipeline.report.words import Words
@@ -53,3 +53,14 @@ def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
     plain, led = headline(parts, None, []), headline(parts, None, [], UNIT)
     assert led == f"The forces seem to be 1000 times too large. {plain}"
     assert Words("de").said(led).language == "de"
+
+
+def test_what_the_diagnosis_names_is_said_once():
+    noticed = [
+        Finding("scale/displacement", "warning", "the travel gives another scale"),
+        Finding("identify/chord-displacement", "warning", "chord and displacement disagree"),
+        Finding("scale/length", "warning", "the traced length is another"),
+    ]
+    unit = Finding("log/unit", "warning", "the log seems to hold cm instead of mm")
+    assert [f.code for f in without_those_told_better(noticed, [unit])] == ["scale/length"]
+    assert without_those_told_better(noticed, []) == noticed

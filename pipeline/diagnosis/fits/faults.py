@@ -6,7 +6,8 @@ each other (stuck). After the base fit, each photo and each hold is left out in 
 then agrees with the model and no cause explains as much, that one item is at fault, not the model.
 
 Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/stuck``,
-``force/unit``, ``log/unit``, ``length/traced``; see `force_breaks` for ``force/factor`` and ``force/zero-moved``.
+``force/unit``, ``log/unit``,
+``log/displacement``, ``length/traced``; see `force_breaks` for ``force/factor`` and ``force/zero-moved``.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ UNITS = {
     25.4: "inches instead of mm",
 }
 """What the displacement column may hold if the chord changes this many times as much as the log says."""
+
+ALONE = 4.0
+"""Times the spread of all other sums of chord and displacement: a sum that far away is alone among them."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,15 @@ class Faults:
 def faults_of_input(test: MeasuredTest, settings: DiagnosisSettings) -> Faults:
     """Faults that show without any fit."""
     found = Faults(test)
-    for check in (_unit_of_displacement, _doubled_photos, _order_of_photos, _traced_length, _forces, _stuck):
+    for check in (
+        _unit_of_displacement,
+        _doubled_photos,
+        _order_of_photos,
+        _displacement,
+        _traced_length,
+        _forces,
+        _stuck,
+    ):
         found = found.joined(check(found, settings))
     return found
 
@@ -145,13 +157,14 @@ def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
 
 
 def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
-    """Two photos whose noise is the same are one photo."""
+    """Two photos from files of the same contents, or whose noise is the same, are one photo."""
     steps = found.test.steps
     pictures = [(i, step.shape) for i, step in enumerate(steps) if step.shape is not None]
     findings, dropped = [], set()
     for (i, one), (j, other) in combinations(pictures, 2):
         assert one is not None and other is not None
-        if not _same_noise(one, other, settings.doubled_share):
+        same_file = steps[i].picture is not None and steps[i].picture == steps[j].picture
+        if not same_file and not _same_noise(one, other, settings.doubled_share):
             continue
         gap = {k: abs(_mismatch(found.test, k)) for k in (i, j)}
         wrong = j if gap[j] >= gap[i] else i
@@ -228,6 +241,34 @@ def _order_of_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
         ),
         frozenset(int(used[k]) for k in np.flatnonzero(wrong)),
     )
+
+
+def _displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
+    """One chord under load that does not fit its displacement, where all others do; its step then goes by the chord.
+
+    The force-free step is none of them: play and a yielding frame set it apart from all others.
+    """
+    test, used = found.test, [i for i in _with_both(found) if found.test.steps[i].branch != "mounted"]
+    if len(used) < 4:
+        return Faults(test)
+    chord = np.array([test.steps[i].chord for i in used], dtype=float)
+    sums = chord + np.array([test.steps[i].displacement for i in used], dtype=float)
+    off = sums - np.median(sums)
+    worst = int(np.argmax(np.abs(off)))
+    rest, travel = float(np.ptp(np.delete(off, worst))), float(np.ptp(chord))
+    if abs(off[worst]) < max(settings.displacement_mismatch * travel, ALONE * rest):
+        return Faults(test)
+    step = test.steps[used[worst]]
+    apart = "farther apart" if off[worst] > 0.0 else "nearer"
+    finding = Finding(
+        "log/displacement",
+        "warning",
+        f"the photo of step {step.step} shows the bearings {1e3 * abs(off[worst]):.2f} mm {apart} than the "
+        "displacement of the log says, where all other steps agree: the displacement is wrong, or the photo is of "
+        "another step; the displacement was taken from the photo",
+    )
+    steps = tuple(replace(one, displacement=None) if one is step else one for one in test.steps)
+    return Faults(replace(test, steps=steps), (finding,))
 
 
 def _traced_length(found: Faults, settings: DiagnosisSettings) -> Faults:

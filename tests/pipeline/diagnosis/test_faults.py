@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +51,29 @@ def test_doubled_photo(honest):
     assert [finding.code for finding in findings] == ["photo/doubled"]
     assert "of step 3, which fits its displacement less well" in findings[0].message
     assert part.verdict == "adequate"
+
+
+def test_the_same_file_twice_is_one_photo_however_it_was_traced(honest):
+    """Noise alone had not told it: a path from another neighbour has its sections elsewhere."""
+    steps = with_steps(honest, step3={"picture": "hash"}, step5={"picture": "hash"})
+    assert codes(faults_of_input(steps, SETTINGS)) == ["photo/doubled"]
+    other = with_steps(honest, step3={"picture": "hash"}, step5={"picture": "other"})
+    assert codes(faults_of_input(other, SETTINGS)) == []
+
+
+@pytest.mark.parametrize("wrong", [0.4e-3, -1.0e-3, 87e-3])
+def test_one_wrong_displacement_is_neither_a_bad_photo_nor_a_cause(honest, wrong):
+    spoiled = with_steps(honest, step4={"displacement": honest.steps[4].displacement + wrong})
+    part, findings = diagnose(spoiled, None, SETTINGS)
+    assert [finding.code for finding in findings] == ["log/displacement"]
+    size = float(re.search(r"step 4 shows the bearings ([\d.]+) mm", findings[0].message)[1])
+    assert size == pytest.approx(1e3 * abs(wrong), abs=0.03)
+    assert part.verdict == "adequate" and part.left_out_photos == []
+
+
+def test_play_before_the_first_step_is_no_wrong_displacement():
+    test = hidden_test(Cable(), SIX, largest=0.0138, seed=21, reading=Reading(play=1e-3))
+    assert codes(faults_of_input(test, SETTINGS)) == []
 
 
 @pytest.mark.parametrize(("factor", "word"), [(1e-3, "m instead of mm"), (1.0 / 25.4, "inches"), (0.1, "cm instead")])
