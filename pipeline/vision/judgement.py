@@ -41,11 +41,15 @@ _MAD_TO_STD = 1.4826
 
 @dataclass(frozen=True)
 class Cable:
-    """What is known of the cable and its bearings before the photo is looked at; lengths in px, None if unknown."""
+    """What is known of the cable and its bearings before the photo is looked at; lengths in px, None if unknown.
+
+    ``slenderness`` is length over diameter, known without a scale too.
+    """
 
     diameter_px: float | None = None
     length_px: float | None = None
     bearings: BearingHints = field(default_factory=BearingHints)
+    slenderness: float | None = None
 
 
 def refused(photo: Photo, code: str, reason: str, **figure: float) -> Rejected:

@@ -55,12 +55,57 @@ def find_cable(
     RoughCable or Rejected
     """
     cable = Cable() if cable is None else cable
+    found = _find_near(photo, settings, cable, near)
+    if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness, settings):
+        return found
+    # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
+    strips = stand_out(photo, choose_reduction(photo.size, None, settings.segmentation), settings.segmentation)
+    widths = [2.0 * near.half_width_px] if near is not None else _widths(strips, cable.slenderness, settings)
+    for width in widths:
+        again = _find_near(photo, settings, replace(cable, diameter_px=width), near)
+        if _is_slender(again, cable.slenderness, settings):
+            return again
+    return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
+
+
+def _find_near(photo: Photo, settings: VisionSettings, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
+    """Find the cable where a neighbour photo lets it be expected, then anywhere."""
     cable = replace(cable, bearings=replace(cable.bearings, sought=SoughtCovers()))
     if near is not None:
         found = _find_in(photo, settings, cable, _surroundings(near, photo, settings.segmentation))
         if isinstance(found, RoughCable):
             return found
     return _find_in(photo, settings, cable, None)
+
+
+def _is_slender(found: RoughCable | Rejected, slenderness: float, settings: VisionSettings) -> bool:
+    """True for a cable about as many times as long as wide as it is stated to be."""
+    if isinstance(found, Rejected):
+        return False
+    low, high = settings.segmentation.accepted_slenderness_ratio
+    return low <= _slenderness(found) / slenderness <= high
+
+
+def _slenderness(found: RoughCable) -> float:
+    return 0.5 * found.length_px / found.half_width_px
+
+
+def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
+    text = (
+        f"the strip is {_slenderness(found):.0f} times as long as wide, by length_mm and diameter_mm the cable is "
+        f"{slenderness:.0f} times; a highlight may split it, or one of the two is wrong"
+    )
+    return refused(photo, "photo/width", text, seen=_slenderness(found), stated=slenderness)
+
+
+def _widths(standout: Standout, slenderness: float, settings: VisionSettings) -> list[float]:
+    """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
+    wanted = _wanted(standout, Cable(), settings.segmentation)
+    for readings in read_photo(standout, wanted, settings.segmentation):
+        longest = max(reading.longest for reading in readings)
+        if longest >= wanted.least_length:
+            return [longest * standout.reduction / slenderness]
+    return []
 
 
 def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Window | None) -> RoughCable | Rejected:

@@ -167,7 +167,8 @@ def _expected(specimen: Specimen, calibration: Calibration | None, travel: float
         widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
         # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
         given = rig.bearings_px if travel == 0.0 and widths is None else None
-        return Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
+        hints = BearingHints(cover_widths=widths, given_px=given)
+        return Cable(bearings=hints, slenderness=specimen.length_m / specimen.diameter_m)
     scale = calibration.scale.px_per_m
     cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
     given = None

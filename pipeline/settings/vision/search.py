@@ -169,6 +169,11 @@ class SegmentationSettings(StageSettings):
     accepted_width_ratio: tuple[float, float] = Field(
         (0.65, 1.35), description="ratio of the edges' distance to the diameter; a sheath may be dark at its flanks"
     )
+    accepted_slenderness_ratio: tuple[float, float] = Field(
+        (0.6, 1.5),
+        description="ratio of length to width as seen and as stated, where no scale is known; covers hide up to a "
+        "third of a short, thick cable, and a sheath may be dark at its flanks",
+    )
     max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
     seen_share: float = Field(
         0.4, gt=0, lt=1, description="share of the median contrast from which a section counts as seen"

@@ -335,3 +335,36 @@ def test_piece_of_a_cable_that_leaves_the_frame_is_not_taken_for_it(cable: Cable
     outcome, _ = find(scene(cable=strand, camera=camera, covers=(None, None), ground=cloth), cable)
     assert isinstance(outcome, Rejected)
     assert outcome.code == "photo/leaves-frame"
+
+
+def round_sheath(edge: float, crest: float, cover: int) -> tuple[Photo, np.ndarray]:
+    """A lit round sheath 72 px across with dark flanks between two covers, drawn in shells; and its course in px."""
+    rng, picture = np.random.default_rng(0), np.full((560, 1500), 205, np.uint8)
+    u = np.linspace(200.0, 1300.0, 400)
+    course = np.column_stack([u, 200.0 + 140.0 * np.sin(pi * (u - 200.0) / 1100.0)])
+    points = np.round(16.0 * course).astype(np.int32)  # 4 bits of a pixel
+    for across in range(72, 2, -4):
+        lit = edge + (crest - edge) * np.sqrt(1.0 - (across / 72.0) ** 2)
+        cv2.polylines(picture, [points], False, lit, across, cv2.LINE_AA, 4)
+    for u0, v0 in points[[0, -1]].tolist():
+        cv2.circle(picture, (u0, v0), 16 * 62, cover, cv2.FILLED, cv2.LINE_AA, 4)
+        cv2.circle(picture, (u0, v0), 16 * 32, cover - 30, 8, cv2.LINE_AA, 4)
+    noisy = cv2.GaussianBlur(picture, (0, 0), 1.5) + rng.normal(0.0, 1.5, picture.shape)
+    return Photo("a.png", np.clip(noisy, 0, 255).astype(np.uint8), 8), course
+
+
+@pytest.mark.parametrize(("edge", "crest", "cover"), [(70, 155, 130), (90, 155, 110), (90, 170, 110), (90, 140, 130)])
+def test_without_a_scale_the_flanks_of_a_sheath_pass_for_no_cable(edge: float, crest: float, cover: int) -> None:
+    """Each flank is a strip as long as the cable, and both may join at a cover: too thin for their length."""
+    photo, course = round_sheath(edge, crest, cover)
+    found = find_cable(photo, SETTINGS, cable=Cable(slenderness=1150 / 72))
+    assert isinstance(found, RoughCable)
+    between_covers = found.path_px[(found.path_px[:, 0] > 262.0) & (found.path_px[:, 0] < 1238.0)]
+    assert cKDTree(course).query(between_covers)[0].max() < 0.25 * 72  # a flank lies half a diameter aside
+
+
+def test_without_a_scale_a_strip_of_another_slenderness_is_refused() -> None:
+    photo, _ = round_sheath(90, 90, 130)
+    wrong = find_cable(photo, SETTINGS, cable=Cable(slenderness=2.5 * 1150 / 72))
+    assert isinstance(wrong, Rejected)
+    assert wrong.code == "photo/width" and "length_mm and diameter_mm" in wrong.reason
