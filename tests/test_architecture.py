@@ -92,9 +92,9 @@ INSIDE = {
     "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes", "steady")],
     "pipeline.vision.centerline": [
         ("curvature", "smoothing", "edge_profile"),
-        ("curve_fit", "edges"),
+        ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),
-        ("path",),
+        ("path", "refusal"),
         ("measurement", "lay", "side"),
     ],
     "pipeline.vision.render": [

@@ -19,8 +19,9 @@ from pipeline.records import Array, Centerline, Finding, Preview, Rejected, Scal
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
+from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
 from pipeline.vision.centerline.lay import without_lay
-from pipeline.vision.centerline.measurement import measure_centerline
+from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable
 from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
@@ -35,6 +36,7 @@ from pipeline.vision.scale.calibration import (
     from_found,
     from_number,
 )
+from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
@@ -64,7 +66,10 @@ def trace_photo(
         return photo
     preview = reduce_photo(photo, settings.preview)
     rough = find_cable(photo, settings, cable=Cable(diameter_px=diameter_px))
-    return _measure(rough, PlaneMap.from_scale(1.0), diameter_px, preview, settings)
+    if isinstance(rough, Rejected):
+        return _shown(rough, preview, settings)
+    plane = PlaneMap.from_scale(1.0)
+    return _shown(follow_cable(rough, plane=plane, diameter_m=diameter_px, settings=settings), preview, settings)
 
 
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
@@ -125,17 +130,8 @@ def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibrat
     return None
 
 
-def _line(
-    shot: Shot, plane: PlaneMap, diameter_m: float, parallax_std: float, settings: VisionSettings
-) -> Centerline | Rejected:
-    work = partial(_measure, shot.found, plane, diameter_m, shot.preview, settings, axis_parallax_std=parallax_std)
-    line = guarded(shot.found.image, work)
-    # the picture is shown also where the work on it broke
-    return replace(line, preview=shot.preview) if line.preview is None else line
-
-
 def _told_by(
-    shots: Sequence[Shot], outcomes: Sequence[RoughCable | Centerline | Rejected]
+    shots: Sequence[Shot], outcomes: Sequence[RoughCable | Followed | Centerline | Rejected]
 ) -> tuple[list[RoughCable], Array]:
     """Cables and displacements of the photos that were not refused: what was may show something else."""
     pairs = zip(shots, outcomes, strict=True)
@@ -147,44 +143,61 @@ def _told_by(
 def _measure_all(
     specimen: Specimen, shots: list[Shot], calibration: Calibration, parallax_std: float, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Centerline | Rejected, ...], tuple[Finding, ...]]:
-    """Measure all photos; once more if those that can be measured tell that sides or axes are others than taken."""
+    """Measure all photos: the cables that can be followed tell the sides and the axes of all."""
 
-    def measured(some: list[Shot]) -> tuple[Centerline | Rejected, ...]:
-        return tuple(_line(shot, calibration.plane, specimen.diameter_m, parallax_std, settings) for shot in some)
-
-    lines = measured(shots)
-    found, _ = _told_by(shots, lines)
-    wandering = wandering_px(found, calibration.scale.px_per_m, settings.series)
-    named, findings = _name_sides(specimen, shots, found, calibration, settings)
-    if wandering > 0.0:
-        named = [
-            replace(shot, found=at_least(shot.found, wandering)) if isinstance(shot.found, RoughCable) else shot
-            for shot in named
-        ]
-    return named, lines if named is shots else measured(named), findings
-
-
-def _measure(
-    rough: RoughCable | Rejected,
-    plane: PlaneMap,
-    diameter_m: float | None,
-    preview: Preview | None,
-    settings: VisionSettings,
-    *,
-    axis_parallax_std: float = 0.0,
-) -> Centerline | Rejected:
-    outcome = (
-        rough
-        if isinstance(rough, Rejected)
-        else measure_centerline(
-            rough, plane=plane, diameter_m=diameter_m, settings=settings, axis_parallax_std=axis_parallax_std
+    def follow(found: RoughCable | Rejected) -> Followed | Rejected:
+        if isinstance(found, Rejected):
+            return found
+        plane, diameter = calibration.plane, specimen.diameter_m
+        work = partial(
+            follow_cable, found, plane=plane, diameter_m=diameter, settings=settings, axis_parallax_std=parallax_std
         )
-    )
-    if preview is None:
-        return outcome
-    if isinstance(outcome, Centerline) and isinstance(rough, RoughCable):
-        preview = with_strip(preview, outcome, rough, settings.preview)
-    return replace(outcome, preview=preview)
+        return guarded(found.image, work)
+
+    cables = [follow(shot.found) for shot in shots]
+    found, _ = _told_by(shots, cables)
+    named, findings = _name_sides(specimen, shots, found, calibration, settings)
+    if named is not shots:
+        cables = [follow(shot.found) for shot in named]
+    wandering = wandering_px(found, calibration.scale.px_per_m, settings.series)
+    if wandering > 0.0:
+        cables = [c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables]
+    return named, _tied(named, cables, settings), findings
+
+
+def _loosened(cable: Followed, std_px: float) -> Followed:
+    """The cable with axes no surer than ``std_px``."""
+    rough = at_least(cable.rough, std_px)
+    chord = chord_frame(rough, cable.chord.plane, cable.chord.axis_parallax_std)
+    return replace(cable, rough=rough, chord=chord)
+
+
+def _tied(
+    shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings
+) -> tuple[Centerline | Rejected, ...]:
+    """Centerlines of the cables, each tied to its axes by what the others tell of how a cable passes them."""
+    sights = [
+        cable if isinstance(cable, Rejected) else guarded(cable.rough.image, partial(cable.sight, settings))
+        for cable in cables
+    ]
+    told = iter(told_by_others([sight for sight in sights if isinstance(sight, AxisSight)]))
+    expected = [next(told) if isinstance(sight, AxisSight) else None for sight in sights]
+    lines = []
+    for shot, cable, axes in zip(shots, cables, expected, strict=True):
+        line = guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes))
+        # the picture is shown also where the work on it broke
+        lines.append(replace(line, preview=shot.preview) if line.preview is None else line)
+    return tuple(lines)
+
+
+def _shown(
+    cable: Followed | Rejected, preview: Preview | None, settings: VisionSettings, told: AxesTold | None = None
+) -> Centerline | Rejected:
+    """Centerline of a cable, with its picture."""
+    if isinstance(cable, Rejected):
+        return cable if preview is None else replace(cable, preview=preview)
+    line = centerline_of(cable, settings, told)
+    return line if preview is None else replace(line, preview=with_strip(preview, line, cable.rough, settings.preview))
 
 
 def _name_sides(

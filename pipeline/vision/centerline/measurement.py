@@ -8,24 +8,35 @@ Chord frame: origin at the left bearing axis, x to the right axis, y toward the 
 is mirrored or not.
 
 Under the bearing covers nothing is seen; there the curve is continued to the axes as far as they are known
-(`pipeline.vision.centerline.continuation`), its uncertainty grows and the points are marked as not seen. By how much
+(`pipeline.vision.centerline.continuation`), its uncertainty grows and the points are marked as not seen. What a series
+tells of its axes comes in between: `follow_cable` on each photo, then `centerline_of` what was followed. By how much
 the curve of the seen part alone misses the axes is a figure of quality.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.records import Array, Centerline, Finding, Rejected
+from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.centerline import CurveSettings
-from pipeline.vision.centerline.continuation import continue_to_axes
+from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
+from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
+from pipeline.vision.centerline.refusal import (
+    beside_axis,
+    feet_of_axes,
+    middle_width,
+    refusal,
+    refusal_beside_axis,
+)
 from pipeline.vision.centerline.smoothing import Witness
-from pipeline.vision.rough import RoughCable
+from pipeline.vision.rough import AxisKind, RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
 from rod.measurement import MeasuredShape
@@ -63,6 +74,84 @@ def measure_centerline(
     ValueError
         If a break lies outside the cable.
     """
+    followed = follow_cable(
+        rough,
+        plane=plane,
+        diameter_m=diameter_m,
+        settings=settings,
+        breaks_m=breaks_m,
+        axis_parallax_std=axis_parallax_std,
+    )
+    return followed if isinstance(followed, Rejected) else centerline_of(followed, settings)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A cable fitted where its photo shows it, not yet tied to its axes.
+
+    Attributes
+    ----------
+    rough : RoughCable
+    chord : ChordFrame
+    sections : Sections
+    width : (n,) m
+        Of the cable on the sections.
+    fit : CurveFit
+        In the chord frame.
+    covariance : (p, p)
+        Of its parameters, the light's errors included.
+    light : (std m, length m)
+        Of the light's slow error.
+    diameter_m : m or None
+    """
+
+    rough: RoughCable
+    chord: ChordFrame
+    sections: Sections
+    width: Array
+    fit: CurveFit
+    covariance: Array
+    light: tuple[float, float]
+    diameter_m: float | None
+
+    def sight(self, settings: VisionSettings) -> AxisSight | None:
+        """How the cable passes its axes; None where these are the ends that were seen."""
+        return sight_of_axes(
+            self.fit,
+            self.covariance,
+            self.chord,
+            kinds=self._kinds,
+            width=middle_width(self.width)[0],
+            settings=settings.curve,
+        )
+
+    def tied(self, told: AxesTold | None, settings: VisionSettings) -> tuple[CurveFit, Array]:
+        """Curve and covariance with what is known of the axes."""
+        return continue_to_axes(
+            self.fit,
+            self.covariance,
+            self.chord,
+            kinds=self._kinds,
+            width=middle_width(self.width)[0],
+            settings=settings.curve,
+            told=told,
+        )
+
+    @property
+    def _kinds(self) -> tuple[AxisKind, AxisKind]:
+        return self.rough.left.kind, self.rough.right.kind
+
+
+def follow_cable(
+    rough: RoughCable,
+    *,
+    plane: PlaneMap,
+    diameter_m: float | None,
+    settings: VisionSettings,
+    breaks_m: tuple[float, ...] = (),
+    axis_parallax_std: float = 0.0,
+) -> Followed | Rejected:
+    """The cable fitted where it is seen, or why it cannot be; arguments of `measure_centerline`."""
     options = settings.curve
     half_width = rough.half_width_px
     if diameter_m is not None:
@@ -73,76 +162,18 @@ def measure_centerline(
         return sections
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
-    refused = _refusal(rough, sections, width, diameter_m, options)
+    refused = refusal(rough, sections, width, diameter_m, options)
     if refused is not None:
         return refused
     fit = _fit(sections, chord, width, breaks_m, options)
-    refused = _beside_axis(rough, fit, chord, width, options)
+    refused = refusal_beside_axis(rough, fit, chord, width, options)
     if refused is not None:
         return refused
-    return _assemble(rough, sections, chord, width, fit, diameter_m, options)
-
-
-def _refusal(
-    rough: RoughCable, sections: Sections, width: Array, diameter: float | None, options: CurveSettings
-) -> Rejected | None:
-    """What the figures forbid."""
-    radius = 0.5 * float(np.median(sections.width))
-    middle, scatter = _width(width)
-    ratio = sections.contrast / max(sections.noise, 1e-9)
-    figure = {
-        "contrast_to_noise": ratio,
-        "blur_px": sections.blur,
-        "width_scatter": scatter,
-        "measured_share": sections.share,
-    }
-    if diameter is not None:
-        figure["width_over_diameter"] = middle / diameter
-
-    def rejected(code: str, reason: str) -> Rejected:
-        return Rejected(rough.image, code, reason, figure=figure)
-
-    # chance gives no constant width: what then counts as noise is a pattern of the sheath or the ground
-    quiet = rough.contrast >= options.min_contrast_to_noise * rough.noise
-    constant = scatter < (options.quiet_width_scatter if quiet else options.sure_width_scatter)
-    needed = options.patterned_contrast_to_noise if constant else options.min_contrast_to_noise
-    if ratio < needed and quiet and scatter >= options.sure_width_scatter:
-        # the pixels are quiet enough: what is between them and a clean pair of edges is no noise
-        return rejected(
-            "photo/outline",
-            f"the cable's outline is no pair of smooth edges: the picture beside them is off by"
-            f" {100.0 * sections.noise / sections.contrast:.0f} % of their contrast, though its pixels are quiet, and"
-            f" the width varies by {100.0 * scatter:.0f} %; twisted pairs, bare strands and a sheath or ground of"
-            " strong pattern do that",
-        )
-    if ratio < needed:
-        return rejected(
-            "photo/contrast",
-            f"contrast of the cable's edges is {ratio:.1f} times the noise, too little to place"
-            f" an edge (at least {needed:g})",
-        )
-    if sections.blur > options.max_blur_radii * radius:
-        return rejected(
-            "photo/blur",
-            f"the edges are blurred over {sections.blur:.1f} px (standard deviation) on a cable"
-            f" {2 * radius:.0f} px wide",
-        )
-    if diameter is not None and abs(middle / diameter - 1.0) > options.max_width_error:
-        return rejected(
-            "photo/width",
-            f"what was traced is {100.0 * middle / diameter:.0f} % as wide as the cable: the cable is split"
-            " along a highlight or shadow, or scale or diameter are wrong",
-        )
-    if scatter > options.max_width_scatter:
-        return rejected(
-            "photo/width",
-            f"the width of what was traced varies by {100.0 * scatter:.0f} % along it; a cable's does not",
-        )
-    if sections.share < options.min_measured_share:
-        return rejected(
-            "photo/contrast", f"both edges of the cable were found on {100.0 * sections.share:.0f} % of its length only"
-        )
-    return None
+    metres = float(np.median(width / sections.width))
+    light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
+    covariance = _with_light(fit, *light)
+    covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
+    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
 def _fit(
@@ -184,25 +215,22 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
-def _assemble(
-    rough: RoughCable,
-    sections: Sections,
-    chord: ChordFrame,
-    width: Array,
-    fit: CurveFit,
-    diameter: float | None,
-    options: CurveSettings,
-) -> Centerline:
-    """Record of a fitted curve, from foot to foot of the bearing axes."""
-    misses = _feet(fit, chord)[1]
+def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold | None = None) -> Centerline:
+    """Record of a followed cable, from foot to foot of the bearing axes.
+
+    Parameters
+    ----------
+    followed : Followed
+    settings : VisionSettings
+    told : AxesTold, optional
+        What the other photos of its series tell of how the cable passes the axes.
+    """
+    rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
+    options, (middle, scatter) = settings.curve, middle_width(width)
+    misses = feet_of_axes(followed.fit, chord)[1]
     metres = float(np.median(width / sections.width))
-    light_std, light_length = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
-    covariance = _with_light(fit, light_std, light_length)
-    covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
-    middle, scatter = _width(width)
-    kinds = (rough.left.kind, rough.right.kind)
-    fit, covariance = continue_to_axes(fit, covariance, chord, kinds=kinds, width=middle, settings=options)
-    feet = _feet(fit, chord)[0]
+    fit, covariance = followed.tied(told, settings)
+    feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
@@ -228,13 +256,13 @@ def _assemble(
         section_y=fit.points[used, 1],
         section_std=fit.smooth.sigma * (fit.std / np.sqrt(np.maximum(fit.weight, 1e-9)))[used],
         correlation_length=fit.smooth.correlation_length,
-        systematic_std=light_std,
-        systematic_length=light_length,
+        systematic_std=followed.light[0],
+        systematic_length=followed.light[1],
     )
     uv = chord.to_pixels(where)
     quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
-    if diameter is not None:
-        quality["width_over_diameter"] = middle / diameter
+    if followed.diameter_m is not None:
+        quality["width_over_diameter"] = middle / followed.diameter_m
     return Centerline(
         image=rough.image,
         shape=shape,
@@ -253,56 +281,8 @@ def _assemble(
         width_std_m=scatter * middle,
         mirrored=chord.mirrored,
         quality=quality,
-        findings=rough.findings + _beside(float(misses.max()), middle, options),
+        findings=rough.findings + beside_axis(float(misses.max()), middle, options),
     )
-
-
-def _width(width: Array) -> tuple[float, float]:
-    """Median width, and its robust relative scatter along s."""
-    middle = float(np.median(width))
-    return middle, 1.4826 * float(np.median(np.abs(width - middle))) / middle
-
-
-def _feet(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
-    """Arc lengths of the feet of both bearing axes on the curve, and their distances from it."""
-    feet = fit.curve.foot(chord.axes, np.array([0.0, fit.curve.frame.knots[-1]]))
-    return feet, np.asarray(np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T))
-
-
-def _beside_axis(
-    rough: RoughCable, fit: CurveFit, chord: ChordFrame, width: Array, options: CurveSettings
-) -> Rejected | None:
-    """Refuse a curve that passes beside the axis of a cover that was found, or far beside the end that was seen."""
-    axes = (rough.left, rough.right)
-    covers = np.array([bearing.radius_px is not None for bearing in axes])
-    ends = np.array([bearing.kind in ("end", "clamp") for bearing in axes])
-    shares = _feet(fit, chord)[1] / (0.5 * _width(width)[0])
-    if (shares[ends] > options.max_end_distance_radii).any():
-        worst = float(shares[ends].max())
-        return Rejected(
-            rough.image,
-            "photo/bearing",
-            f"what was traced passes {worst:.2f} cable radii beside the cable's visible end: too little of the cable"
-            " between its ends was seen to follow it",
-            figure={"axis_distance_radii": worst},
-        )
-    share = float((shares * covers).max())
-    if share <= options.max_axis_distance_radii:
-        return None
-    return Rejected(
-        rough.image,
-        "photo/bearing",
-        f"what was traced passes {share:.2f} cable radii beside the axis of a bearing cover: it is a flank, a shadow or"
-        " a stripe of the cable, or the cover is not the bearing's",
-        figure={"axis_distance_radii": share},
-    )
-
-
-def _beside(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
-    if miss <= 0.5 * options.axis_distance_radii * width:
-        return ()
-    message = f"the centerline passes {miss / width:.1f} cable diameters beside a bearing axis: is the axis right?"
-    return (Finding("photo/bearing", "warning", message),)
 
 
 def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.bool_]) -> dict[str, float]:
@@ -318,7 +298,7 @@ def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.
         "measured_share": sections.share,
         "rejected_sections": float(np.mean(~used)),
         "effective_parameters": fit.smooth.freedom,
-        "width_scatter": _width(sections.width)[1],
+        "width_scatter": middle_width(sections.width)[1],
     }
 
 

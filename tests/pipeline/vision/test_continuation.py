@@ -9,7 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from pipeline.settings.vision.centerline import CurveSettings
-from pipeline.vision.centerline.continuation import continue_to_axes
+from pipeline.vision.centerline.axes_of_series import told_by_others
+from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.path import fit_along
 from pipeline.vision.render import Curve
 from pipeline.vision.scale.chord import ChordFrame
@@ -53,16 +54,21 @@ def cases():
     return fitted(bow)
 
 
-def _errors(case, *, kinds=("cover", "cover"), beside=0.0, apart=0.0, known=True):
+def _seen(case, beside, apart):
+    """Fit in the frame of axes seen off by ``beside`` and ``apart`` m, its covariance and that frame."""
+    fit, curve = case
+    origin = np.array([-apart, beside])
+    chord = ChordFrame(PlaneMap.from_scale(1.0), origin, np.eye(2), curve.chord + 2.0 * apart, 1e-5, False, PARALLAX)
+    return replace(fit, curve=replace(fit.curve, point=fit.curve.point - origin)), fit.smooth.covariance, chord
+
+
+def _errors(case, *, kinds=("cover", "cover"), beside=0.0, apart=0.0, known=True, told=None):
     """Errors of kappa at both ends and their standard deviations, 1/m; axes seen off by ``beside`` and ``apart`` m."""
     fit, curve = case
     covariance = fit.smooth.covariance
     if known:
-        origin = np.array([-apart, beside])
-        seen = curve.chord + 2.0 * apart
-        chord = ChordFrame(PlaneMap.from_scale(1.0), origin, np.eye(2), seen, 1e-5, False, PARALLAX)
-        fit = replace(fit, curve=replace(fit.curve, point=fit.curve.point - origin))
-        fit, covariance = continue_to_axes(fit, covariance, chord, kinds=kinds, width=DIAMETER, settings=SETTINGS)
+        known_of = {"kinds": kinds, "width": DIAMETER, "settings": SETTINGS, "told": told}
+        fit, covariance = continue_to_axes(*_seen(case, beside, apart), **known_of)
     ends = np.array([0.0, LENGTH])
     basis = fit.curve.curvature_basis(ends)
     std = np.sqrt(((basis @ covariance) * basis).sum(axis=1))
@@ -99,3 +105,16 @@ def test_band_covers_the_truth_when_covers_are_seen_too_far_apart(cases):
 def test_axes_of_visible_ends_tell_nothing(cases):
     here, there = (_errors(cases[0], kinds=("end", "cover"), beside=off)[0] for off in (0.0, 1e-3))
     np.testing.assert_allclose(here, there, rtol=1e-9)
+
+
+@pytest.mark.parametrize("off", [{}, {"apart": 4e-4, "beside": 2e-4}], ids=["flat", "parallax"])
+def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
+    """Twelve bows taken for photos of one camera: what they share is found, and the ends come out better for it."""
+    off = {"beside": 0.0, "apart": 0.0} | off
+    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
+    together = told_by_others([sight_of_axes(*_seen(case, **off), **known) for case in cases])
+    alone = _rms([_errors(case, **off)[0] for case in cases])
+    found = [_errors(case, **off, told=told) for case, told in zip(cases, together, strict=True)]
+    # 0.26 to 0.16 1/m where the axes are exact, 0.33 to 0.23 with parallax; the same noise in both
+    assert _rms([error for error, _ in found]) < 0.75 * alone
+    assert np.mean([np.abs(error) < 1.96 * std for error, std in found]) > 0.85
