@@ -11,6 +11,7 @@ import base64
 import datetime
 import importlib.metadata
 import platform
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -90,7 +91,7 @@ def assemble(
     earlier = [
         *specimen.findings,
         *traces.findings,
-        *(finding for photo in traces.photos for finding in photo_findings(photo)),
+        *folded((photo.image, finding) for photo in traces.photos for finding in photo_findings(photo)),
         *parts.findings,
     ]
     gathered = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
@@ -173,6 +174,24 @@ def photo_findings(photo: Centerline | Rejected) -> tuple[Finding, ...]:
     if isinstance(photo, Centerline):
         return tuple(photo.findings)
     return (Finding(photo.code, "warning", f"{photo.image}: {photo.reason.removeprefix(f'{photo.image}: ')}"),)
+
+
+def folded(noticed: Iterable[tuple[str, Finding]]) -> list[Finding]:
+    """Findings of photos, by their names: what is the same on several, but for its numbers, is said once for all."""
+    groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
+    for image, finding in noticed:
+        message = finding.message.removeprefix(f"{image}: ")
+        groups.setdefault((finding.code, re.sub(r"[\d.]+", "", message)), []).append((image, finding))
+    return [_said_once(group) for group in groups.values()]
+
+
+def _said_once(group: list[tuple[str, Finding]]) -> Finding:
+    image, first = group[0]
+    names = list(dict.fromkeys(image for image, _ in group))
+    if len(names) == 1:
+        return first
+    message = f"{len(names)} photos ({', '.join(names)}): {first.message.removeprefix(f'{image}: ')}"
+    return Finding(first.code, first.level, message)
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:

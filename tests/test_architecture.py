@@ -77,7 +77,7 @@ INSIDE = {
         ("judgement",),
         ("segmentation",),
         ("shots",),
-        ("picture_size",),
+        ("picture_size", "stated_width"),
         ("series",),
     ],
     "pipeline.vision.scale": [("plane",), ("calibration", "chord", "corners", "plane_fit"), ("board", "doubt")],

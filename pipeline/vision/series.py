@@ -41,6 +41,7 @@ from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
 from pipeline.vision.shots import Shot, find_cables, guarded, with_fixed_cover
+from pipeline.vision.stated_width import with_width_seen
 
 
 def trace_photo(
@@ -90,6 +91,12 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     InputError
         The calibration photos cannot be used.
     """
+    traces = _traces(specimen, settings)
+    return with_width_seen(specimen, traces, settings, retrace=_traces, trace=trace_photo)
+
+
+def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
+    """All photos with the diameter as stated."""
     calibration = _given_calibration(specimen, settings)
     shots, cover_findings = find_cables(specimen, calibration, settings)
     shots, size_findings = of_one_size(shots, settings.series)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.assembly import headline, photo_findings, without_those_told_better
+from pipeline.assembly import folded, headline, photo_findings, without_those_told_better
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import answer
 from pipeline.report.words import Words
@@ -64,3 +64,19 @@ def test_what_the_diagnosis_names_is_said_once():
     unit = Finding("log/unit", "warning", "the log seems to hold cm instead of mm")
     assert [f.code for f in without_those_told_better(noticed, [unit])] == ["scale/length"]
     assert without_those_told_better(noticed, []) == noticed
+
+
+def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
+    def narrow(image, share):
+        reason = (
+            f"what was traced is {share} % as wide as the cable: the cable is split along a highlight or shadow, or"
+        )
+        return image, Finding("photo/width", "warning", f"{image}: {reason} scale or diameter are wrong")
+
+    axis = Finding("photo/bearing", "warning", "the centerline passes 0.2 cable diameters beside a bearing axis")
+    noticed = [narrow("a.png", 116), ("b.png", axis), narrow("b.png", 115), narrow("c.png", 116)]
+    told = folded(noticed)
+    assert [finding.code for finding in told] == ["photo/width", "photo/bearing"]
+    assert told[0].message.startswith("3 photos (a.png, b.png, c.png): what was traced is 116 % as wide")
+    assert told[1] == axis and folded(noticed[:1]) == [noticed[0][1]]
+    assert Words("de").said(told[0].message).language == "de"

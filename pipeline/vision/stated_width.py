@@ -1,0 +1,103 @@
+"""A stated diameter that no photo shows: told once, with the width that they show, and measured with that.
+
+A diameter that is wrong by a factor leads the search astray: with twice the width, shadow, highlight and ground beside
+the cable pass for its edges. So where most photos are refused for what their strips look like, a few are traced without
+any diameter. If these agree on another width, and on a cable about as long as stated, it is the diameter that is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
+from pipeline.settings.vision import VisionSettings
+
+MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
+"""What photos are refused for when a strip of another width is looked for: edges beside the cable, or half of it."""
+
+LOOKED_AT = 3
+"""Photos that are traced without a diameter; all must agree."""
+
+ALIKE = 0.05
+"""Relative; widths on several photos of one cable agree to a percent, those of shadows and highlights do not."""
+
+LEAST_LENGTH, MOST_LENGTH = 0.7, 1.1
+"""Visible length over the stated one: covers hide up to a diameter or three at each end, and photos have a scale."""
+
+
+def with_width_seen(
+    specimen: Specimen,
+    traces: Traces,
+    settings: VisionSettings,
+    *,
+    retrace: Callable[[Specimen, VisionSettings], Traces],
+    trace: Callable[..., Centerline | Rejected],
+) -> Traces:
+    """The traces as they are, or those with the width that the photos show.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    traces : Traces
+        With the diameter as stated.
+    settings : VisionSettings
+    retrace, trace : callable
+        Trace a series, and a single photo without a diameter.
+
+    Returns
+    -------
+    Traces
+        Where the width seen does not lead to more photos, all of them are refused: what was traced is not the cable.
+    """
+    refused = [photo for photo in traces.photos if isinstance(photo, Rejected) and photo.code in MISLED]
+    if 2 * len(refused) < max(len(traces.photos), 1):
+        return traces
+    width_m = _width_seen(specimen, traces, settings, trace)
+    if width_m is None:
+        return traces
+    again = retrace(replace(specimen, diameter_m=width_m), settings)
+    seen = [photo.width_m for photo in again.photos if isinstance(photo, Centerline)]
+    better = len(seen) > len(again.photos) - len(refused)
+    used = "that width was taken" if better else "no photo was used"
+    shown = float(np.median(seen)) if better else width_m
+    finding = Finding(
+        "diameter/seen",
+        "error",
+        f"the photos show a cable {1e3 * shown:.2f} mm wide where diameter_mm says "
+        f"{1e3 * specimen.diameter_m:.3g}: diameter_mm, or the scale, is wrong; {used}",
+    )
+    if better:
+        return replace(again, findings=(finding, *again.findings))
+    photos = tuple(_refused(photo) for photo in traces.photos)
+    return replace(traces, photos=photos, findings=(finding, *traces.findings))
+
+
+def _width_seen(
+    specimen: Specimen, traces: Traces, settings: VisionSettings, trace: Callable[..., Centerline | Rejected]
+) -> float | None:
+    """Width (m) on which a few photos agree that are traced without a diameter; None if it may be the stated one."""
+    paths: list[Path] = [specimen.images[photo.image] for photo in traces.photos if photo.image in specimen.images]
+    places = {round(place) for place in np.linspace(0, len(paths) - 1, LOOKED_AT)} if paths else set()
+    lines = [trace(paths[i], settings=settings) for i in sorted(places)]
+    free = [line for line in lines if isinstance(line, Centerline)]
+    px_per_m = specimen.camera.scale_px_per_m or traces.scale.px_per_m
+    if len(free) < min(2, len(paths)) or not free or px_per_m <= 1.0:
+        return None
+    widths = np.array([line.width_m for line in free]) / px_per_m
+    lengths = np.array([line.traced_length_m for line in free]) / px_per_m / specimen.length_m
+    alike = np.ptp(widths) < ALIKE * np.median(widths)
+    whole = lengths.min() > LEAST_LENGTH and lengths.max() < MOST_LENGTH
+    width = float(np.median(widths))
+    off = abs(width / specimen.diameter_m - 1.0) > settings.curve.max_width_error
+    return width if alike and whole and off else None
+
+
+def _refused(photo: Centerline | Rejected) -> Rejected:
+    if isinstance(photo, Rejected):
+        return photo
+    reason = "what was traced has neither the width stated nor that of the cable on the other photos"
+    return Rejected(photo.image, "photo/width", reason, photo.preview, {"width_m": photo.width_m})

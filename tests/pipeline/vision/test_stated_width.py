@@ -1,0 +1,40 @@
+"""A wrong diameter: told once with the width that the photos show, and no photo is traced beside its cable."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.intake.folder import read_specimen
+from pipeline.records import Centerline
+from pipeline.settings import Settings
+from pipeline.vision.series import trace_series
+
+FOLDER = Path(__file__).parents[3] / "fixtures" / "specimens" / "three"
+SETTINGS = Settings()
+STATED = 4.6e-3
+
+
+@pytest.fixture(scope="module")
+def specimen():
+    return read_specimen(FOLDER, SETTINGS.intake)
+
+
+def widths(traces):
+    return [photo.width_m for photo in traces.photos if isinstance(photo, Centerline)]
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5, 1.4])
+def test_a_wrong_diameter_is_one_finding_and_every_photo_is_traced_with_the_width_seen(specimen, factor):
+    traces = trace_series(replace(specimen, diameter_m=factor * STATED), SETTINGS.vision)
+    (told,) = [finding for finding in traces.findings if finding.code == "diameter/seen"]
+    assert told.level == "error" and "cable 4.6" in told.message
+    assert f"diameter_mm says {1e3 * factor * STATED:.3g}" in told.message
+    assert widths(traces) == pytest.approx([STATED] * 3, rel=0.03)
+    lengths = [photo.traced_length_m for photo in traces.photos]
+    assert lengths == pytest.approx([specimen.length_m] * 3, rel=2e-3)
+
+
+def test_the_right_diameter_is_not_doubted(specimen):
+    traces = trace_series(specimen, SETTINGS.vision)
+    assert len(widths(traces)) == 3 and "diameter/seen" not in [finding.code for finding in traces.findings]
