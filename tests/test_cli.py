@@ -152,6 +152,11 @@ def test_a_folder_that_does_not_exist_costs_the_others_nothing(cheap):
         ["simulate", "virtual", "--hide", "rig_complianc=1e-5"],
         ["simulate", "virtual", "--hide", "rig_compliance"],
         ["simulate", "virtual", "--length-mm", "-1"],
+        ["simulate", "virtual", "--hide", "rigid_ends=0.09"],
+        ["simulate", "virtual", "--hide", "pre_curvature=40"],
+        ["simulate", "virtual", "--k0", "-18"],
+        ["simulate", "virtual", "--hide", "stiffness_varying=-1.5"],
+        ["simulate", "virtual", "--hide", "force_offset=0.1", "--hide", "force_offset=0.2"],
         ["explain", "rig_complianc"],
         ["init"],
     ],
@@ -306,6 +311,9 @@ def test_settings_that_are_refused(text, code, line, hint, tmp_path):
 def test_explain_knows_every_cause_of_the_contract():
     known = call("explain").stdout
     assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 20
+    parts = ("Amount:", "Sits in:", "Shows with:", "Told apart by:", "At the rig:", "Settled by:")
+    assert all(part in call("explain", "pre_curvature").stdout for part in parts)
+    assert "An der Anlage:" in call("explain", "pre_curvature", "--language", "de").stdout
     page = call("explain", "rig_compliance").stdout
     assert page.startswith("rig_compliance (m/N")
     german = call("explain", "rig_compliance", "--language", "de").stdout

@@ -87,13 +87,12 @@ def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[In
             click.echo(f"cablebend: {error.sentence}", err=True)
     for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
         other = misnamed(folder)
-        if other is None:
-            told = f"has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`"
-        elif folder in folders:
+        if other is not None and folder in folders:
             continue  # said above
-        else:
-            told = f"holds {other}, but no specimen.toml; write its name in small letters"
-        click.echo(f"cablebend: {folder}: {told}.", err=True)
+        told = (
+            f"{folder}: has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`."
+        )
+        click.echo(f"cablebend: {told if other is None else other.sentence}", err=True)
     return list(specimens), refused
 
 

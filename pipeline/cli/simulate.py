@@ -15,7 +15,12 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
     from pipeline.simulate import parse_effect
 
     try:
-        return dict(parse_effect(text) for text in texts)
+        effects = [parse_effect(text) for text in texts]
+        names = [name for name, _ in effects]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{twice} is given {names.count(twice)} times: give one --hide with the size of all")
+        return dict(effects)
     except ValueError as error:
         raise click.BadParameter(f"{error}.") from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.statistics.verdict import Verdict
@@ -111,15 +112,48 @@ def cause_by_name(name: str) -> Cause:
     raise ValueError(f"unknown cause {name!r}; known are {', '.join(cause.name for cause in CATALOGUE)}")
 
 
+class Described(NamedTuple):
+    """What is said of a cause; attributes as of `pipeline.diagnosis.causes.Cause`."""
+
+    name: str
+    unit: str
+    sign: int
+    seat: str
+    summary: str
+    sign_means: str
+    needs: str
+    apart: str
+    remedy: str
+    settled_by: str
+
+
+PRE_CURVATURE = Described(
+    name="pre_curvature",
+    unit="1/m",
+    sign=0,
+    seat="cable",
+    summary=(
+        "The cable is uniformly bent at rest. Its curvature K0 is part of the base model and fitted on every specimen: "
+        "only a simulation that starts from a straight cable has to find it."
+    ),
+    sign_means="K0, positive toward the side to which the cable is bent most",
+    needs="a photo of the force-free cable, or several loading steps",
+    apart=(
+        "A uniform K0 bends the force-free cable to an arc of a circle. A load in the plane and a varying "
+        "pre-curvature give it another shape, and friction in the bearings shows in the loaded photos only."
+    ),
+    remedy=(
+        "Photograph the mounted, force-free cable, and push it to the side to which it bows by itself: pushed the "
+        "other way, it may snap through."
+    ),
+    settled_by="a photo of the mounted, force-free cable",
+)
+"""Part of the base model, so no class of the catalogue, but a name of the contract like the others."""
+
+
 def explain(name: str) -> str:
     """Page on one cause: what it is, what shows it, what it is confused with, what to do at the rig."""
-    if name == "pre_curvature":
-        return (
-            "pre_curvature (K0, 1/m)\n\nThe cable is uniformly bent at rest. K0 is part of the base model and fitted "
-            "on every specimen;\nonly a simulation that starts from a straight cable of constant stiffness has to "
-            "find it.\n"
-        )
-    cause = cause_by_name(name)
+    cause = PRE_CURVATURE if name == PRE_CURVATURE.name else cause_by_name(name)
     sign = "not negative" if cause.sign else "either sign"
     lines = [
         f"{cause.name} ({cause.unit}, {sign})",

@@ -45,12 +45,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
         if not here:
             other = misnamed(path)
             if other is not None:
-                raise InputError(
-                    f"holds {other}, but no {NAME}",
-                    path=path,
-                    code="folder/no-specimen",
-                    remedy=f"write its name in small letters: {NAME}",
-                )
+                raise other
             raise InputError(
                 f"holds no {NAME}, neither itself nor in its folders",
                 path=path,
@@ -61,12 +56,20 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     return list(found)
 
 
-def misnamed(folder: Path) -> str | None:
-    """The file of a folder that differs from ``specimen.toml`` by capitals only; not every system takes it for that."""
+def misnamed(folder: Path) -> InputError | None:
+    """What to say of a folder with a ``specimen.toml`` in capitals, which not every system finds."""
     try:
-        return next((e.name for e in folder.iterdir() if e.name != NAME and e.name.casefold() == NAME), None)
+        other = next((e.name for e in folder.iterdir() if e.name != NAME and e.name.casefold() == NAME), None)
     except OSError:
         return None
+    if other is None:
+        return None
+    return InputError(
+        f"holds {other}, but no {NAME}",
+        path=folder,
+        code="folder/no-specimen",
+        remedy=f"write its name in small letters: {NAME}",
+    )
 
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:

@@ -32,6 +32,15 @@ SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0
 ONE_SIDED = frozenset(
     {"hysteresis", "plastic_set", "relaxation", "bearing_friction", "bearing_stiffness", "rigid_ends", "rig_compliance"}
 )  # their sizes cannot be negative, as in the catalogue of causes
+POSSIBLE = {
+    "stiffness_varying": (-1.0, 1.0, "a stiffness cannot be negative"),
+    "relaxation": (-1.0, 1.0, "no more than all of a force is lost"),
+    "force_gain": (-1.0, 10.0, "a load cell does not turn forces round"),
+    "length_error": (-0.5, 1.0, "no length is mistaken for its half or double"),
+    "scale_error": (-0.5, 1.0, "no scale is mistaken for its half or double"),
+}
+"""Between which their sizes lie (neither end included), and why."""
+
 WIDTH = 0.08  # standard deviation of a local kink or soft spot, in lengths: the 15 mm of a splice on a cable of 181 mm
 
 
@@ -126,7 +135,33 @@ def parse_effect(text: str) -> tuple[str, Values]:
         raise ValueError(f"{text!r} is no finite number: {effect.name} takes {effect.values}")
     if effect.name in ONE_SIDED and min(values) < 0.0:
         raise ValueError(f"{text!r} is negative, which {effect.name} cannot be: it takes {effect.values}")
+    low, high, reason = POSSIBLE.get(effect.name, (-np.inf, np.inf, ""))
+    if not low < values[0] < high:
+        raise ValueError(f"{text!r} cannot be, {reason}: {effect.name} takes {effect.values}")
     return effect.name, values
+
+
+def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, float | Values]) -> None:
+    """Refuse what does not fit a cable of this length.
+
+    Raises
+    ------
+    ValueError
+        With the figures: a cable rolled up to more than a half circle at rest has no chord to be pushed along, and
+        stiff ends of more than a quarter of the length each leave less cable than clamp.
+    """
+    K0 = float(np.atleast_1d(effects.get("pre_curvature", pre_curvature))[0])
+    if not abs(K0) * length < np.pi:
+        raise ValueError(
+            f"a pre-curvature of {K0:g} 1/m rolls {1e3 * length:g} mm of cable up to more than a half circle: at most "
+            f"{np.pi / length:.3g} 1/m"
+        )
+    stiff = float(np.atleast_1d(effects.get("rigid_ends", 0.0))[0])
+    if not 4.0 * stiff < length:
+        raise ValueError(
+            f"rigid_ends of {stiff:g} m leave {1e3 * (length - 2.0 * stiff):.3g} of {1e3 * length:g} mm of cable to "
+            f"bend: at most {length / 4.0:.3g} m each"
+        )
 
 
 def _effect(name: str) -> Effect:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Branch
-from pipeline.simulate.effects import Readings, Setup, Values, hide
+from pipeline.simulate.effects import Readings, Setup, Values, check_geometry, hide
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest, simulate
 from rod.laws import StickSlip
@@ -74,6 +74,8 @@ class Experiment:
             raise ValueError("length, diameter, stiffnesses and kc must be positive, the length above the diameter")
         if not self.displacements_m or self.samples < 1 or not self.period_s >= self.hold_s > 0:
             raise ValueError("an experiment needs a step, a sample a hold, and holds that end before the next begins")
+
+        check_geometry(self.length_m, self.K0, self.effects)
 
     @property
     def branches(self) -> tuple[Branch, ...]:
