@@ -34,7 +34,7 @@ from pipeline.vision.search.ends import (
     without_specks,
 )
 from pipeline.vision.search.strips import Strip
-from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis
+from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
 _MAD_TO_STD = 1.4826
 
@@ -143,7 +143,7 @@ def _judge(
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     if isinstance(axes, Rejected):
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
-    short = short_of_axis(standout, cut, axes, stage)
+    short = short_of_axis(standout, cut, axes, stage) if len(cut.seen_widths) else None
     if short is not None:
         return _goes_on_beyond(photo, short)
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
@@ -283,7 +283,7 @@ def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
         photo,
         "photo/hidden-end",
         f"the cable was followed to ({u:.0f}, {v:.0f}) px only and seems to go on beyond: something lies across"
-        " it or shades it there",
+        " it or shades it there, or its colour changes",
         u_px=float(u),
         v_px=float(v),
     )
@@ -300,6 +300,9 @@ def _assemble(
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
     kept = without_specks(_seen(standout, cut, stage), cut.usual_width)
+    unlike = unlike_from(path, kept, axes, cut.usual_width, stage)
+    if unlike is not None:
+        return _goes_on_beyond(photo, unlike)
     path = path[kept]
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
         path, axes = path[::-1], axes[::-1]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
@@ -70,4 +71,17 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes, stage: Segmenta
             continue
         if distance[end] > far or goes_on(standout, cut, width, stage, at_start=at_start):
             return float(path[end, 0]), float(path[end, 1])
+    return None
+
+
+def unlike_from(path: Array, kept: slice, axes: Axes, width: float, stage: SegmentationSettings) -> Place | None:
+    """Where a strip (n, 2) in px, points a cell apart, begins to look unlike the part of it that is ``kept``, long.
+
+    A cable whose sheath changes its colour is a strip of one width, but what one colour tells ends with that; under a
+    visible end such a rest is no end of it.
+    """
+    rests = ((axes[0], kept.start, kept.start), (axes[1], len(path) - kept.stop, kept.stop - 1))
+    for axis, rest, last in rests:
+        if axis.kind in ("end", "clamp") and rest > stage.unlike_widths * width:
+            return float(path[last, 0]), float(path[last, 1])
     return None

@@ -47,6 +47,12 @@ class CurveSettings(StageSettings):
     least_pixel_share: float = Field(
         0.5, gt=0, le=1, description="weight left on a section's pixels; with less there is something else than an edge"
     )
+    width_departure: float = Field(
+        0.08,
+        gt=0,
+        description="relative; a stretch whose width is farther from the usual one is left out: a cable's is constant"
+        " within 5 %",
+    )
     edge_outlier: float = Field(
         6.0, gt=0, description="robust standard deviations from the neighbouring edges; the other edge takes over"
     )
@@ -222,6 +228,11 @@ class CurveSettings(StageSettings):
         gt=0,
         description="of the radius; a centerline that misses a cover's axis by more follows a flank, a shadow or a"
         " stripe: those missed by 0.85 and more, a cable sits in its bearing by a tenth",
+    )
+    max_bend_diameters: float = Field(
+        0.5,
+        gt=0,
+        description="curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends",
     )
     max_end_distance_radii: float = Field(
         2.0,

@@ -225,6 +225,11 @@ class SegmentationSettings(StageSettings):
         gt=0,
         description="widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm",
     )
+    unlike_widths: float = Field(
+        6.0,
+        gt=0,
+        description="widths; a longer rest of a strip that looks unlike it is no cover: those are 2 to 6 wide",
+    )
     fading_share: float = Field(
         0.5, gt=0, lt=1, description="of the step before an end that is left beyond it: covers leave less, glare more"
     )

@@ -34,6 +34,7 @@ from pipeline.vision.centerline.refusal import (
     middle_width,
     refusal,
     refusal_beside_axis,
+    refusal_of_bend,
 )
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.rough import AxisKind, RoughCable
@@ -166,7 +167,7 @@ def follow_cable(
     if refused is not None:
         return refused
     fit = _fit(sections, chord, width, breaks_m, options)
-    refused = refusal_beside_axis(rough, fit, chord, width, options)
+    refused = refusal_beside_axis(rough, fit, chord, width, options) or refusal_of_bend(rough, fit, width, options)
     if refused is not None:
         return refused
     metres = float(np.median(width / sections.width))

@@ -1,7 +1,8 @@
 """Midline of the cable from its two edges: sections with their errors, the width, and how far the light misleads them.
 
 A section's midpoint is the mean of its edges. An edge that contradicts its neighbours (text, dirt, an object beside the
-cable) is replaced by the other one and the local width; a section without any edge is left out.
+cable) is replaced by the other one and the local width; a section without any edge is left out, and a stretch of
+another width.
 
 Where a narrow shadow lies along one edge, the place of that edge is open by pixels and that of the other is not. The
 width ``W`` of a cable is constant, so each edge tells the midpoint, ``e1 + W/2`` and ``e2 - W/2``: they are weighted by
@@ -26,13 +27,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
+
+_MEDIAN = 15  # sections of a running median: two to three diameters
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,10 @@ def measure_sections(
     if good.sum(axis=0).min() < settings.least_sections:
         return None
     place, std, good = _consistent(place, std, good, settings.edge_outlier)
-    keep = good.any(axis=1)
+    keep = np.asarray(good.any(axis=1))
+    keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width, settings)
+    if np.count_nonzero(keep) < settings.least_sections:
+        return None
     s, place, std = s[keep], place[keep], std[keep]
     where, angle = curve.at(s)
     across = normals(angle)
@@ -168,8 +174,19 @@ def _serves(
     return unlike(plain) <= settings.ramps_worth * unlike(shaded)
 
 
-def _running_median(values: Array, size: int = 15) -> Array:
-    return np.asarray(median_filter(values, size=min(size, len(values)), mode="nearest"))
+def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
+    """Sections ``(k,)`` but those of a stretch as wide as the cable is not: its edges there are those of other things.
+
+    A pale sleeve before a pale ground leaves the edges of shadows and shades, 0.3 diameters off.
+    """
+    middle = float(np.median(width))
+    smooth, own = (np.abs(w - middle) > settings.width_departure * middle for w in (_running_median(width), width))
+    # the running median sees the first and last sections of a stretch as their neighbours outside it
+    return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
+
+
+def _running_median(values: Array) -> Array:
+    return np.asarray(median_filter(values, size=min(_MEDIAN, len(values)), mode="nearest"))
 
 
 def _consistent(

@@ -107,6 +107,21 @@ def refusal_beside_axis(
     )
 
 
+def refusal_of_bend(rough: RoughCable, fit: CurveFit, width: Array, options: CurveSettings) -> Rejected | None:
+    """Refuse a curve that bends as no cable can, where it was seen or on the way to its axes."""
+    s = np.linspace(0.0, fit.curve.frame.knots[-1], options.points)
+    bend = float(np.abs(fit.curve.curvature(s)).max()) * middle_width(width)[0]
+    if bend <= options.max_bend_diameters:
+        return None
+    return Rejected(
+        rough.image,
+        "photo/outline",
+        f"what was traced bends to a radius of {1.0 / bend:.1f} cable diameters, no cable does: near there another edge"
+        " was taken for the cable's",
+        figure={"bend_radius_diameters": 1.0 / bend},
+    )
+
+
 def beside_axis(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
     """Finding about a curve that passes ``miss`` (m) beside an axis, of a cable ``width`` (m) wide."""
     if miss <= 0.5 * options.axis_distance_radii * width:

@@ -141,6 +141,22 @@ def test_a_thing_eight_times_as_long_as_wide_is_no_cable():
     assert found.figure["slenderness"] == pytest.approx(8.5, abs=0.8)
 
 
+@pytest.mark.parametrize("first", [40.0, 225.0])
+def test_half_a_cable_of_two_colours_does_not_pass_for_it(first):
+    """One half stands out by its brightness, the other by its blue: what tells the first sees nothing of the second."""
+    rng, bow = np.random.default_rng(4), np.round(_bow() * 16).astype(np.int32)
+    picture = np.full((*SIZE, 3), 215.0, np.float32)
+    colours = ((40.0, 40.0, 40.0), (60.0, 215.0, 225.0))
+    for part, colour in zip((bow[:250], bow[249:]), colours if first == 40.0 else colours[::-1], strict=True):
+        cv2.polylines(picture, [part], False, colour, WIDTH, cv2.LINE_AA, 4)
+    picture = cv2.GaussianBlur(picture, (0, 0), 1.0) + 2.0 * rng.standard_normal(picture.shape)
+    found = find_cable(Photo("halves.png", np.clip(picture, 0, 255).astype(np.uint8), 8), VisionSettings())
+    if isinstance(found, Rejected):
+        assert found.code == "photo/hidden-end"
+    else:
+        assert found.length_px == pytest.approx(_length(), rel=0.01)
+
+
 def test_another_piece_of_cable_in_line_is_none_of_one_that_is_whole():
     assert isinstance(find_cable(_photo(_papered), VisionSettings(), cable=Cable(length_px=555.0)), RoughCable)
 

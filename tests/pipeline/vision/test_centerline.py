@@ -8,10 +8,12 @@ import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from pipeline.records import Rejected
+from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision.centerline import midline
 from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import render
 from pipeline.vision.render.ground import Ground
@@ -260,6 +262,48 @@ def test_strands_of_two_greys_that_swell_the_outline_are_traced():
     # strands pull an edge by a twentieth of their width; 0.5 % here, and the band holds what they do
     assert off.interior() < 1.0
     assert off.covered().mean() > 0.9
+
+
+def test_a_stretch_of_another_width_does_not_bend_the_line(monkeypatch):
+    """On a pale sleeve before a pale ground shadow and shading pass for a flank, a fifth of the diameter inside it."""
+    sound = midline.fit_edges
+    rng = np.random.default_rng(40)
+    scene = even(rng)
+    picture = render(scene)
+    diameter = DIAMETER * scene.camera.px_per_m
+
+    def misled(*given, **named):
+        edges = sound(*given, **named)
+        sections = np.arange(edges.place.shape[1]) / edges.place.shape[1]
+        aside = np.where((sections > 0.4) & (sections < 0.55), 0.2 * diameter, 0.0)
+        return replace(edges, place=edges.place - np.stack([aside, np.zeros_like(aside)]))
+
+    monkeypatch.setattr(midline, "fit_edges", misled)
+    rough, plane = rough_cable(scene, picture, rng), PlaneMap.from_scale(scene.camera.px_per_m)
+    line = measure_centerline(rough, plane=plane, diameter_m=DIAMETER, settings=VisionSettings())
+    assert isinstance(line, Centerline), line.reason
+    true = CubicSpline(np.arange(1001), np.column_stack([picture.u_px, picture.v_px]))(np.linspace(0, 1000, 20_001))
+    distance = cKDTree(true).query(np.column_stack([line.u_px, line.v_px])[line.shape.seen])[0]
+    assert distance.max() < 0.01 * diameter
+
+
+def test_a_bend_that_no_cable_makes_is_refused():
+    rng = np.random.default_rng(41)
+    scene = even(rng)
+    rough = rough_cable(scene, render(scene), rng)
+    bend = float(scene.cable.curve.kappa.max()) * DIAMETER
+    for most, refusal in ((1.1 * bend, False), (0.9 * bend, True)):
+        settings = VisionSettings()
+        curve = settings.curve.model_copy(update={"max_bend_diameters": most})
+        line = measure_centerline(
+            rough,
+            plane=PlaneMap.from_scale(scene.camera.px_per_m),
+            diameter_m=DIAMETER,
+            settings=settings.model_copy(update={"curve": curve}),
+        )
+        assert isinstance(line, Rejected) == refusal
+    assert line.code == "photo/outline"
+    assert line.figure["bend_radius_diameters"] == pytest.approx(1.0 / bend, rel=0.05)
 
 
 def test_path_beside_the_cable_is_refused():
