@@ -50,11 +50,32 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
         for photo, cable in seen
         for end in visible_ends(cable)
     ]
-    for measured in (_at_end, _to_mark):
-        radii = _alike((measured(end) for end in ends), settings)
-        if radii is not None:
-            return float(np.median(radii))
+    for radii in (_at_ends(ends), (_to_mark(end) for end in ends)):
+        alike = _alike(radii, settings)
+        if alike is not None:
+            return float(np.median(alike))
     return _common(ends, settings) if ends else None
+
+
+def _at_ends(ends: list[_LostEnd]) -> Iterator[float | None]:
+    """Radius of the cover at each end: the first is sought in all sizes, the others in the one that it tells."""
+    first = _at_end(ends[0]) if ends else None
+    if ends:
+        yield first
+    for end in ends[1:]:
+        yield None if first is None else _same(end, first)
+
+
+def _same(lost: _LostEnd, radius: float) -> float | None:
+    """Radius of the circle with the cable's end on its rim that is about as large as another end's."""
+    near = [size for size in lost.sizes() if abs(size / radius - 1.0) <= lost.settings.search_radii]
+    for size in sorted(near, key=lambda size: abs(size - radius)):
+        circle = lost.near(float(size))
+        if circle is None or not lost.on_rim(circle):
+            continue
+        if abs(circle.radius - radius) <= lost.settings.same_radius * radius:
+            return circle.radius
+    return None
 
 
 def rim_radius(seen: Iterable[tuple[Photo, RoughCable]], expected_px: float, settings: BearingSettings) -> float | None:
@@ -140,24 +161,37 @@ class _LostEnd:
         """Distance of a circle's centre from the end of the cable, in radii."""
         return float(np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius)
 
-    def _search(self) -> Iterator[Circle]:
+    def on_rim(self, circle: Circle) -> bool:
+        """True if the cable is lost on this circle."""
+        return abs(self.ahead(circle) - 1.0) <= self.settings.end_on_rim
+
+    def near(self, radius: float) -> Circle | None:
+        """Circle of about some radius that is seen nearly all round."""
+        expected = Radius(radius, 0.5 * self.settings.search_radii)
+        circle = find_rim(self.photo, self.end, expected, self.width_px, self.settings)
+        if circle is None or circle.rim < self.settings.sure_rim:
+            return None
+        return circle if circle.radius_std <= self.settings.same_radius * circle.radius else None
+
+    def sizes(self) -> Array:
+        """Radii tried."""
         settings = self.settings
         low, high = settings.cover_radii_widths
         # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
         steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
-        for radius in np.geomspace(low, high, steps + 1):
-            expected = Radius(float(radius * self.width_px), 0.5 * settings.search_radii)
-            circle = find_rim(self.photo, self.end, expected, self.width_px, settings)
-            if circle is None or circle.rim < settings.sure_rim:
-                continue
-            if circle.radius_std <= settings.same_radius * circle.radius:
+        return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
+
+    def _search(self) -> Iterator[Circle]:
+        for radius in self.sizes():
+            circle = self.near(float(radius))
+            if circle is not None:
                 yield circle
 
 
 def _at_end(lost: _LostEnd) -> float | None:
     """Radius of the smallest circle with the cable's end on its rim, or of a larger one about it that hides it too."""
     settings = lost.settings
-    at_end = (circle for circle in lost.circles() if abs(lost.ahead(circle) - 1.0) <= settings.end_on_rim)
+    at_end = (circle for circle in lost.circles() if lost.on_rim(circle))
     rim = next(at_end, None)
     if rim is None:
         return None

@@ -1,6 +1,7 @@
 """Bearing axes: covers of every look, free ends, pixels of the user. Truth: the rendered scene's own axes."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ from scipy.special import erfc
 
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.bearings import BearingSettings
+from pipeline.vision.bearings import cover_size
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius, visible_ends
-from pipeline.vision.bearings.covers import find_cover
+from pipeline.vision.bearings.covers import find_cover, find_rim
 from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
@@ -268,6 +270,23 @@ def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
         for bearing, true in zip(bearings, (left, right), strict=True):
             assert bearing is not None
             assert np.abs(np.subtract(bearing.center_px, true)).max() < 3.5 * bearing.std_px < 0.7
+
+
+def test_size_that_one_end_tells_is_all_that_is_sought_at_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
+    photos = painted_covers(lefts, right, radius)
+    seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
+    sought: list[float] = []
+
+    def counted(photo: Photo, end: CableEnd, expected: Radius, *rest: Any) -> Circle | None:
+        sought.append(expected.px)
+        return find_rim(photo, end, expected, *rest)
+
+    monkeypatch.setattr(cover_size, "find_rim", counted)
+    assert cover_radius(seen, STAGE) is not None
+    sizes = len(set(sought))
+    assert sizes > 8  # all sizes at the first end
+    assert len(sought) <= sizes + 3 * 3  # three ends in at most three sizes about that of the first
 
 
 def test_size_of_covers_is_told_where_letters_hide_the_last_of_the_cable() -> None:
