@@ -89,12 +89,14 @@ def sight_of_axes(
     width: float,
     settings: CurveSettings,
 ) -> AxisSight | None:
-    """How the curve continued as a bow passes the axes, arguments as above; None where these are its own ends."""
+    """How the curve continued as a bow passes the axes, as above; None where these are its own ends or it is unknown."""
     if not _known(kinds):
         return None
     step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance, settings.least_departure))
     rows, misses, normals = _axes(fit, chord)
     loose = rows @ covariance @ rows.T + chord.axis_std**2 * np.eye(2)
+    if not (np.isfinite(misses).all() and np.isfinite(loose).all()):
+        return None  # what broke on one photo shall not reach the others
     return _sight(misses - rows @ step, loose, normals, chord, settings.axis_play_widths * width)
 
 

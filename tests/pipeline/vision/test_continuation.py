@@ -118,3 +118,10 @@ def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
     # 0.26 to 0.16 1/m where the axes are exact, 0.33 to 0.23 with parallax; the same noise in both
     assert _rms([error for error, _ in found]) < 0.75 * alone
     assert np.mean([np.abs(error) < 1.96 * std for error, std in found]) > 0.85
+
+
+def test_a_photo_of_unknown_errors_tells_the_others_nothing(cases):
+    fit, covariance, chord = _seen(cases[0], 0.0, 0.0)
+    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
+    assert sight_of_axes(fit, covariance, chord, **known) is not None
+    assert sight_of_axes(fit, np.full_like(covariance, np.nan), chord, **known) is None
