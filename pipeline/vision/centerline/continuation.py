@@ -89,7 +89,7 @@ def sight_of_axes(
     width: float,
     settings: CurveSettings,
 ) -> AxisSight | None:
-    """How the curve continued as a bow passes the axes, as above; None where these are its own ends or it is unknown."""
+    """How the curve continued as a bow passes the axes, as above; None where these are its own ends or unknown."""
     if not _known(kinds):
         return None
     step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance, settings.least_departure))
