@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.observations.prediction import Facts, Model
 from pipeline.result import CauseForm, Result
 from pipeline.visited import Visited, best, pre_curvature
@@ -38,7 +39,7 @@ RESOLVED = 1e-2
 """Share of the largest moment band below which a direction of the covariance tells nothing about its link to K0: the
 integrals are trapezoidal sums, right to about 1e-4."""
 
-IN_THE_LAW = ("nonlinear_stiffness",)
+IN_THE_LAW = (LAW,)
 """Causes of the cable that are in its characteristic already."""
 
 

@@ -64,8 +64,10 @@ INSIDE = {
     ],
     "pipeline.diagnosis.explanations": [
         ("explanation", "candidates", "refit", "effort"),
-        ("forms",),
-        ("single_cause", "two_causes", "friction_in_law"),
+        ("forms", "free_profile"),
+        ("single_cause", "pair_fits", "friction_in_law"),
+        ("exchange", "pair_set"),
+        ("two_causes",),
         ("conclusion",),
     ],
     "pipeline.diagnosis.presentation": [("leftover", "named", "table"), ("part",)],

@@ -13,13 +13,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.friction_in_law import LAW, shared
+from pipeline.diagnosis.explanations.friction_in_law import shared
+from pipeline.diagnosis.explanations.pair_set import TwoCauses
 from pipeline.diagnosis.explanations.single_cause import refit_one
-from pipeline.diagnosis.explanations.two_causes import TwoCauses, masking, second_cause
+from pipeline.diagnosis.explanations.two_causes import masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.fits.fit import Fit
@@ -138,8 +140,7 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
-    two, instead = second_cause(bench, singles, named, settings, effort)
-    curtailed = effort.spent
+    two, instead, curtailed = second_cause(bench, singles, named, settings, effort)
     concluded = _concluded(bench, singles, chance, len(members), two, settings)
     return replace(concluded, instead=instead, impossible=impossible, curtailed=curtailed)
 

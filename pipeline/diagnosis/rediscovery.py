@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import faults_of_input
@@ -94,15 +95,13 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
             before = _fitted(faults.test, observation, facts, settings, curved=curved, bent=bent)
             offers = {}
             if not curved:
-                offers["nonlinear_stiffness"] = _fitted(
-                    faults.test, observation, facts, settings, curved=True, bent=bent
-                )
+                offers[LAW] = _fitted(faults.test, observation, facts, settings, curved=True, bent=bent)
             if not bent:
                 offers["pre_curvature"] = _fitted(faults.test, observation, facts, settings, curved=curved, bent=True)
             best = min(offers, key=lambda name: _cost(offers[name]))
             if _cost(before) - _cost(offers[best]) < settings.knot_gain:
                 break
-            curved, bent = curved or best == "nonlinear_stiffness", bent or best == "pre_curvature"
+            curved, bent = curved or best == LAW, bent or best == "pre_curvature"
             gain = _gain(faults.test, observation, facts, settings, before, offers[best])
             found.append(
                 Discovery(

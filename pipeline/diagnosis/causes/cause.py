@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy as np
+
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 
@@ -31,6 +33,9 @@ class Variant:
     trace : float
         Multiple of the usual amount (`search.direction`) at which its trace in the data is computed: one that grows
         otherwise than in proportion looks elsewhere when it is large.
+    known : float
+        Multiple of the usual amount that is the standard deviation of what is known of the amount beforehand; infinite
+        where nothing is.
     """
 
     label: str = ""
@@ -41,6 +46,7 @@ class Variant:
     width_range: tuple[float, float] = (0.0, 1.0)
     setting: str = ""
     trace: float = 1.0
+    known: float = np.inf
 
     def range(self, name: str) -> tuple[float, float]:
         """Range of ``at`` or ``width``."""

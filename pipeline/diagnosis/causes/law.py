@@ -16,12 +16,15 @@ from pipeline.diagnosis.observations.prediction import Facts, Model
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
+LAW = "nonlinear_stiffness"
+"""Name of the cause that is no second one beside another: a further control point of the law is a finer base."""
+
 
 @dataclass(frozen=True)
 class NonlinearStiffness:
     """``nonlinear_stiffness``: the bending stiffness depends on curvature in another way than the model's."""
 
-    name: str = "nonlinear_stiffness"
+    name: str = LAW
     unit: str = "N m^2"
     sign: int = 0
     combines: bool = True

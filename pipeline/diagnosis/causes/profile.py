@@ -4,16 +4,22 @@ Both are deviations ``amount * phi(s)`` from a uniform cable, ``phi`` of largest
 so the amount is the largest deviation from the mean; only a soft spot counts from the cable beside it, whose stiffness
 is the one that is wanted. Forms: growing along the cable, more (or less) in the middle than at the
 ends, S-shaped, and a spot at a place that is found by scanning. Several forms may add up.
+
+What is none of these (a kink, several bumps) is a sum of waves, or a step between two pieces: `wave` k has k half
+periods over the cable, and any profile of mean zero is a sum of them. They are no forms to be suspected, their number
+would drown a true cause in chance; they take the place of the forms once the cause is known
+(`explanations.free_profile`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, Variant
+from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 Array = NDArray[np.float64]
@@ -21,6 +27,19 @@ Array = NDArray[np.float64]
 PLACES = (0.15, 0.325, 0.5, 0.675, 0.85)
 SPOT_WIDTH = 0.07
 """Standard deviation of a spot in shares of the length: a splice or kink of some diameters; tuned in a refit."""
+
+STEEPEST = 10.0
+"""Usual amounts: standard deviation of the longest wave; that of the k-th is a k-th of it, as of a sharp step. Without
+a photo of the force-free cable short waves and the law else run away together: 24 waves grew to 1 to 4 1/m."""
+
+WAVE_COST = 4
+"""Free numbers that one wave counts for: it is known beforehand to a few usual amounts and afterwards to a fiftieth of
+that (exp(-4)). As cheap as the others, eight waves stood alone for a spot and a spring in the bearings."""
+
+SEAM = "in a step"
+
+LEAST = 0.05
+"""Relative stiffness that no form goes below: a cable without any has no equilibrium."""
 
 
 def forms() -> tuple[Variant, ...]:
@@ -44,9 +63,41 @@ def forms() -> tuple[Variant, ...]:
     )
 
 
+def step() -> Variant:
+    """Two pieces of different kind with a seam between: half a cable that was wound otherwise, a spliced one.
+
+    Like a wave it is tried once the cause is known. A seam narrower than an element (1/120) shows no other trace.
+    """
+    return Variant(
+        SEAM,
+        at=0.5,
+        width=0.02,
+        tuned=("at", "width"),
+        at_range=(0.05, 0.95),
+        width_range=(0.008, 0.15),
+    )
+
+
+def wave(half_periods: int) -> Variant:
+    """One of the waves any profile is a sum of; ``at`` is minus its number of half periods.
+
+    Those of a step fall with their number, and no profile has more of short waves; see `STEEPEST`.
+    """
+    return Variant("in waves", at=-float(half_periods), known=STEEPEST / half_periods)
+
+
+def is_wave(variant: Variant) -> bool:
+    """Whether a form is one of them."""
+    return bool(np.isfinite(variant.known))
+
+
 def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> Array:
     """``phi`` at relative positions 0..1 that sample the cable evenly; a spot ``from_beside`` keeps its mean."""
-    if variant.width > 0.0:
+    if variant.at < 0.0:
+        values = np.cos(variant.at * np.pi * position)
+    elif variant.label == SEAM:
+        values = np.tanh((position - variant.at) / variant.width)
+    elif variant.width > 0.0:
         values = np.exp(-0.5 * ((position - variant.at) / variant.width) ** 2)
     elif variant.at == 2.0:
         values = -np.cos(2.0 * np.pi * position)
@@ -54,12 +105,13 @@ def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> 
         values = np.sin(2.0 * np.pi * position)
     else:
         values = 2.0 * position - 1.0
-    deviation = values if from_beside and variant.width > 0.0 else values - np.mean(values)
+    spot = variant.width > 0.0 and variant.label != SEAM
+    deviation = values if from_beside and spot else values - np.mean(values)
     return np.asarray(deviation / np.max(np.abs(deviation)))
 
 
-def spot_between(uniform: Model, varying: Model) -> tuple[Variant, float, float] | None:
-    """The one spot that looks most like what varies along the cable.
+def form_between(uniform: Model, varying: Model) -> tuple[Variant, float, float] | None:
+    """The one spot or step that looks most like what varies along the cable.
 
     Parameters
     ----------
@@ -78,20 +130,59 @@ def spot_between(uniform: Model, varying: Model) -> tuple[Variant, float, float]
         return None
     position = position_of(varying)
     weight = np.sin(np.pi * position)  # where no moment is, no stiffness shows
-    kind = forms()[-1]
     best: tuple[float, Variant, Array] | None = None
-    for at in np.linspace(*kind.at_range, 48):
-        for width in np.geomspace(*kind.width_range, 12):
-            spot = replace(kind, at=float(at), width=float(width))
-            columns = np.column_stack([np.ones_like(position), profile(spot, position, from_beside=relative)])
-            found = np.linalg.lstsq(weight[:, None] * columns, weight * change, rcond=None)[0]
-            left = float(np.sum((weight * (change - columns @ found)) ** 2))
-            if best is None or left < best[0]:
-                best = left, spot, np.asarray(found)
+    for form in _places():
+        columns = np.column_stack([np.ones_like(position), profile(form, position, from_beside=relative)])
+        found = np.linalg.lstsq(weight[:, None] * columns, weight * change, rcond=None)[0]
+        left = float(np.sum((weight * (change - columns @ found)) ** 2))
+        if best is None or left < best[0]:
+            best = left, form, np.asarray(found)
     if best is None or not best[2][0] > -1.0:
         return None
     beside, amount = (float(value) for value in best[2])
     return (best[1], amount / (1.0 + beside), beside) if relative else (best[1], amount, 0.0)
+
+
+def _places() -> Iterator[Variant]:
+    """Spots and steps over the whole cable and of every width."""
+    for kind in (forms()[-1], step()):
+        for at in np.linspace(*kind.at_range, 48):
+            for width in np.geomspace(*kind.width_range, 12):
+                yield replace(kind, at=float(at), width=float(width))
+
+
+def deviation(uniform: Model, varying: Model, cause: Cause) -> Array:
+    """How far (n joints,) a cause of this module takes a cable from another: K0, 1/m, or relative EI."""
+    before, after = uniform.bending.rod.section, varying.bending.rod.section
+    if isinstance(cause, PreCurvatureVarying):
+        return np.asarray(after.pre_curvature - before.pre_curvature)
+    return np.asarray(_factor(varying) - _factor(uniform))
+
+
+def _factor(model: Model) -> Array:
+    """Stiffness (n,) at the joints relative to the law."""
+    section = model.bending.rod.section
+    return np.ones_like(section.pre_curvature) if section.profile is None else section.profile
+
+
+def largest_of(forms: Sequence[Variant], amounts: Array, cause: Cause) -> Array:
+    """The forms (k,) of a cause of this module where their sum deviates most: its size is this times their amounts."""
+    position, beside = np.linspace(0.0, 1.0, 401), isinstance(cause, StiffnessVarying)
+    table = np.column_stack([profile(form, position, from_beside=beside) for form in forms])
+    return np.asarray(table[int(np.argmax(np.abs(table @ amounts)))])
+
+
+def is_profile(cause: Cause) -> bool:
+    """Whether a cause is one of this module."""
+    return isinstance(cause, PreCurvatureVarying | StiffnessVarying)
+
+
+def along_cable(cause: Cause, variant: Variant, model: Model) -> tuple[str, Array]:
+    """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which."""
+    if isinstance(cause, PreCurvatureVarying):
+        return "pre_curvature", profile(variant, position_of(model))
+    moves = profile(variant, position_of(model), from_beside=True)
+    return "stiffness_profile", np.where(_factor(model) > LEAST, moves, 0.0)
 
 
 def position_of(model: Model) -> Array:
@@ -174,4 +265,4 @@ class StiffnessVarying:
             + amount * profile(variant, position_of(model), from_beside=True)
             + (0.0 if given is None else given - 1.0)
         )
-        return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, 0.05)))
+        return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, LEAST)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.two_causes import TwoCauses
+from pipeline.diagnosis.explanations.pair_set import TwoCauses
 from pipeline.diagnosis.statistics.leftover import Leftover
 
 

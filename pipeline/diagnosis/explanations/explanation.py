@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.profile import WAVE_COST, is_profile, is_wave, largest_of
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.statistics.verdict import Weighed, scan_share
@@ -33,13 +34,21 @@ class Explanation:
     weighed: Weighed
 
     def amount(self, cause: Cause) -> tuple[float, float]:
-        """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest."""
-        own = self.fitted.extension.terms_of(cause)
-        if not cause.additive:
+        """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest.
+
+        That of a profile along the cable is its largest deviation, of all forms together.
+        """
+        extension, own = self.fitted.extension, self.fitted.extension.terms_of(cause)
+        if is_profile(cause) and len(own) > 1:
+            forms = [extension.formed(self.fitted.vector, i).variant for i in own]
+            weight = largest_of(forms, self.fitted.vector[[extension.amounts_at[i] for i in own]], cause)
+        elif cause.additive:
+            weight = np.ones(len(own))
+        else:
             return max((self.fitted.amount(i) for i in own), key=lambda pair: abs(pair[0]))
-        at = [self.fitted.extension.amounts_at[i] for i in own]
-        variance = float(self.fitted.covariance[np.ix_(at, at)].sum())
-        return float(self.fitted.vector[at].sum()), float(np.sqrt(max(variance, 0.0)))
+        at = [extension.amounts_at[i] for i in own]
+        variance = float(weight @ self.fitted.covariance[np.ix_(at, at)] @ weight)
+        return float(weight @ self.fitted.vector[at]), float(np.sqrt(max(variance, 0.0)))
 
     def impossible(self, catalogue: Sequence[Cause], most: float) -> Cause | None:
         """A cause that would have to be larger, by two standard deviations, than ``most`` plausible sizes; or None."""
@@ -57,7 +66,7 @@ def explanation_of(causes: tuple[int, ...], base: Fit, fitted: Fit, suspicion: S
     gain = base.chi2 - fitted.chi2
     weighed = Weighed(
         gain=gain,
-        tuned=sum(len(term.variant.tuned) for term in terms) + len(terms) - 1,
+        tuned=sum(len(term.variant.tuned) + (WAVE_COST if is_wave(term.variant) else 1) for term in terms) - 1,
         scan=sum(scan_share(suspicion.statistic[suspicion.of(cause)]) for cause in causes),
         signs=int(np.prod([1 if kind.sign else 2 for kind in kinds])),
     )

@@ -2,7 +2,7 @@
 
 A profile along the cable is a sum of smooth forms and spots, friction between the wires a sum of elements that slip one
 after the other. Forms are added while each pays for itself; those that a later one has made needless go again; and
-where they add up to one spot, that spot is tried in their place.
+where they add up to one spot or one step, that is tried in their place.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.profile import spot_between
+from pipeline.diagnosis.causes.profile import form_between
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
@@ -96,8 +96,8 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause, 
     return fitted
 
 
-def as_one_spot(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
-    """One spot in the place of several forms along the cable, where it explains the data as well.
+def as_one_form(observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, worse: float) -> Fit:
+    """One spot or step in the place of several forms along the cable, if its chi-square is ``worse`` by no more.
 
     A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
     not: what they add up to tells where the spot is.
@@ -106,7 +106,7 @@ def as_one_spot(observation: Observation, fitted: Fit, settings: DiagnosisSettin
     count = len(extension.terms)
     if count < 2 or len(extension.terms_of(extension.terms[0].cause)) < count:
         return fitted
-    spot = spot_between(extension.base_model(fitted.vector), extension.model(fitted.vector))
+    spot = form_between(extension.base_model(fitted.vector), extension.model(fitted.vector))
     if spot is None:
         return fitted
     variant, amount, stiffer = spot
@@ -114,5 +114,5 @@ def as_one_spot(observation: Observation, fitted: Fit, settings: DiagnosisSettin
     start = alone.start(fitted.vector, (amount,))
     start[: len(alone.base.knots)] += np.log1p(stiffer)
     one = fit_from(observation, alone, start, fitted, settings)
-    as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + settings.shape_gain * (count - 1)
+    as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + worse
     return one if as_well else fitted

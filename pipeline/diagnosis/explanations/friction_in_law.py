@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.fits.workbench import Workbench
 
 Array = NDArray[np.float64]
 
-LAW, FRICTION = "nonlinear_stiffness", "hysteresis"
+FRICTION = "hysteresis"
 
 AS_WELL = 0.5
 """Share of the better one's chi-square that the other must remove: a law that rises is no friction of any form."""

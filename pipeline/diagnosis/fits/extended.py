@@ -27,8 +27,11 @@ WITHIN = 1.0 / 1.96
 
 
 def visited(fitted: Fit) -> tuple[float, float]:
-    """Smallest and largest curvature of the fitted cable over all steps, 1/m."""
-    kappa = np.concatenate([step.kappa[2:-2] for step in fitted.run.steps])
+    """Smallest and largest curvature over all steps of a cable of this law that is bent alike at rest, 1/m.
+
+    Where K0 varies along the cable, it is the excess over it that f_EI is known for.
+    """
+    kappa = fitted.extension.base.pre_curvature(fitted.vector) + fitted.excess
     return float(kappa.min()), float(kappa.max())
 
 

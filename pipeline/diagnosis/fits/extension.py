@@ -67,9 +67,13 @@ class Extension:
 
     @cached_property
     def prior(self) -> Array:
-        """Rows (m, p) of prior knowledge, of unit variance."""
+        """Rows (m, p) of prior knowledge, of unit variance: those of the base model, then of the amounts of terms."""
         rows = self.base.prior
-        return np.hstack([rows, np.zeros((len(rows), self.size - rows.shape[1]))])
+        own = [np.hstack([rows, np.zeros((len(rows), self.size - rows.shape[1]))])]
+        for at, term in zip(self.amounts_at, self.terms, strict=True):
+            if np.isfinite(term.variant.known):
+                own.append(np.eye(1, self.size, at) / (term.variant.known * term.cause.plausible(self.facts)))
+        return np.vstack(own)
 
     @property
     def steps(self) -> Array:
@@ -102,10 +106,15 @@ class Extension:
     def model(self, vector: Array, *, of: Model | None = None) -> Model:
         """The model at a vector; ``of`` is the base model there, where it is known already."""
         model = self.base_model(vector) if of is None else of
-        for at, term in zip(self.amounts_at, self.terms, strict=True):
-            tuned = {name: float(vector[at + 1 + j]) for j, name in enumerate(term.variant.tuned)}
-            model = term.cause.apply(model, float(vector[at]), term.variant.moved(tuned), self.facts)
+        for k, (at, term) in enumerate(zip(self.amounts_at, self.terms, strict=True)):
+            model = term.cause.apply(model, float(vector[at]), self.formed(vector, k).variant, self.facts)
         return end_for_end(model) if self.turned else model
+
+    def formed(self, vector: Array, k: int) -> Term:
+        """Term ``k`` with its place and width as they stand in the vector."""
+        term, at = self.terms[k], self.amounts_at[k]
+        tuned = {name: float(vector[at + 1 + j]) for j, name in enumerate(term.variant.tuned)}
+        return term._replace(variant=term.variant.moved(tuned))
 
     def admissible(self, vector: Array) -> bool:
         """Whether the vector describes a possible cable: base model, signs of amounts and places within their range."""

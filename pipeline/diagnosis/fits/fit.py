@@ -84,6 +84,16 @@ class Fit:
         root = right.T / np.maximum(weight, 1e-8 * weight[0])
         return np.asarray((root @ root.T) / np.outer(size, size))
 
+    @property
+    def excess(self) -> Array:
+        """Curvatures (n,) of all steps beyond what each place of the cable has at rest, 1/m; its outermost ends apart.
+
+        For what a set adds to the rest see `rod.section`: it is not taken off.
+        """
+        rod = self.run.model.bending.rod
+        K0, first = rod.section.pre_curvature, 1 if rod.edges[0] else 0
+        return np.concatenate([(step.kappa[first : first + K0.size] - K0)[2:-2] for step in self.run.steps])
+
     def amount(self, term: int) -> tuple[float, float]:
         """Amount of a term and its standard deviation."""
         at = self.extension.amounts_at[term]

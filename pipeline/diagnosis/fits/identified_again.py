@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.extended import law_of
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
@@ -111,7 +112,7 @@ def _with_fine_law(fitted: Fit, count: int) -> tuple[Extension, Array]:
     extension, vector = with_knots(fitted, count)
     whole = law_of(fitted).f(extension.base.knots)
     ordinates = np.log(np.maximum(whole, FLOOR * float(np.max(whole))) / extension.base.stiffness)
-    in_law = [k for k, term in enumerate(extension.terms) if term.cause.name == "nonlinear_stiffness"]
+    in_law = [k for k, term in enumerate(extension.terms) if term.cause.name == LAW]
     extension, vector = extension.without(vector, in_law)
     return extension, np.r_[ordinates, vector[count:]]
 
@@ -196,7 +197,7 @@ def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
     J = -np.vstack([weight[:, None] * columns[:count], columns[count:known]])
     sizes = []
     for term in fitted.extension.terms:
-        sizes.append(FORGOTTEN * term.cause.plausible(facts))
+        sizes.append(min(FORGOTTEN, term.variant.known) * term.cause.plausible(facts))
         sizes.extend(term.variant.scale(name) for name in term.variant.tuned)
     sizes.extend(np.ones(beside.shape[1]))
     weak = np.diag(1.0 / np.array(sizes))

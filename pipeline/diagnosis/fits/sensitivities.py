@@ -2,22 +2,25 @@
 
 Rows: the whitened data in the order of `observation.Row`, then one row per piece of prior knowledge. Columns: control
 points of the law, K0 and length by the implicit function theorem (`rod.sensitivity`), what only the camera changes by
-the observers alone, amounts and forms of causes by difference quotients with warm starts.
+the observers alone; amounts of a profile along the cable by that theorem too, amounts of other causes and what is tuned
+of a form by difference quotients with warm starts.
 
 Sign: residual = data - model, so the Jacobian here is that of the model, ``d residual = - jacobian d vector``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.profile import along_cable, is_profile
 from pipeline.diagnosis.fits.base import Base
-from pipeline.diagnosis.fits.extension import Extension
+from pipeline.diagnosis.fits.extension import STEP, Extension, Term
 from pipeline.diagnosis.observations.observation import Observation, residual
-from pipeline.diagnosis.observations.prediction import Model, Prediction
+from pipeline.diagnosis.observations.prediction import Model, Prediction, end_for_end
 from pipeline.diagnosis.observations.simulation import Run, base_derivatives, moved, observed, run
 from rod.characteristic import Characteristic
 from rod.sensitivity import Derivatives
@@ -54,8 +57,12 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     at_here = whole_residual(observation, here.prediction, vector, prior)
     assert at_here is not None and here.bare is not None
     columns = _base_columns(observation, extension, vector, here, at_here)
+    profiles = _profiles(observation, extension, vector, here)
     first = len(columns)
     for j, step in enumerate(extension.steps[first:], start=first):
+        if j in profiles:
+            columns.append(profiles[j])
+            continue
         column = np.zeros_like(at_here)
         for signed in (step, -step):
             trial = vector.copy()
@@ -69,6 +76,50 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
                 break
         columns.append(column)
     return np.column_stack(columns)
+
+
+def _profiles(observation: Observation, extension: Extension, vector: Array, here: Run) -> dict[int, Array]:
+    """Columns of the amounts of profiles along the cable by their position in the vector."""
+    own = [k for k, term in enumerate(extension.terms) if is_profile(term.cause)]
+    table = profile_columns(observation, extension, vector, here, [extension.formed(vector, k) for k in own])
+    prior = extension.prior
+    table[len(table) - len(prior) :] = prior[:, [extension.amounts_at[k] for k in own]]
+    return {extension.amounts_at[k]: column for k, column in zip(own, table.T, strict=True)}
+
+
+def profile_columns(
+    observation: Observation, extension: Extension, vector: Array, here: Run, terms: Sequence[Term]
+) -> Array:
+    """Columns (N, terms) of the amounts of profiles along the cable, whether or not they are in the model.
+
+    Rows of prior knowledge are zero: what is known of a term beforehand has a row where it is in the model.
+
+    Parameters
+    ----------
+    observation : Observation
+    extension : Extension
+    vector : (p,)
+    here : Run
+        Of the model at the vector, with a prediction.
+    terms : sequence of Term
+        Of causes of `causes.profile`.
+    """
+    at_here = whole_residual(observation, here.prediction, vector, extension.prior)
+    assert at_here is not None and here.bare is not None
+    table = np.zeros((len(at_here), len(terms)))
+    if not terms:
+        return table
+    facts = extension.facts
+    cable = end_for_end(here.model) if extension.turned else here.model
+    given = [along_cable(term.cause, term.variant, cable) for term in terms]
+    by = base_derivatives(here, facts, [(name, phi[::-1] if extension.turned else phi) for name, phi in given])
+    for k, term in enumerate(terms):
+        step = STEP * term.cause.plausible(facts)
+        shown = observed(moved(here.bare, by, k, step), here.model, facts)
+        there = whole_residual(observation, shown, vector, extension.prior)
+        assert there is not None
+        table[:, k] = (at_here - there) / step
+    return table
 
 
 def _base_columns(

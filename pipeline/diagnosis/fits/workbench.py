@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
@@ -175,7 +176,7 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
 
 
 def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> bool:
-    own = [k for k, term in enumerate(suspicion.terms) if term.cause.name == "nonlinear_stiffness"]
+    own = [k for k, term in enumerate(suspicion.terms) if term.cause.name == LAW]
     if not own:
         return False
     gain = float(suspicion.statistic[own].max()) ** 2
@@ -186,9 +187,7 @@ def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
     """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
     base = fitted.extension.base
     law = base.characteristic(fitted.vector)
-    K0 = base.pre_curvature(fitted.vector)
-    reach = max(float(step.kappa.max()) for step in fitted.run.steps) - K0
-    knots = place_knots(0.0, reach, count)
+    knots = place_knots(0.0, float(fitted.excess.max()), count)
     ordinates = np.log(np.maximum(law.f(knots), 0.02 * float(np.max(law.ordinates))) / base.stiffness)
     extension = replace(fitted.extension, base=replace(base, knots=knots))
     return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]

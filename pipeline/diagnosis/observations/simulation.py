@@ -7,6 +7,7 @@ tries a pre-curvature of the other sign. Derivatives with respect to control poi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from pipeline.diagnosis.observations.work import counted
 from rod.equilibrium import Branch, Equilibrium, solve
+from rod.parameters import Parameter
 from rod.sensitivity import Derivatives, derivatives
 
 Array = NDArray[np.float64]
@@ -129,7 +131,7 @@ def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -
     return tuple(found[i] for i in range(len(facts.branch)))
 
 
-def base_derivatives(here: Run, facts: Facts, names: tuple[str, ...]) -> tuple[Derivatives, ...]:
+def base_derivatives(here: Run, facts: Facts, names: Sequence[Parameter]) -> tuple[Derivatives, ...]:
     """Derivatives of every step of a run with respect to parameters of `rod.parameters`."""
     found: dict[int, Derivatives] = {}
     for index, *_ in _groups(here.model, facts):

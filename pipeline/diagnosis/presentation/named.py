@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
@@ -37,7 +38,7 @@ def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     if accepted is None:
         return []
     # a law with one more control point is no second cause, only a finer base
-    found = [cause for cause in accepted.causes if catalogue[cause].name != "nonlinear_stiffness"] or [*accepted.causes]
+    found = [cause for cause in accepted.causes if catalogue[cause].name != LAW] or [*accepted.causes]
     if two is None or len(found) == 1:
         class_ = list(dict.fromkeys([found[0], *conclusion.names]))
         return [_part(bench, accepted, found[0], class_, conclusion.probability[0])]

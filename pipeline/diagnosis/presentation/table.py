@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.explanations.friction_in_law import FRICTION
@@ -124,7 +125,7 @@ def seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[Cause
 def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSettings) -> list[BlindSpot]:
     """Causes that cannot be seen at a plausible size but would move f_EI, the most harmful first."""
     suspicion = bench.suspicion
-    known = {row.name for row in seen} | {"nonlinear_stiffness"}
+    known = {row.name for row in seen} | {LAW}
     spots = []
     for index, cause in enumerate(suspicion.causes):
         own = suspicion.of(index)

@@ -10,7 +10,7 @@ from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis import explain
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.causes.profile import spot_between
+from pipeline.diagnosis.causes.profile import form_between
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.observations.simulation import run
@@ -182,9 +182,9 @@ def test_several_forms_that_add_up_to_one_spot_are_told_as_it(bench, name, amoun
     cause = BY_NAME[name]
     spot = replace(cause.variants(facts)[-1], at=0.405, width=0.06)
     parts = cause.apply(cause.apply(model, 0.6 * amount, spot, facts), 0.4 * amount, spot, facts)
-    variant, size, stiffer = spot_between(model, parts)
+    variant, size, stiffer = form_between(model, parts)
     assert variant.at == pytest.approx(0.405, abs=0.01)  # half a step of the search
     assert variant.width == pytest.approx(0.06, rel=0.13)
     assert size == pytest.approx(amount, rel=0.1)
     assert stiffer == pytest.approx(0.0, abs=0.01)
-    assert spot_between(model, model) is None
+    assert form_between(model, model) is None

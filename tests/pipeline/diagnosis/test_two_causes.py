@@ -13,8 +13,11 @@ from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations import two_causes
 from pipeline.diagnosis.explanations.effort import Effort
+from pipeline.diagnosis.explanations.exchange import exchanged
 from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.two_causes import _exchanged, _refitted, _weighed, _with_all_forms, masking
+from pipeline.diagnosis.explanations.pair_fits import refitted_pairs, with_all_forms
+from pipeline.diagnosis.explanations.pair_set import weighed_pairs
+from pipeline.diagnosis.explanations.two_causes import masking
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.observations.work import newton_steps
@@ -42,33 +45,33 @@ PAIR = (0, 1)
 
 
 def test_a_pair_that_fits_better_than_one_cause_of_several_forms_stands_alone(bench):
-    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 370.0, 3)])
+    two, instead = weighed_pairs(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 370.0, 3)])
     assert two is not None and [two.names(place) for place in (0, 1)] == [[0], [1]]
     assert two.chance(0) == pytest.approx(1.0, abs=1e-6) and instead == []
 
 
 def test_one_cause_of_several_forms_that_fits_as_well_may_stand_for_both(bench):
     """Two more free numbers cost it exp(-2), the pair's prior is a tenth: of equal gain it keeps a place."""
-    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 4)])
+    two, instead = weighed_pairs(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 4)])
     assert two is not None and instead == []
     assert [two.names(place) for place in (0, 1)] == [[0, 2], [1, 2]] and 0.5 < two.chance(0) < 0.95
 
 
 def test_the_causes_of_a_pair_that_fits_as_well_join_the_class_of_one_cause(bench):
-    two, instead = _weighed(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
+    two, instead = weighed_pairs(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
     assert two is None and instead == [0, 1]
-    assert _weighed(bench, [explanation(PAIR, 390.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
+    assert weighed_pairs(bench, [explanation(PAIR, 390.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
 
 
 def test_its_prior_alone_does_not_keep_a_pair_out_of_the_class(bench):
     """Less than two sigma apart; prior and gain together leave it 2 %, less than the set asks for."""
-    two, instead = _weighed(bench, [explanation(PAIR, 397.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
+    two, instead = weighed_pairs(bench, [explanation(PAIR, 397.0, 1)], SETTINGS, [explanation((2,), 400.0, 1)])
     assert two is None and instead == [0, 1]
-    assert _weighed(bench, [explanation(PAIR, 397.0, 2)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
+    assert weighed_pairs(bench, [explanation(PAIR, 397.0, 2)], SETTINGS, [explanation((2,), 400.0, 1)]) == (None, [])
 
 
 def test_a_search_whose_effort_is_spent_begins_nothing(bench):
-    assert _exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1)) == []
+    assert exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1)) == []
     assert not Effort().spent
 
 
@@ -99,8 +102,8 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     names = [cause.name for cause in CATALOGUE]
     scale, decay, lens = (names.index(n) for n in ("scale_error", "relaxation", "lens_distortion"))
     given = Pair(bench.suspicion.best(scale), bench.suspicion.best(decay), 0.0)
-    (wrong,) = _refitted(bench, [given], SETTINGS, hopeless=bench.base.chi2)
-    best = max(_exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
+    (wrong,) = refitted_pairs(bench, [given], SETTINGS, hopeless=bench.base.chi2)
+    best = max(exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
     assert best.causes == (lens, decay) and best.gain > wrong.gain + 16.0
 
 
@@ -113,8 +116,8 @@ def test_each_half_of_a_pair_has_all_its_forms():
     names = [cause.name for cause in CATALOGUE]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
     given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)
-    (half,) = _refitted(bench, [given], SETTINGS, hopeless=np.inf)
-    (whole,) = _with_all_forms(bench, [half], SETTINGS)
+    (half,) = refitted_pairs(bench, [given], SETTINGS, hopeless=np.inf)
+    (whole,) = with_all_forms(bench, [half], SETTINGS)
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SETTINGS.shape_gain
     amount, std = whole.amount(CATALOGUE[lens])
     assert abs(amount - 0.012) < 4.0 * std
@@ -138,7 +141,7 @@ def test_a_pair_beyond_the_linear_limit_is_nothing_where_scores_spread_wider(mon
     bench = prepare(faults_of_input(hidden_test(Cable(), THREE, largest=0.0138, seed=3), settings), settings, knots=5)
     scores = replace(bench.suspicion.scores, unit=0.5 * bench.suspicion.scores.unit)
     asked = []
-    monkeypatch.setattr(two_causes, "_linear_pairs", lambda *_: [Pair(0, 1, gain)])
-    monkeypatch.setattr(two_causes, "_refitted", lambda *_, **__: asked.append(True) or [])
+    monkeypatch.setattr(two_causes, "linear_pairs", lambda *_: [Pair(0, 1, gain)])
+    monkeypatch.setattr(two_causes, "refitted_pairs", lambda *_, **__: asked.append(True) or [])
     assert masking(replace(bench, suspicion=replace(bench.suspicion, scores=scores)), settings) is None
     assert bool(asked) is tried

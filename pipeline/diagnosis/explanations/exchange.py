@@ -1,0 +1,92 @@
+"""Exchange of the causes of a pair: each is judged rightly beside the right amount of the other alone.
+
+Each cause of the best pair is taken out in turn, everything is scored beside the other as it is there, and what scores
+nearly as much is refitted in its place, until no exchange makes the pair better.
+"""
+
+from __future__ import annotations
+
+from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
+from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
+from pipeline.diagnosis.explanations.pair_fits import with_own_forms, worth
+from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
+from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+ATTEMPTS = 3
+"""Fits at most that go on where the last one ran out of steps."""
+
+EXCHANGES = 2
+"""Rounds at most; the second is for what the first has put right."""
+
+
+def exchanged(
+    bench: Workbench, found: list[Explanation], settings: DiagnosisSettings, effort: Effort = TO_THE_END
+) -> list[Explanation]:
+    """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
+    every, done = list(found), set[frozenset[int]]()
+    for _ in range(EXCHANGES):
+        best = max(every, key=worth, default=None)
+        if best is None or effort.spent or frozenset(best.causes) in done:
+            break
+        done.add(frozenset(best.causes))
+        if not best.fitted.converged:
+            best = _settled(bench, best, settings)
+            every.append(best)
+        for place in (0, 1):
+            every += _in_place_of(bench, best, place, settings, effort)
+    return every[len(found) :]
+
+
+def _settled(bench: Workbench, pair: Explanation, settings: DiagnosisSettings) -> Explanation:
+    """A pair whose fit ran out of steps, fitted on from where it stands: beside a half-way cause scores mislead."""
+    fitted = pair.fitted
+    for _ in range(ATTEMPTS):
+        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted, settings)
+        gained, fitted = fitted.chi2 - further.chi2, further
+        if fitted.converged or gained < settings.shape_gain:
+            break
+    return explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
+
+
+def _in_place_of(
+    bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings, effort: Effort
+) -> list[Explanation]:
+    """The pair with one of its causes replaced by whatever scores nearly as much beside the other."""
+    suspicion, other, found = bench.suspicion, pair.causes[1 - place], []
+    rest = _without(bench, pair.fitted, pair.causes[place])
+    if rest is None:
+        return []
+    beside = suspect(bench.observation, rest, suspicion.causes, visible=settings.visible, trace=settings.trace)
+    if beside.statistic.size == 0:
+        return []
+    near = settings.model_copy(update={"refit_margin": settings.exchange_margin, "refit_most": settings.exchange_most})
+    for cause in candidates(beside, near):
+        direction = beside.best(cause)
+        if effort.spent:
+            break
+        if cause in pair.causes or direction is None:
+            continue  # itself, or further forms of the other cause: that is a single cause
+        fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2)
+        if fitted is not None and not fitted.converged:  # kinks: the form as it is scored does not stall
+            held = fit_terms(
+                bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2, tuned=False
+            )
+            fitted = held if held is not None and held.chi2 < fitted.chi2 else fitted
+        if fitted is not None:
+            causes = (cause, other) if place == 0 else (other, cause)
+            new = explanation_of(causes, bench.base, fitted, suspicion)
+            found.append(with_own_forms(bench, new, settings, rival=pair.fitted.chi2))
+    return found
+
+
+def _without(bench: Workbench, fitted: Fit, cause: int) -> Fit | None:
+    """The model with a cause taken out and all else left where it is; None where that has no equilibrium."""
+    extension, vector = fitted.extension.without(
+        fitted.vector, fitted.extension.terms_of(bench.suspicion.causes[cause])
+    )
+    rest = evaluated(bench.observation, extension, vector, fitted.run)
+    return None if rest.run.prediction is None else rest

@@ -1,0 +1,115 @@
+"""A profile along the cable in any form: a sum of waves in the place of the forms it was found by.
+
+A step, a kink, three waves or several bumps are no form of the catalogue, and what three forms leave of a strong one is
+many times the noise: it was then unexplained, or another cause was named beside it, and f_EI was up to 28 % off. Once a
+cause along the cable is in the model, its profile may be whatever the photos ask for. Photos of the force-free cable
+show K0(s) directly, photos under load by what does not grow with the moment, so that waves are a nearly linear problem;
+they come in blocks as long as each block pays for itself, and start from the profile that the forms add up to.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.profile import WAVE_COST, deviation, is_profile, position_of, profile, wave
+from pipeline.diagnosis.fits.extension import Extension, Term
+from pipeline.diagnosis.fits.fit import Fit, fit_from
+from pipeline.diagnosis.fits.sensitivities import profile_columns
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.statistics.score import span
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+Array = NDArray[np.float64]
+
+BLOCKS = (8, 16, 24)
+"""Numbers of waves. Of a sharp step of K0 by 3 1/m, 24 leave waves of 0.5 um across the cable: a twentieth of a pixel's
+tenth, below what a photo shows. A shape has 20 functions a photo, so more could hardly be told apart."""
+
+EACH = 2.0 * WAVE_COST
+"""Chi-square for each further number that a block must remove besides ``shape_gain``."""
+
+
+def with_free_profile(
+    observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings, *, hopeless: float = np.inf
+) -> Fit:
+    """The model with the forms of a cause along the cable replaced by waves, where these explain the data better.
+
+    Parameters
+    ----------
+    observation : Observation
+    fitted : Fit
+        With the cause in it.
+    cause : Cause
+        Any; one that is no profile along the cable leaves the model as it is.
+    settings : DiagnosisSettings
+    hopeless : float
+        Chi-square above which the result is of no use.
+    """
+    if not is_profile(cause) or not _may_pay(observation, fitted, cause, settings, hopeless):
+        return fitted
+    best = fitted
+    for count in BLOCKS:
+        extension, start = in_waves(best, cause, count)
+        found = fit_from(observation, extension, start, best, settings)
+        if found.run.prediction is not None and best.chi2 - found.chi2 > price(found, best, settings):
+            best = found
+        elif best is not fitted:
+            break  # what replaces spots may need more waves than the first block has
+    return best if _excess(best) < SHARED * _excess(fitted) else fitted
+
+
+SHARED = 0.25
+"""Share of the misfit beyond noise that waves may leave: what takes only a part of it away takes it from another misfit
+(a law that is too coarse for a steep fall left 380; waves took half of that and put f_EI 8 % off)."""
+
+
+def _excess(fitted: Fit) -> float:
+    """Chi-square beyond noise."""
+    return fitted.chi2 - (len(fitted.residual) - fitted.extension.size)
+
+
+def in_waves(fitted: Fit, cause: Cause, count: int) -> tuple[Extension, Array]:
+    """The model with ``count`` waves in the place of the forms of a cause, and the vector nearest to the fitted one.
+
+    Waves have mean zero; a mean that the forms had (spots) goes to the law, or to K0.
+    """
+    own = fitted.extension.terms_of(cause)
+    rest, vector = fitted.extension.without(fitted.vector, own)
+    uniform, varying = rest.model(vector), fitted.extension.model(fitted.vector)
+    terms = tuple(Term(cause, wave(k)) for k in range(1, count + 1))
+    position = position_of(uniform)
+    waves = np.column_stack([np.ones_like(position), *(profile(term.variant, position) for term in terms)])
+    mean, *amounts = np.linalg.lstsq(waves, deviation(uniform, varying, cause), rcond=None)[0]
+    if cause.unit == "-":
+        vector[: len(rest.base.knots)] += np.log1p(max(mean, -0.9))
+        amounts = [amount / (1.0 + max(mean, -0.9)) for amount in amounts]
+    elif (bend := rest.base.pre_curvature_index) is not None:
+        vector[bend] += mean
+    return Extension(rest.base, rest.facts, (*rest.terms, *terms)), np.r_[vector, amounts]
+
+
+def price(found: Fit, simpler: Fit, settings: DiagnosisSettings) -> float:
+    """Chi-square that a model must remove for its further numbers."""
+    return _price(found.extension.size - simpler.extension.size, settings)
+
+
+def _price(further: int, settings: DiagnosisSettings) -> float:
+    return settings.shape_gain + EACH * max(further, 0)
+
+
+def _may_pay(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings, hopeless: float) -> bool:
+    """Whether waves beside what is fitted would remove enough, by the linear model."""
+    further = BLOCKS[0] - sum(fitted.extension.terms[k].size for k in fitted.extension.terms_of(cause))
+    if _excess(fitted) < _price(further, settings):
+        return False
+    terms = [Term(cause, wave(k)) for k in range(1, BLOCKS[-1] + 1)]
+    columns = profile_columns(observation, fitted.extension, fitted.vector, fitted.run, terms)
+    known = span(fitted.jacobian)
+    beside = columns - known @ (known.T @ columns)
+    seen = np.linalg.norm(beside, axis=0) > settings.visible * np.linalg.norm(columns, axis=0)
+    removed = float(np.sum((span(beside[:, seen]).T @ fitted.residual) ** 2))
+    if not fitted.converged:  # what is left then says little of what waves would leave
+        return fitted.chi2 - removed < max(hopeless, 0.5 * fitted.chi2) or not np.isfinite(hopeless)
+    return removed > _price(further, settings) and fitted.chi2 - removed < hopeless

@@ -1,0 +1,138 @@
+"""Pairs of causes as they are fitted: the best of the linear search, the best single cause with what scores beside it.
+
+The linear search is exhaustive about the base model, and only a start: amounts of two causes at once come from it, the
+rest from refits. A pair then gets all forms of its causes, as a single cause has: without its lesser part a load at an
+angle left a wrong pair the better one. Forms with a place of their own (elements of friction, profiles along the cable)
+cost several refits, so only the best pairs get them (`in_any_form`): beside friction of the bearings a loop of two
+elements fitted by one was a quarter too small and left more than noise, so two right names were refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.diagnosis.causes.profile import is_profile
+from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
+from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
+from pipeline.diagnosis.explanations.forms import with_more_forms
+from pipeline.diagnosis.explanations.free_profile import with_free_profile
+from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, pair_gains
+from pipeline.diagnosis.statistics.twins import cosines
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+
+def linear_pairs(bench: Workbench, settings: DiagnosisSettings) -> list[Pair]:
+    """Best pairs of the exhaustive linear search about the base model that are worth a refit."""
+    suspicion = bench.suspicion
+    cosine = cosines(suspicion.scores.unit)
+    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner, collinear=settings.pair_collinear)
+    pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
+    least = pairs[0].gain - max(settings.refit_least, settings.refit_margin * pairs[0].gain) if pairs else 0.0
+    return [pair for pair in pairs if pair.gain > least]
+
+
+def refitted_pairs(
+    bench: Workbench,
+    pairs: list[Pair],
+    settings: DiagnosisSettings,
+    *,
+    hopeless: float,
+    effort: Effort = TO_THE_END,
+) -> list[Explanation]:
+    """The pairs, fitted in full from their linear amounts; the best two in any case."""
+    suspicion, found = bench.suspicion, []
+    z, norm, unit = suspicion.scores.z, suspicion.scores.norm, suspicion.scores.unit
+    for rank, pair in enumerate(pairs):
+        if rank > 1 and effort.spent:
+            break
+        one, other = pair.first, pair.second
+        c = float(unit[:, one] @ unit[:, other])
+        amounts = tuple(
+            float((z[own] - c * z[rest]) / (1.0 - c * c) / norm[own]) for own, rest in ((one, other), (other, one))
+        )
+        fitted = fit_terms(
+            bench.observation, bench.base, suspicion, (one, other), settings, amounts=amounts, hopeless=hopeless
+        )
+        if fitted is not None:
+            causes = (int(suspicion.owner[one]), int(suspicion.owner[other]))
+            found.append(explanation_of(causes, bench.base, fitted, suspicion))
+    return found
+
+
+def beside_best(
+    bench: Workbench, best: Explanation, second: Suspicion, settings: DiagnosisSettings
+) -> list[Explanation]:
+    """The best single cause with each of the two that score most beside it."""
+    found = []
+    for cause in candidates(second, settings)[:2]:
+        direction = second.best(cause)
+        if cause == best.causes[0] or direction is None:
+            continue
+        fitted = fit_terms(bench.observation, best.fitted, second, (direction,), settings)
+        if fitted is not None:
+            found.append(explanation_of((best.causes[0], cause), bench.base, fitted, bench.suspicion))
+    return found
+
+
+def with_all_forms(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
+    """The pairs with further forms of their causes, the best first; one that stays far above it is left as it is.
+
+    A load at an angle to the chord is no better than half of itself beside another cause, as it is alone.
+    """
+    every: dict[frozenset[int], Explanation] = {}
+    for pair in sorted(found, key=lambda e: -worth(e)):
+        if frozenset(pair.causes) not in every:
+            rival = min((e.fitted.chi2 for e in every.values()), default=np.inf)
+            every[frozenset(pair.causes)] = with_own_forms(bench, pair, settings, rival=rival)
+    return list(every.values())
+
+
+def with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSettings, *, rival: float) -> Explanation:
+    """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square.
+
+    Of causes whose forms are directions (a load, a tilt); a form with a place of its own is tuned instead.
+    """
+    fitted, hopeless, facts = pair.fitted, rival + settings.refit_least, bench.facts
+    for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
+        if not kind.combines or any(form.tuned for form in kind.variants(facts)):
+            continue
+        for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
+            fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
+    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
+
+
+def in_any_form(
+    bench: Workbench, found: Sequence[Explanation], settings: DiagnosisSettings, *, rivals: Sequence[Explanation] = ()
+) -> list[Explanation]:
+    """What the best pairs become with further forms of their own place, and with profiles of any form.
+
+    One that cannot come near the best one so far, ``rivals`` included, as far as its scores tell, is left out.
+    """
+    new: list[Explanation] = []
+    for pair in sorted(found, key=lambda e: -worth(e))[:IN_ANY_FORM]:
+        rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
+        fitted, hopeless = pair.fitted, rival + settings.refit_least
+        for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
+            fitted = with_free_profile(bench.observation, fitted, kind, settings, hopeless=hopeless)
+            if is_profile(kind) or not kind.combines:
+                continue
+            for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
+                fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
+        if fitted is not pair.fitted:
+            new.append(explanation_of(pair.causes, bench.base, fitted, bench.suspicion))
+    return new
+
+
+IN_ANY_FORM = 2
+"""Pairs, the best first, that get forms with a place of their own; time."""
+
+
+def worth(explanation: Explanation) -> float:
+    """Logarithm of its weight, as far as fit and free numbers go."""
+    return 0.5 * explanation.gain - explanation.weighed.tuned
