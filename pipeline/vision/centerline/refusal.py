@@ -108,9 +108,14 @@ def refusal_beside_axis(
 
 
 def refusal_of_bend(rough: RoughCable, fit: CurveFit, width: Array, options: CurveSettings) -> Rejected | None:
-    """Refuse a curve that bends as no cable can, where it was seen or on the way to its axes."""
-    s = np.linspace(0.0, fit.curve.frame.knots[-1], options.points)
-    bend = float(np.abs(fit.curve.curvature(s)).max()) * middle_width(width)[0]
+    """Refuse a curve that bends as no cable can over one diameter, where it was seen.
+
+    Over the last pixels before an axis, without data, it may bend as it likes: what ties it to the axis mends that.
+    """
+    middle = middle_width(width)[0]
+    s = np.arange(fit.s.min(), fit.s.max(), 0.1 * middle)  # the feet of a curve that ran wild are in no order
+    angle = fit.curve.at(s)[1]
+    bend = float(np.abs(angle[10:] - angle[:-10]).max(initial=0.0))
     if bend <= options.max_bend_diameters:
         return None
     return Rejected(
