@@ -107,7 +107,7 @@ def _too_large(modulus_mpa: float, usual: tuple[float, float]) -> str:
     """By which factor the forces may be off, if a mistaken unit brings the modulus back among those of cables."""
     stiff = modulus_mpa > usual[1]
     readings = [
-        f"{factor:.4g} times too large ({said})" if stiff else f"{1.0 / factor:.4g} times too small ({said})"
+        (f"{factor:.4g} times too large" if stiff else f"{1.0 / factor:.4g} times too small") + f" ({said})"
         for factor, said in READINGS.items()
         if (factor > 1.0) == stiff and usual[0] <= modulus_mpa / factor <= usual[1]
     ]

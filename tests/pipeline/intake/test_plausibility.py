@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.intake.plausibility import size_findings
 from pipeline.records import LoadStep
+from pipeline.report.words import Words
 from pipeline.settings.intake import IntakeSettings
 
 SETTINGS = IntakeSettings()
@@ -62,6 +63,8 @@ def test_what_no_bar_of_steel_and_no_loose_wire_has_is_an_error(factor):
 def test_other_units_of_force(factor, said):
     (finding,) = found_for(0.02 * factor, 4.6e-3)
     assert finding.code == "size/force" and said in finding.message
+    german = Words("de").said(finding.message)
+    assert german.language == "de" and "times too" not in german.text and "taken for" not in german.text
 
 
 @pytest.mark.parametrize("diameter", [2e-3, 3e-3, 5e-3, 8e-3, 15e-3, 30e-3])
