@@ -114,7 +114,7 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     lines = without_lay(lines, specimen.diameter_m, settings.curve)
     lines, bow_findings = on_one_side(lines, specimen.diameter_m, settings.series)
-    lines = tuple(with_doubt_of_plane(line, calibration) if isinstance(line, Centerline) else line for line in lines)
+    lines = tuple(_doubted(line, calibration) for line in lines)
     found, displacements = _told_by(shots, lines)
     findings = (
         *calibration.findings,
@@ -205,6 +205,14 @@ def _shown(
         return cable if preview is None else replace(cable, preview=preview)
     line = centerline_of(cable, settings, told)
     return line if preview is None else replace(line, preview=with_strip(preview, line, cable.rough, settings.preview))
+
+
+def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:
+    """The line with what its plane leaves open; a plane that is not finite there costs that photo."""
+    if isinstance(line, Rejected):
+        return line
+    doubted = guarded(line.image, partial(with_doubt_of_plane, line, calibration))
+    return replace(doubted, preview=line.preview)
 
 
 def _name_sides(

@@ -9,18 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision.shots import guarded
 
 MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
 """What photos are refused for when a strip of another width is looked for: edges beside the cable, or half of it."""
 
 LOOKED_AT = 3
-"""Photos that are traced without a diameter; all must agree."""
+"""Photos that are traced without a diameter; all that can be must agree, and at least two."""
 
 ALIKE = 0.05
 """Relative; widths on several photos of one cable agree to a percent, those of shadows and highlights do not."""
@@ -82,9 +84,10 @@ def _width_seen(
     """Width (m) on which a few photos agree that are traced without a diameter; None if it may be the stated one."""
     paths: list[Path] = [specimen.images[photo.image] for photo in traces.photos if photo.image in specimen.images]
     places = {round(place) for place in np.linspace(0, len(paths) - 1, LOOKED_AT)} if paths else set()
-    lines = [trace(paths[i], settings=settings) for i in sorted(places)]
+    lines = [guarded(paths[i].name, partial(trace, paths[i], settings=settings)) for i in sorted(places)]
     free = [line for line in lines if isinstance(line, Centerline)]
     px_per_m = specimen.camera.scale_px_per_m or traces.scale.px_per_m
+    # where no photo could be measured, 1 px/m stands for a scale that nobody knows
     if len(free) < min(2, len(paths)) or not free or px_per_m <= 1.0:
         return None
     widths = np.array([line.width_m for line in free]) / px_per_m

@@ -6,8 +6,8 @@ each other (stuck). After the base fit, each photo and each hold is left out in 
 then agrees with the model and no cause explains as much, that one item is at fault, not the model.
 
 Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/stuck``,
-``force/unit``, ``log/unit``,
-``log/displacement``, ``length/traced``; see `force_breaks` for ``force/factor`` and ``force/zero-moved``.
+``force/unit``, ``log/unit``, ``log/displacement``, ``length/traced``; see `force_breaks` for ``force/factor`` and
+``force/zero-moved``.
 """
 
 from __future__ import annotations

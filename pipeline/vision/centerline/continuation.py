@@ -12,8 +12,8 @@ things more are known, and both go in as measurements with their own uncertainty
   its slope is held.
 - The cable passes through the bearing axes, as far as these are known: as found, with the play of a cable in its
   bearing. Covers lie above the cable and are seen too far out by a share of their distance from the camera's foot, the
-  same share at both ends. What of that is common to the
-  photos of a series they tell together (`pipeline.vision.centerline.axes_of_series`).
+  same share at both ends. What of that is common to the photos of a series they tell together
+  (`pipeline.vision.centerline.axes_of_series`).
 
 On path-traced photos at 5 to 16 px/mm the first takes a third off the errors of the last 10 mm, the second a twentieth;
 axes known without error would take off half or more: on 101 photos of another renderer with covers above the cable, a
@@ -89,7 +89,10 @@ def sight_of_axes(
     width: float,
     settings: CurveSettings,
 ) -> AxisSight | None:
-    """How the curve continued as a bow passes the axes, as above; None where these are its own ends or unknown."""
+    """How the curve continued as a bow passes the axes, as above.
+
+    None where these are its own ends or unknown, or where the fit is not finite.
+    """
     if not _known(kinds):
         return None
     step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance, settings.least_departure))

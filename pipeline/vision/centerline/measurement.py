@@ -116,7 +116,7 @@ class Followed:
     diameter_m: float | None
 
     def sight(self, settings: VisionSettings) -> AxisSight | None:
-        """How the cable passes its axes; None where these are the ends that were seen."""
+        """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
         return sight_of_axes(
             self.fit,
             self.covariance,

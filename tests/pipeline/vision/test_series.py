@@ -327,7 +327,7 @@ def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data
     assert outcome.preview is not None
 
 
-@pytest.mark.parametrize("stage", ["find_cable", "follow_cable", "with_strip"])
+@pytest.mark.parametrize("stage", ["find_cable", "follow_cable", "with_strip", "with_doubt_of_plane"])
 def test_photo_that_breaks_the_program_costs_that_photo_alone(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.intake.folder import read_specimen
-from pipeline.records import Centerline
+from pipeline.records import Centerline, Rejected, Scale, Traces
 from pipeline.settings import Settings
 from pipeline.vision.series import trace_series
+from pipeline.vision.stated_width import with_width_seen
 
 FOLDER = Path(__file__).parents[3] / "fixtures" / "specimens" / "three"
 SETTINGS = Settings()
@@ -38,3 +39,12 @@ def test_a_wrong_diameter_is_one_finding_and_every_photo_is_traced_with_the_widt
 def test_the_right_diameter_is_not_doubted(specimen):
     traces = trace_series(specimen, SETTINGS.vision)
     assert len(widths(traces)) == 3 and "diameter/seen" not in [finding.code for finding in traces.findings]
+
+
+def test_a_photo_that_breaks_the_look_without_a_diameter_costs_no_specimen(specimen):
+    def broken(*_, **__):
+        raise ValueError("numbers nobody foresaw")
+
+    refused = tuple(Rejected(image, "photo/width", "too narrow") for image in specimen.images)
+    traces = Traces(refused, Scale(5e3, 1e-3, "number given in specimen.toml"))
+    assert with_width_seen(specimen, traces, SETTINGS.vision, retrace=broken, trace=broken) is traces
