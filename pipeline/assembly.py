@@ -190,8 +190,11 @@ def _said_once(group: list[tuple[str, Finding]]) -> Finding:
     names = list(dict.fromkeys(image for image, _ in group))
     if len(names) == 1:
         return first
-    message = f"{len(names)} photos ({', '.join(names)}): {first.message.removeprefix(f'{image}: ')}"
-    return Finding(first.code, first.level, message)
+    told = {finding.message.removeprefix(f"{own}: ") for own, finding in group}
+    message, listed = first.message.removeprefix(f"{image}: "), ", ".join(names)
+    if len(told) > 1:  # the numbers are those of one photo
+        return Finding(first.code, first.level, f"{len(names)} photos ({listed}), on {image}: {message}")
+    return Finding(first.code, first.level, f"{len(names)} photos ({listed}): {message}")
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:

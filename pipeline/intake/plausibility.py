@@ -17,6 +17,7 @@ import numpy as np
 
 from pipeline.intake.noted import doubtful
 from pipeline.records import Finding, LoadStep
+from pipeline.rounding import plain
 from pipeline.settings.intake import IntakeSettings
 from pipeline.units import quantity
 
@@ -83,16 +84,17 @@ def _force_size(
     usual = settings.modulus_range_mpa
     if usual[0] <= modulus_mpa <= usual[1]:
         return ()
+    asked = plain(float(f"{modulus_mpa:.3g}"))
     reached = (
         f"a force of {quantity(force, 'N')} on a cable of {length_m * 1e3:.4g} mm asks for EI = P L^2/pi^2 = "
-        f"{quantity(stiffness, 'N m²')}, that is a modulus of {modulus_mpa:.3g} MPa for {diameter_m * 1e3:.3g} mm "
+        f"{quantity(stiffness, 'N m²')}, that is a modulus of {asked} MPa for {diameter_m * 1e3:.3g} mm "
         "diameter"
     )
     loose = LOOSE_MPA_MM2 / (diameter_m * 1e3) ** 2
     if modulus_mpa > BENT * STEEL_MPA:
         bound = f"a bar of steel has {STEEL_MPA:.0f} MPa, and no cable more"
     elif modulus_mpa < loose:
-        bound = f"the finest wires lying loose have {loose:.1g} MPa, and no cable less"
+        bound = f"the finest wires lying loose have {plain(loose, 1)} MPa, and no cable less"
     else:
         bound = f"cables have {usual[0]:g} to {usual[1]:g} MPa"
     message = (
@@ -107,7 +109,7 @@ def _too_large(modulus_mpa: float, usual: tuple[float, float]) -> str:
     """By which factor the forces may be off, if a mistaken unit brings the modulus back among those of cables."""
     stiff = modulus_mpa > usual[1]
     readings = [
-        (f"{factor:.4g} times too large" if stiff else f"{1.0 / factor:.4g} times too small") + f" ({said})"
+        (f"{factor:.7g} times too large" if stiff else f"{1.0 / factor:.7g} times too small") + f" ({said})"
         for factor, said in READINGS.items()
         if (factor > 1.0) == stiff and usual[0] <= modulus_mpa / factor <= usual[1]
     ]

@@ -28,7 +28,8 @@ def measured():
     return measured_result()
 
 
-UNIT = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
+TOO_LARGE = "forces seem to be 1000 times too large (mN taken for N, or N for kN)"
+UNIT = FindingPart(code="size/force", level="error", message=f"the {TOO_LARGE}")
 
 
 @pytest.mark.parametrize(
@@ -51,8 +52,10 @@ def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads
 def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
     parts = SimpleNamespace(inverse=measured.inverse, balance=measured.balance, agreement=measured.agreement)
     plain, led = headline(parts, None, []), headline(parts, None, [], UNIT)
-    assert led == f"The forces seem to be 1000 times too large. {plain}"
-    assert Words("de").said(led).language == "de"
+    assert led == f"The {TOO_LARGE}. {plain}"
+    german = Words("de").said(led)
+    assert german.language == "de" and german.text.endswith(Words("de").said(plain).text)
+    assert german.text.startswith("Die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder N für kN). ")
 
 
 def test_what_the_diagnosis_names_is_said_once():
@@ -77,6 +80,11 @@ def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     noticed = [narrow("a.png", 116), ("b.png", axis), narrow("b.png", 115), narrow("c.png", 116)]
     told = folded(noticed)
     assert [finding.code for finding in told] == ["photo/width", "photo/bearing"]
-    assert told[0].message.startswith("3 photos (a.png, b.png, c.png): what was traced is 116 % as wide")
+    names = "3 photos (a.png, b.png, c.png)"
+    assert told[0].message.startswith(f"{names}, on a.png: what was traced is 116 % as wide")
     assert told[1] == axis and folded(noticed[:1]) == [noticed[0][1]]
-    assert Words("de").said(told[0].message).language == "de"
+    (alike,) = folded([narrow("a.png", 116), narrow("c.png", 116)])
+    assert alike.message.startswith("2 photos (a.png, c.png): what was traced is 116 % as wide")
+    german = Words("de").said(told[0].message)
+    assert german.language == "de" and german.text.startswith("3 Fotos (a.png, b.png, c.png), auf a.png: das ")
+    assert Words("de").said(alike.message).language == "de"

@@ -289,7 +289,7 @@ def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
 def _size(found: Break) -> str:
     if found.kind == "factor":
         return f"by a factor of {rounded(found.amount, found.std)}"
-    return f"by {quantity(found.amount, 'N', found.std)}"
+    return f"by an offset of {quantity(found.amount, 'N', found.std)}"
 
 
 def _zeroed(test: MeasuredTest, found: Break) -> bool:
