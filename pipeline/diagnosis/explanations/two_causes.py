@@ -14,9 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.causes.law import LAW
+from pipeline.diagnosis.causes.profile import is_wave
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.exchange import exchanged
 from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.free_profile import EACH
 from pipeline.diagnosis.explanations.pair_fits import (
     beside_best,
     in_any_form,
@@ -106,9 +108,19 @@ def _both_needed(
         if float(amount @ np.linalg.solve(covariance, amount)) <= significant:
             return False
     refitted = {e.causes[0] for e in singles}
-    simpler = [e.gain for e in singles if not _composed(e) or e.weighed.tuned < pair.weighed.tuned]
-    simpler += [_linear_gain(suspicion, cause) for cause in pair.causes if cause not in refitted]
+    # waves remove some of any misfit: beside a single cause without them each must pay for itself
+    simpler = [
+        e.gain + EACH * max(_waves(pair) - _waves(e), 0)
+        for e in singles
+        if not _composed(e) or e.weighed.tuned < pair.weighed.tuned
+    ]
+    dear = EACH * _waves(pair)
+    simpler += [_linear_gain(suspicion, cause) + dear for cause in pair.causes if cause not in refitted]
     return pair.gain - max(simpler, default=0.0) > least
+
+
+def _waves(found: Explanation) -> int:
+    return sum(is_wave(term.variant) for term in found.fitted.extension.terms)
 
 
 def masking(bench: Workbench, settings: DiagnosisSettings, effort: Effort = TO_THE_END) -> TwoCauses | None:
