@@ -129,8 +129,8 @@ def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
     """The finding that comes before every number: with data at fault the numbers may be wrong, however well they fit.
 
     An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
-    refused for stands where its numbers would be.
+    refused for stands where its numbers would be, and an error of the program is none of the data.
     """
-    faults = [f for f in findings if not f.code.startswith("identify/")]
+    faults = [f for f in findings if not f.code.startswith("identify/") and not f.code.endswith("/program-error")]
     first = (f for f in faults if f.level == "error")
     return next(first, next((f for f in faults if f.code == "size/force"), None))

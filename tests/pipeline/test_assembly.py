@@ -40,6 +40,7 @@ UNIT = FindingPart(code="size/force", level="error", message=f"the {TOO_LARGE}")
         ("force/gain", "error", True),
         ("force/outlier", "warning", False),
         ("identify/inverse-no-start", "error", False),  # said where the numbers would be
+        ("diagnosis/program-error", "error", False),  # the data are not to blame, and the numbers stand without it
     ],
 )
 def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads):
