@@ -56,7 +56,7 @@ def find_cables(
         if _count_of_length(found, stated, most) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
-    radius = cover_radius(_with_photos(specimen, ends, settings), settings.bearings)
+    radius = _sought(lambda: cover_radius(_with_photos(specimen, ends, settings), settings.bearings))
     again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
@@ -65,6 +65,12 @@ def find_cables(
         "centres are taken for the bearing axes."
     )
     return again, (Finding("rig/covers-found", "info", text),)
+
+
+def _sought(work: Callable[[], float | None]) -> float | None:
+    """Radius of the covers that the ends of cables tell; where the search breaks on a photo, they tell none."""
+    radius = guarded("", work)
+    return None if isinstance(radius, Rejected) else radius
 
 
 def _count_alike(shots: list[Shot], most: float) -> int:
@@ -96,7 +102,7 @@ def _with_covers_by_length(
     lengths = [shot.found.length_px for shot in seen if isinstance(shot.found, RoughCable)]
     expected = 0.5 * diameter_m * float(np.median(lengths)) / (specimen.length_m - diameter_m)
     ends = [seen[0], seen[-1]] if len(seen) > 1 else seen
-    radius = rim_radius(_with_photos(specimen, ends, settings), expected, settings.bearings)
+    radius = _sought(lambda: rim_radius(_with_photos(specimen, ends, settings), expected, settings.bearings))
     if radius is None:
         return shots
     again = _find_all(specimen, from_number(2.0 * radius / diameter_m, settings.calibration), settings)

@@ -346,3 +346,15 @@ def test_photo_that_breaks_the_program_costs_that_photo_alone(
     assert isinstance(second, Rejected) and second.code == "photo/program-error"
     assert "LinAlgError: Singular matrix" in second.reason
     assert second.preview is not None
+
+
+def test_a_search_for_covers_that_breaks_costs_no_specimen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def broken(*_: object) -> float:
+        asked.append(True)
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(shots_module, "cover_radius", broken)
+    traces = trace_series(series(tmp_path, given=RigSpec("left", None), cover_m=0.0098), FLAT)
+    assert asked and len(traces.photos) == 3
