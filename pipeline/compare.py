@@ -28,11 +28,12 @@ from pipeline.result import Result
 from pipeline.rounding import p_value as p_text
 from pipeline.rounding import plain, rounded
 from pipeline.settings.compare import CompareSettings
-from pipeline.visited import Visited, best, pre_curvature
+from pipeline.visited import Visited, best, leading, pre_curvature
 
 Array = NDArray[np.float64]
 
-# Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it.
+# Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it; besides them the
+# one that comes before all its numbers.
 DOUBTS = ("identify/scale", "identify/length", "identify/misfit-shape", "identify/misfit-force", "length/traced")
 # Misfit of the base model is no doubt about the answer of an extended one.
 EXPLAINED = ("identify/misfit-shape", "identify/misfit-force")
@@ -246,7 +247,9 @@ def _findings(
         yield Finding("compare/method", "warning", message)
     for result in (a, b):
         settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
-        doubts = [f.message.rstrip(".") for f in result.findings if f.code in DOUBTS and f.code not in settled]
+        fault = leading(result.findings)
+        doubtful = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
+        doubts = [f.message.rstrip(".") for f in doubtful]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
             doubts.append("its simulation leaves a misfit that no known cause removes")
         if doubts:

@@ -144,10 +144,11 @@ def test_one_scale_for_both_and_two_scales(before):
 def test_doubts(before):
     long = before.specimen.model_copy(update={"length_m": 1.3 * LENGTH})
     assert "compare/length" in codes(compare(before, before.model_copy(update={"specimen": long})))
-    doubt = FindingPart(code="identify/scale", level="warning", message="The scale is off by 2 %.")
-    (_, finding) = compare(before, before.model_copy(update={"findings": [doubt]})).findings
-    assert finding.code == "compare/doubt"
-    assert "The scale is off by 2 %." in finding.message
+    for code, level in (("identify/scale", "warning"), ("force/factor", "error")):
+        doubt = FindingPart(code=code, level=level, message="The scale is off by 2 %.")
+        (_, finding) = compare(before, before.model_copy(update={"findings": [doubt]})).findings
+        assert finding.code == "compare/doubt"
+        assert "The scale is off by 2 %." in finding.message
     curve = before.inverse.curve
     few = [k < curve.kappa_per_m[0] + 1.0 for k in curve.kappa_per_m]
     assert "compare/range" in codes(compare(before, shifted(before, supported=few)))
