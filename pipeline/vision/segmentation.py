@@ -127,7 +127,8 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
         if isinstance(outcome, RoughCable):
             if first is not None and _lies_on(outcome, leaving):
                 return first
-            return _more_shown(outcome, going_on, settings) or outcome
+            more = _more_shown(outcome, going_on, settings)
+            return outcome if more is None else more[0]
         if outcome.code in _CONCLUSIVE:
             return outcome
         if outcome.code == "photo/leaves-frame":
@@ -182,7 +183,7 @@ def _weigh(
     _, outcome, path = max(clear or verdicts, key=lambda verdict: verdict[0])
     if isinstance(outcome, RoughCable):
         going_on = [(v[1], v[2]) for v in verdicts if isinstance(v[1], Rejected) and v[1].code in _IN_PIECES]
-        outcome = _more_shown(outcome, going_on, settings) or outcome
+        outcome, path = _more_shown(outcome, going_on, settings) or (outcome, path)
     return outcome, path
 
 
@@ -194,15 +195,17 @@ def _length(outcome: RoughCable | Rejected) -> float:
     return outcome.length_px if isinstance(outcome, RoughCable) else 0.0
 
 
-def _more_shown(found: RoughCable, going_on: list[tuple[Rejected, Array]], settings: VisionSettings) -> Rejected | None:
-    """The refusal of a strip that another reading showed to go on: where this one ends, or longer and elsewhere."""
+def _more_shown(
+    found: RoughCable, going_on: list[tuple[Rejected, Array]], settings: VisionSettings
+) -> tuple[Rejected, Array] | None:
+    """Refusal and path of a strip that another reading showed to go on: where this one ends, or longer, elsewhere."""
     tree = cKDTree(found.path_px)
     for refusal, path in going_on:
         longer = float(np.hypot(*np.diff(path, axis=0).T).sum()) > found.length_px
         elsewhere = float(np.median(tree.query(path)[0])) > found.half_width_px
         at_end = refusal.code == "photo/hidden-end" and _ends_at(found, refusal, settings)
         if at_end or (longer and elsewhere):
-            return refusal
+            return refusal, path
     return None
 
 

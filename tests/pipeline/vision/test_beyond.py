@@ -185,3 +185,14 @@ def test_a_real_cable_is_followed_through_a_shadow(place, shared_data):
     assert isinstance(found, RoughCable)
     # that of the photo without the shadow; the last piece at a clamp is a matter of a few widths
     assert found.length_px == pytest.approx(3798.0, rel=0.01)
+
+
+@pytest.mark.shared
+def test_a_band_across_a_real_cable_does_not_pass_for_it(shared_data):
+    """One reading shows the cable cut by it, all others the band alone, a fifth as long and twice as large."""
+    whole = load_photo(shared_data / "real" / "loop" / "black0.jpg", VisionSettings().photo)
+    picture = cv2.resize(whole.pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    cv2.line(picture, (430, 460), (254, 1187), (37, 100, 188), 51, cv2.LINE_AA)
+    noise = 7.0 * np.random.default_rng(9).standard_normal(picture.shape)
+    found = find_cable(Photo("band.png", np.clip(picture + noise, 0, 255).astype(np.uint8), 8), VisionSettings())
+    assert isinstance(found, Rejected) and found.code == "photo/hidden-end"
