@@ -23,6 +23,7 @@ from pipeline.diagnosis.explanations.pair_set import TwoCauses
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
+from pipeline.diagnosis.fits.displacement_scatter import with_scatter
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
@@ -83,6 +84,12 @@ def diagnose(
     known = None if identification is None else curve_of(identification.inverse)
     conclusion = conclude(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
+    scattered = with_scatter(faults, bench, settings) if part.verdict == "unexplained" else None
+    if scattered is not None:
+        concluded = conclude(scattered[1], settings)
+        presented = present(scattered[1], concluded, settings, identified=known)
+        if presented.verdict != "unexplained":
+            (faults, bench), conclusion, part = scattered, concluded, presented
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
     return part, (*findings, *_search_ended(conclusion))

@@ -26,6 +26,11 @@ class DiagnosisSettings(BaseModel):
         2e-6,
         description="m; of one displacement of the log against the chord: spindle and last digit of a log in 0.001 mm",
     )
+    displacement_scatter: float = Field(
+        5e-5,
+        description="m; largest scatter of the displacements that is asked for where no cause explains the data: a "
+        "dial gauge is read to 0.01 mm, and a spindle has some hundredths of play",
+    )
     section_blocks: int = Field(
         96, description="block means a photo; four per shape function, so that noise and misfit are measured apart"
     )
