@@ -153,6 +153,14 @@ def _slope(section: Section, law: Characteristic, update: Update, K: Array) -> A
     return tangent if section.profile is None else section.profile * tangent
 
 
+ROUNDING = 1e-12
+"""Relative: a ratio of tangent to secant is a quotient of sums, known to some hundred roundings of 1e-16 each."""
+
+
 def _damping(ratios: Array) -> float:
-    """Largest contraction over all joints if some tangent exceeds its secant; otherwise the plain method."""
-    return min(1.0, 2.0 / (1.0 + float(ratios.max())))
+    """Largest contraction over all joints if some tangent exceeds its secant; otherwise the plain method.
+
+    Where the cable is straight both are the same, but for roundings.
+    """
+    largest = float(ratios.max())
+    return 1.0 if largest <= 1.0 + ROUNDING else 2.0 / (1.0 + largest)
