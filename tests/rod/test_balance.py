@@ -44,7 +44,7 @@ def test_result_scales_with_the_stiffness(EI0):
     graph = law_of(measured(law=replace(LAW, EI0=EI0, EI1=0.3 * EI0)))
     unit = law_of(measured())
     assert np.allclose(graph.tangent / EI0, unit.tangent / LAW.EI0, rtol=1e-6)
-    # where the iteration ended: rounding of another processor moves that by 5e-6 to 2e-5, a std is read to 1e-2
+    # rounding moves a std by 5e-6 on one processor and by 2e-5 on another; it is read to 1e-2
     assert np.allclose(graph.tangent_std / EI0, unit.tangent_std / LAW.EI0, rtol=1e-4)
     assert graph.pre_curvature == pytest.approx(unit.pre_curvature, rel=1e-7)
 
