@@ -22,6 +22,7 @@ from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.evidence import (
     force_rows,
     knot_rows,
+    knot_title,
     main_figure,
     mechanics_figures,
     photo_rows,
@@ -118,6 +119,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
                 "photos": photo_rows(result, words),
                 "knots": knot_rows(result, words),
             },
+            knots_title=knot_title(result, words),
             force_symbol=force_unit(result, words).symbol,
             stiffness_symbol=stiffness_unit(result, words).symbol,
             use=simulation_texts(result, words, settings),

@@ -16,9 +16,10 @@ from pipeline.report.words import Said, Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit
-from pipeline.visited import curves, trusted
+from pipeline.visited import best, curves, trusted
 
 TALL = (400.0, 350.0)
+POINTS = 5
 
 
 @dataclass(frozen=True)
@@ -248,7 +249,24 @@ def photos_note(result: Result, words: Words) -> str:
 
 
 def knot_rows(result: Result, words: Words) -> list[list[str]]:
-    """Rows of the table of control points: curvature, tangent."""
-    unit = figures.stiffness_unit(result, words)
-    knots, exact = result.inverse.knots if result.inverse else [], words("exact")
-    return [[f"{words.curvature(k.kappa_per_m)} ({exact})", unit.number(k.tangent_Nm2, k.std_Nm2)] for k in knots]
+    """Rows of the table of the characteristic the report answers with: curvature, tangent.
+
+    The control points where the fitted simulation is the answer; any other way has none, or a law that is no longer
+    theirs, and is read at `POINTS` places over the visited range.
+    """
+    unit, curve, exact = figures.stiffness_unit(result, words), best(result), words("exact")
+    if curve is None:
+        return []
+    if curve.method == "inverse" and result.inverse is not None:
+        points = [(k.kappa_per_m, (k.tangent_Nm2, k.std_Nm2)) for k in result.inverse.knots]
+    else:
+        points = [(float(k), curve.at(k)) for k in np.linspace(curve.kappa[0], curve.kappa[-1], POINTS)]
+    return [[f"{words.curvature(kappa)} ({exact})", unit.number(*tangent)] for kappa, tangent in points]
+
+
+def knot_title(result: Result, words: Words) -> str:
+    """What `knot_rows` shows: the control points, or points of a way without any."""
+    curve = best(result)
+    if curve is None or curve.method == "inverse":
+        return words("table_knots")
+    return words("table_points", way=words(f"way_{curve.method}"))

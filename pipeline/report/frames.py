@@ -11,7 +11,7 @@ from pipeline.compare import Comparison
 from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
-from pipeline.visited import METHODS, best
+from pipeline.visited import METHODS, best, pre_curvature
 
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
@@ -84,7 +84,7 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     Returns
     -------
     pandas.DataFrame
-        Columns quantity, value, std, unit, note.
+        Columns quantity, value, std, unit, note. The first row of a quantity is the answer of the report.
     """
     rows: list[tuple[str, float, float | None, str, str]] = []
     curve = best(result)
@@ -93,9 +93,14 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
         note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
         note += ", std is an upper bound" if constant.bound else ""
         rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
-    for way, part in (("inverse", result.inverse), ("balance", result.balance)):
-        if part is not None and part.pre_curvature_per_m is not None:
-            rows.append(("pre_curvature", part.pre_curvature_per_m, part.pre_curvature_std_per_m, "1/m", way))
+    answer = {curve.method: pre_curvature(result, curve)} if curve is not None else {}
+    parts = {"inverse": result.inverse, "balance": result.balance}
+    others = {
+        way: (part.pre_curvature_per_m, part.pre_curvature_std_per_m)
+        for way, part in parts.items()
+        if part is not None and part.pre_curvature_per_m is not None
+    }
+    rows += [("pre_curvature", *k0, "1/m", way) for way, k0 in (answer | others).items()]
     radius = smallest_radius(result)
     if radius is not None:
         rows.append(("smallest_bend_radius_seen", radius[0], radius[1], "m", f"photo of step {radius[2]}"))

@@ -5,11 +5,15 @@ import io
 import pandas as pd
 import pytest
 
+from pipeline.report.evidence import knot_rows, knot_title
+from pipeline.report.figures import stiffness_unit
 from pipeline.report.files import write_atomic
 from pipeline.report.frames import causes_frame, centerlines_frame, forces_frame, photos_frame, simulation_frame
 from pipeline.report.tables import csv_text, neutral, write_result, write_tables
+from pipeline.report.words import Words
 from pipeline.result import from_json
 from pipeline.settings import ReportSettings
+from pipeline.visited import visited
 
 CHARACTERISTIC = ["method", "kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2", "supported"]
 CENTERLINES = ["image", "s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m"]
@@ -47,6 +51,25 @@ def test_simulation_table_follows_the_range_asked_for(full_result, tmp_path):
     table = pd.read_csv(tmp_path / "simulation.csv").set_index("quantity")
     assert table.loc["equivalent_stiffness", "note"] == "inverse, kappa 3 to 7 1/m"
     assert set(table.index) == {"equivalent_stiffness", "pre_curvature", "smallest_bend_radius_seen"}
+
+
+def test_extended_model_answers_in_every_table(diagnosed, written):
+    result = diagnosed("named")
+    extended = visited("extended", result.diagnosis.extended)
+    first = written["simulation.csv"].set_index("quantity").loc["pre_curvature"].iloc[0]
+    assert first.note == "extended"
+    assert first.value == pytest.approx(extended.rest()[0], rel=1e-8)
+    words, unit = Words("en"), stiffness_unit(result, Words("en"))
+    assert "extended" in knot_title(result, words)
+    rows = knot_rows(result, words)
+    assert rows[0][1] == unit.number(*extended.at(extended.kappa[0]))
+    assert rows[-1][1] == unit.number(*extended.at(extended.kappa[-1]))
+
+
+def test_control_points_where_the_fit_is_the_answer(full_result):
+    words = Words("en")
+    assert len(knot_rows(full_result, words)) == len(full_result.inverse.knots)
+    assert "Control points" in knot_title(full_result, words)
 
 
 def test_failed_specimen_has_tables_with_heads_only(failed_result, tmp_path):
