@@ -10,7 +10,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -25,6 +25,7 @@ POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,
 COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 PLAIN = {".": re.compile(r"[+-]?\d+(?:\.\d+)?", re.ASCII), ",": re.compile(r"[+-]?\d+(?:,\d+)?", re.ASCII)}
 EXPONENT = re.compile("[eE]")
+CLOCK_WITH_COMMA = re.compile(r"\d:\d\d,\d+$", re.ASCII)
 INFINITE = ("inf", "-inf", "+inf", "infinity")
 SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
 MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
@@ -105,8 +106,25 @@ def is_missing(cell: str) -> bool:
     return cell.casefold() in MISSING
 
 
-def decimal_sign(tokens: Iterable[str], *, path: Path, separator: str, decimal: Decimal | None = None) -> Decimal:
+def decimal_sign(
+    tokens: Iterable[str],
+    *,
+    path: Path,
+    separator: str,
+    decimal: Decimal | None = None,
+    others: Callable[[], Iterable[str]] = tuple,
+) -> Decimal:
     """The decimal sign of a file from all its number cells.
+
+    Parameters
+    ----------
+    tokens : iterable of str
+        Forces and displacements.
+    decimal : "." or ",", optional
+        What the user says; it wins.
+    others : callable
+        Gives the remaining cells of the table. They are asked only where every force and displacement can be read both
+        ways, and believed only where they agree.
 
     Raises
     ------
@@ -125,13 +143,28 @@ def decimal_sign(tokens: Iterable[str], *, path: Path, separator: str, decimal: 
         return "," if point else "."
     if point:  # neither fits everywhere: the majority; the cells that do not fit are complained about one by one
         return "." if len(point) <= len(comma) else ","
-    # Both fit: every number with a mark looks like 1,234 or 1.234, a thousand or a fraction
+    # Both fit: every one with a mark looks like 1,234 or 1.234, a thousand or a fraction
+    told = {_decisive(cell) for cell in others()} - {None}
+    if len(told) == 1:
+        return "," if "," in told else "."
     raise InputError(
         f"{marked[0]!r} may be a fraction or a thousand, and no other number of the file decides",
         path=path,
         code="log/ambiguous-decimal",
         remedy='set decimal = "," or decimal = "." in [force_log] of specimen.toml',
     )
+
+
+def _decisive(cell: str) -> Decimal | None:
+    """The decimal sign that a cell of any column tells, None if it tells none.
+
+    A clock with a comma is a German one; one with a point may stand in any file.
+    """
+    if CLOCK_WITH_COMMA.search(cell):
+        return ","
+    token = cell.translate(SMOOTH)
+    point, comma = _fits(POINT, token), _fits(COMMA, token)
+    return None if point == comma else "." if point else ","
 
 
 def _fits(pattern: re.Pattern[str], token: str) -> bool:

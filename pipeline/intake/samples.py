@@ -7,7 +7,7 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -100,7 +100,13 @@ def read_samples(
             code="log/empty",
             remedy="export the log again, one row per sample",
         )
-    decimal = decimal_sign([*force, *displacement], path=path, separator=columns.separator, decimal=_decimal(spec))
+    decimal = decimal_sign(
+        [*force, *displacement],
+        path=path,
+        separator=columns.separator,
+        decimal=_decimal(spec),
+        others=lambda: _others(data, columns),
+    )
     numbers = _Numbers(decimal, columns, path, lines, settings.number_limit)
     steps = _carry_down(table["step"])[0] if "step" in table else []
     branches = _branches(table["branch"], lines, path) if "branch" in table else None
@@ -148,6 +154,12 @@ def _losses(
 
 def _decimal(spec: LogSpec) -> Decimal | None:
     return "," if spec.decimal == "," else "." if spec.decimal == "." else None
+
+
+def _others(data: Sequence[Row], columns: Columns) -> Iterator[str]:
+    """Cells of the columns that are neither force nor displacement nor a label: step 1.2 is none of 12 tenths."""
+    known = {place for role, place in columns.index.items() if role in ("force", "displacement", "step", "image")}
+    return (cell for _, cells in data for place, cell in enumerate(cells) if place not in known)
 
 
 def _cell(cells: list[str], place: int) -> str:

@@ -121,6 +121,41 @@ def test_what_the_user_says_wins(tmp_path):
     assert log.steps[1].displacement_m == pytest.approx(4250e-6)
 
 
+AMBIGUOUS = "Schritt;Zeit [s];Weg [mm];Kraft [mN];Temp [C]\n1.5;{};1,500;2,301;{}\n2.5;{};4,250;2,902;{}\n"
+
+
+@pytest.mark.parametrize(
+    ("cells", "factor"),
+    [
+        (("12,5", "", "72,5", ""), 1.0),  # the time is decisive
+        (("1,000", "", "61,0000", ""), 1.0),
+        (("0,125", "", "1,125", ""), 1.0),
+        (("12.5", "", "72.5", ""), 1e3),
+        (("1,234", "23,5", "1,334", "23,5"), 1.0),  # or any other column
+        (("12:00:00,5", "", "12:01:00,5", ""), 1.0),
+        (("21.11.2026 12:00:00,5", "", "21.11.2026 12:01:00,5", ""), 1.0),
+    ],
+)
+def test_any_decisive_column_tells_the_decimal_sign_of_the_file(cells, factor, tmp_path):
+    log = read(AMBIGUOUS.format(*cells), tmp_path)
+    assert log.steps[1].displacement_m == pytest.approx(4.25e-3 * factor)
+    assert log.steps[1].forces_N[0] == pytest.approx(2.902e-3 * factor)
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ("1", "", "2", ""),  # the step's label 1.5 is no number
+        ("12,5", "23.5", "72,5", "23.5"),  # two columns that contradict each other
+        ("12:00:00.5", "", "12:01:00.5", ""),  # a clock with a point may stand in any file
+    ],
+)
+def test_what_no_column_decides_is_refused(cells, tmp_path):
+    with pytest.raises(InputError) as refused:
+        read(AMBIGUOUS.format(*cells), tmp_path)
+    assert refused.value.code == "log/ambiguous-decimal"
+
+
 def test_a_log_without_header_by_column_numbers(tmp_path):
     rows = "\n".join(PLAIN.splitlines()[1:])
     columns = {"step": 1, "branch": 2, "time": 3, "displacement": 4, "force": 5, "image": 6}
