@@ -46,7 +46,7 @@ INSIDE = {
         ("presentation",),
         ("diagnose",),
     ],
-    "pipeline.diagnosis.observations": [("prediction", "noise", "work"), ("simulation", "observation")],
+    "pipeline.diagnosis.observations": [("prediction", "noise", "force_noise", "work"), ("simulation", "observation")],
     "pipeline.diagnosis.statistics": [
         ("score", "twins", "verdict", "pairs", "gain"),
         ("smooth_fields", "photo_table"),

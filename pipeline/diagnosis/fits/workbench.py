@@ -146,8 +146,7 @@ def scored(
         suspicion.sign,
         draws=settings.null_draws,
         rng=np.random.default_rng(settings.seed),
-        estimated=np.r_[observation.rows.force, np.zeros(len(fitted.residual) - observation.rows.count, dtype=bool)],
-        freedom=observation.force_freedom,
+        estimated=observation.estimated(len(fitted.residual)),
     )
     limit = threshold(maxima, settings.false_alarm)
     return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)

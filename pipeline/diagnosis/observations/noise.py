@@ -1,9 +1,8 @@
-"""What the measurement scatters: covariance of the sections of a photo, and of the force samples of a hold.
+"""What photos scatter: covariance of the sections of a photo; that of the forces is in `force_noise`.
 
-In: the raw midline sections of a `rod.measurement.MeasuredShape` and the samples of each hold. Out: block means of
-sections with their exact covariance, and the noise level of the load cell with the samples behind it. The residuals of
-a fit never set a variance here: only the part of a photo's scatter that no bent cable can follow (faster along s than
-the smooth basis of the comparison) does, so misfit cannot hide in it.
+In: the raw midline sections of a `rod.measurement.MeasuredShape`. Out: block means of sections with their exact
+covariance. The residuals of a fit never set a variance here: only the part of a photo's scatter that no bent cable can
+follow (faster along s than the smooth basis of the comparison) does, so misfit cannot hide in it.
 
 Notation. A photo has sections with standard deviation sigma(s), correlation exp(-ds / l) and a slow sideways error
 (light) of standard deviation sigma_sys and correlation exp(-ds^2 / (2 l_sys^2)). ``m`` neighbouring sections at pitch D
@@ -16,14 +15,13 @@ form a block; with rho = exp(-D / l) the block means have (AR(1) sums)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg
 from scipy.interpolate import CubicHermiteSpline
 
-from rod.measurement import MeasuredShape, MeasuredStep
+from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
 
@@ -209,86 +207,3 @@ def calibrate_photo_noise(
     freedom = prior_weight + sum(part.size for part in fast)
     scatter = float(weight @ (trials[:, 2] - weight @ trials[:, 2]) ** 2)
     return PhotoNoise(level(stretch)[0], stretch, float(np.sqrt(scatter + 2.0 / freedom)))
-
-
-@dataclass(frozen=True)
-class ForceNoise:
-    """Standard deviation of one force sample of each step (n,) N, and the samples behind it; 0 where none."""
-
-    std: Array
-    freedom: int
-
-
-def force_noise(steps: tuple[MeasuredStep, ...], *, floor: float, distinct: float) -> ForceNoise:
-    """Scatter of the samples within the holds, each hold with its own straight line in time.
-
-    Where the holds decay beyond chance, each has its own share of one exponential besides: a force that relaxes within
-    the first samples is no straight line, and taken for noise it hid all that forces tell (a loss of 3 % in 2 s doubled
-    the level). One common level, unless the holds differ beyond chance (Bartlett's test): then each hold has its own.
-
-    Parameters
-    ----------
-    steps : tuple of MeasuredStep
-    floor : N
-        Bounds the level from below: a log of few digits scatters by rounding.
-    distinct : float
-        Level of the two tests.
-    """
-    plain = _scatter(steps, None)
-    total = int(plain.freedom.sum())
-    if total == 0:
-        return ForceNoise(np.maximum([step.force_std for step in steps], floor), 0)
-    found = _decaying(steps, plain, distinct) or plain
-    squares, freedom = found.squares, found.freedom
-    total = int(freedom.sum())
-    pooled = squares.sum() / total
-    own = np.divide(squares, freedom, out=np.full(len(steps), pooled), where=freedom > 0)
-    used = freedom > 0
-    statistic = total * np.log(pooled) - np.sum(freedom[used] * np.log(np.maximum(own[used], 1e-300)))
-    differs = used.sum() > 1 and stats.chi2.sf(statistic, used.sum() - 1) < distinct
-    variance = own if differs else np.full(len(steps), pooled)
-    return ForceNoise(np.maximum(np.sqrt(variance), floor), total)
-
-
-class _Scatter(NamedTuple):
-    """Sums of squares (n,) N^2 of the samples of every hold about their smooth course, and their freedom (n,)."""
-
-    squares: Array
-    freedom: NDArray[np.int_]
-
-
-DECAYS = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Time constants tried, shares of the longest hold: below them the first sample alone is off, above a line does it."""
-
-
-def _decaying(steps: tuple[MeasuredStep, ...], plain: _Scatter, level: float) -> _Scatter | None:
-    """Scatter about a line and a decay in every hold; None where that removes no more than chance does (F-test)."""
-    timed = [step.hold_times for step in steps if step.hold_times is not None and len(step.hold_times)]
-    span = max((float(np.ptp(times)) for times in timed), default=0.0)
-    if span <= 0.0:
-        return None
-    best = min((_scatter(steps, share * span) for share in DECAYS), key=lambda one: float(one.squares.sum()))
-    free, rest = int(best.freedom.sum()), float(best.squares.sum())
-    spent = int(plain.freedom.sum()) - free
-    if free <= 0 or spent <= 0:
-        return None
-    ratio = (float(plain.squares.sum()) - rest) / spent / max(rest / free, 1e-300)
-    return best if float(stats.f.sf(ratio, spent, free)) < level else None
-
-
-def _scatter(steps: tuple[MeasuredStep, ...], decay: float | None) -> _Scatter:
-    """Scatter within the holds of at least four samples, about a line in time and, given its time constant, a decay."""
-    squares, freedom = np.zeros(len(steps)), np.zeros(len(steps), dtype=int)
-    for i, step in enumerate(steps):
-        if step.hold_forces is None or len(step.hold_forces) < 4:
-            continue
-        course = [np.ones(len(step.hold_forces))]
-        if step.hold_times is not None and np.ptp(step.hold_times) > 0.0:
-            since = step.hold_times - step.hold_times.min()
-            course.append(since / np.ptp(step.hold_times) - 0.5)
-            if decay is not None:
-                course.append(np.exp(-since / decay))
-        smooth = np.column_stack(course)
-        scatter = step.hold_forces - smooth @ np.linalg.lstsq(smooth, step.hold_forces, rcond=None)[0]
-        squares[i], freedom[i] = float(scatter @ scatter), len(scatter) - smooth.shape[1]
-    return _Scatter(squares, freedom)

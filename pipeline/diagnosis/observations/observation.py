@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from pipeline.diagnosis.observations.force_noise import force_noise
 from pipeline.diagnosis.observations.noise import (
     PhotoNoise,
     Sections,
     block_means,
     by_axes,
-    force_noise,
     section_covariance,
     smooth_basis,
 )
@@ -102,6 +102,8 @@ class Observation:
         Of one sample.
     force_freedom : int
         Samples behind ``force_std``; 0 if stated.
+    force_own : tuple of float
+        Freedom of each step's ``force_std``, where each has a level of its own; else empty.
     photos : tuple of PhotoData
     photo_noise : PhotoNoise
     rows : Row
@@ -117,6 +119,17 @@ class Observation:
     photo_noise: PhotoNoise
     rows: Row
     added: Array | float = 0.0
+    force_own: tuple[float, ...] = ()
+
+    def estimated(self, count: int) -> list[tuple[NDArray[np.bool_], float]]:
+        """Rows (count,) whose noise is one level estimated from samples, with its freedom; empty where it is stated."""
+        if not self.force_freedom:
+            return []
+        rest = np.zeros(count - self.rows.count, dtype=bool)
+        if not self.force_own:
+            return [(np.r_[self.rows.force, rest], float(self.force_freedom))]
+        steps = np.unique(self.rows.step[self.rows.force])
+        return [(np.r_[self.rows.force & (self.rows.step == i), rest], self.force_own[i]) for i in steps]
 
     @cached_property
     def all_sections(self) -> _Places:
@@ -171,7 +184,7 @@ def observe(
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
     rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
-    return Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows)
+    return Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, force_own=level.own)
 
 
 def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:

@@ -152,11 +152,12 @@ def _drawn(
     noise += (_levels(axis_doubt, draws, rng)[:, None, None] - 1.0) * photos.along_axes(noise)
     flat = noise.reshape(draws, -1)
     total = flat @ sums[photos.rows.ravel()]
-    force = np.r_[observation.rows.force, np.zeros(len(sums) - observation.rows.count, dtype=bool)]
-    other = ~force
+    levels = observation.estimated(len(sums))
+    other = np.ones(len(sums), dtype=bool)
     other[photos.rows.ravel()] = False
-    freedom = observation.force_freedom
-    for rows, doubt in ((force, np.sqrt(2.0 / freedom) if freedom else 0.0), (other, 0.0)):
+    for rows, _ in levels:
+        other &= ~rows
+    for rows, doubt in (*((rows, np.sqrt(2.0 / freedom)) for rows, freedom in levels), (other, 0.0)):
         if np.any(rows):
             triangle = linalg.qr(sums[rows], mode="r")[0][: sums.shape[1]]
             total += _levels(doubt, draws, rng)[:, None] * (rng.standard_normal((draws, len(triangle))) @ triangle)

@@ -15,6 +15,7 @@ The family of correlated scores is judged by the maximum, whose distribution und
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,8 +104,7 @@ def null_maxima(
     *,
     draws: int,
     rng: np.random.Generator,
-    estimated: NDArray[np.bool_] | None = None,
-    freedom: int = 0,
+    estimated: Sequence[tuple[NDArray[np.bool_], float]] = (),
 ) -> Array:
     """Sorted maxima (draws,) of the admissible statistics when nothing is wrong: draws of N(0, U^T U).
 
@@ -115,17 +115,18 @@ def null_maxima(
     sign : (k,)
     draws : int
     rng : Generator
-    estimated : (n,) bool or None
-        Rows whose noise level was estimated from ``freedom`` samples: few samples widen the tails.
-    freedom : int
+    estimated : sequence of ((n,) bool, float)
+        Rows whose noise level was estimated, and the samples behind it: few samples widen the tails.
     """
-    groups = [np.ones(len(unit), dtype=bool)] if estimated is None or not freedom else [~estimated, estimated]
+    known = np.ones(len(unit), dtype=bool)
+    for rows, _ in estimated:
+        known &= ~rows
     z = np.zeros((draws, unit.shape[1]))
-    for group in groups:
-        if np.any(group):
-            triangle = linalg.qr(unit[group], mode="r")[0][: unit.shape[1]]
+    for rows, freedom in ((known, 0.0), *estimated):
+        if np.any(rows):
+            triangle = linalg.qr(unit[rows], mode="r")[0][: unit.shape[1]]
             part = rng.standard_normal((draws, triangle.shape[0])) @ triangle
-            if freedom and group is groups[-1]:
+            if freedom:
                 part /= np.sqrt(rng.chisquare(freedom, draws) / freedom)[:, None]
             z += part
     return np.sort(admissible(z, sign).max(axis=1))

@@ -2,18 +2,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, THREE, Reading, hidden_test
+from pipeline.diagnosis.observations.force_noise import force_noise
 from pipeline.diagnosis.observations.noise import (
     block_correlation,
     block_means,
     calibrate_photo_noise,
-    force_noise,
     section_covariance,
     smooth_basis,
 )
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.measurement import MeasuredStep
 
 
 def test_covariance_of_block_means_is_that_of_the_averages():
@@ -99,6 +101,60 @@ def test_a_noisy_hold_gets_its_own_level():
     noisy = replace(test.steps[1], hold_forces=test.steps[1].hold_forces + 0.5 * (-1.0) ** np.arange(8))
     level = force_noise((test.steps[0], noisy, test.steps[2]), floor=0.0, distinct=1e-3)
     assert level.std[1] > 10.0 * level.std[0]
+
+
+QUIET = (
+    (0.031371, 0.031427, 0.031614, 0.031476, 0.031084, 0.031493),
+    (0.038578, 0.038598, 0.038532, 0.038383, 0.038562, 0.038522),
+    (0.040728, 0.040649, 0.040612, 0.040544, 0.040484, 0.040376),
+)
+"""Forces of a photographed specimen without effect, N; all scatter by 1.2e-4 N, the third lies on a line by chance."""
+
+
+def holds(forces):
+    times = 0.5 + 3.608 * np.arange(len(forces[0]))
+    return tuple(
+        MeasuredStep(k, "loading", 0.0, samples[-1], 1e-4, hold_times=times, hold_forces=np.array(samples))
+        for k, samples in enumerate(forces)
+    )
+
+
+def test_a_hold_that_is_quiet_by_chance_gets_no_level_of_its_own():
+    level = force_noise(holds(QUIET), floor=2e-5, distinct=1e-3)
+    assert level.own == () and level.freedom == 12
+    assert np.all(np.abs(level.std / 1.2e-4 - 1.0) < 2.0 / np.sqrt(2.0 * 12))
+
+
+@pytest.mark.parametrize(("count", "samples"), [(3, 6), (14, 5)])
+def test_holds_of_one_level_are_told_apart_as_rarely_as_asked(count, samples):
+    """Uncorrected for few samples, 14 holds of five differed six times as often as the test allows."""
+    rng, draws, level = np.random.default_rng(3), 200, 0.01
+    found = [
+        force_noise(holds(rng.standard_normal((count, samples))), floor=0.0, distinct=level).own for _ in range(draws)
+    ]
+    # two tests of that level lead there; three standard errors
+    assert np.mean([own != () for own in found]) < 2.0 * level + 3.0 * np.sqrt(2.0 * level / draws)
+
+
+def test_levels_of_their_own_are_drawn_to_each_other_and_known_badly():
+    """Levels of a spread of 4 samples: the assumed one must be right on average, and its freedom that of the tails."""
+    rng, scores = np.random.default_rng(4), []
+    for _ in range(200):
+        true = np.sqrt(4.0 / rng.chisquare(4.0, 7))
+        forces = true[:, None] * rng.standard_normal((7, 6))
+        level = force_noise(holds(forces), floor=0.0, distinct=1.0)  # always of their own
+        means = np.array([samples.mean() for samples in forces]) * np.sqrt(6.0) / level.std
+        scores += [2.0 * stats.t.sf(abs(z), own) for z, own in zip(means, level.own, strict=True)]
+    # 1,400 holds: one in a hundred is known to 0.3 %, and seven holds do not tell their spread well
+    assert np.mean(np.array(scores) < 0.01) == pytest.approx(0.01, abs=0.005)
+
+
+def test_samples_that_repeat_in_all_digits_are_no_quiet_hold():
+    rng = np.random.default_rng(5)
+    forces = np.round(10.0 + 3e-3 * rng.standard_normal((5, 6)), 2)
+    forces[2] = 10.0
+    with np.errstate(all="raise"):
+        assert force_noise(holds(forces), floor=5e-3, distinct=1e-3).own == ()
 
 
 def test_stated_level_where_there_are_no_samples():

@@ -55,7 +55,7 @@ def test_few_samples_behind_the_noise_widen_the_tails(problem):
     unit, sign = score(np.zeros(80), jacobian, columns).unit, np.zeros(5)
     known = null_maxima(unit, sign, draws=20000, rng=np.random.default_rng(8))
     rows = np.ones(80, dtype=bool)
-    guessed = null_maxima(unit, sign, draws=20000, rng=np.random.default_rng(8), estimated=rows, freedom=10)
+    guessed = null_maxima(unit, sign, draws=20000, rng=np.random.default_rng(8), estimated=[(rows, 10)])
     noise = np.random.default_rng(9)
     z = noise.standard_normal((20000, 80)) @ unit / np.sqrt(noise.chisquare(10, 20000) / 10)[:, None]
     rate = np.mean(np.abs(z).max(axis=1) > threshold(guessed, 0.05))
