@@ -17,6 +17,7 @@ from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
@@ -77,7 +78,7 @@ def _disturbance(cut: CrossCut, standout: Standout, cable: Cable, stage: Segment
     width = cut.seen_widths * standout.reduction / cable.diameter_px
     if len(width) < stage.sure_edges_share * len(cut.width):
         return cut.texture
-    off = abs(float(np.median(width)) - 1.0)
+    off = abs(median(width) - 1.0)
     sure = off < stage.sure_width_off and _scatter(width) < stage.sure_width_scatter
     return stage.sure_texture_weight * cut.texture if sure else cut.texture
 
@@ -96,7 +97,7 @@ def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage:
 
 def _scatter(values: Array) -> float:
     """Robust standard deviation about the median."""
-    return _MAD_TO_STD * float(np.median(np.abs(values - np.median(values))))
+    return _MAD_TO_STD * median(np.abs(values - median(values)))
 
 
 def judge_strip(
@@ -255,18 +256,18 @@ def _check_width(
             f"both edges of the cable are seen on only {100 * share:.0f} % of its length",
             share=share,
         )
-    median = float(np.median(widths))
+    usual = median(widths)
     low, high = stage.accepted_width_ratio
-    if cable.diameter_px is not None and not low <= median / cable.diameter_px <= high:
+    if cable.diameter_px is not None and not low <= usual / cable.diameter_px <= high:
         return refused(
             photo,
             "photo/width",
-            f"the strip is {median:.1f} px wide, the cable should be {cable.diameter_px:.1f} px; "
+            f"the strip is {usual:.1f} px wide, the cable should be {cable.diameter_px:.1f} px; "
             "a highlight may split it, or the scale or diameter is wrong",
-            width_px=median,
+            width_px=usual,
             diameter_px=cable.diameter_px,
         )
-    scatter = _scatter(widths) / median
+    scatter = _scatter(widths) / usual
     if scatter > stage.max_width_scatter:
         return refused(
             photo,

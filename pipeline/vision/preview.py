@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision.photo import PreviewSettings
+from pipeline.vision.median import quantile
 from pipeline.vision.photo import Photo, reduce_area
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.crosscut import path_normals
@@ -65,7 +66,7 @@ def _stretched(strip: NDArray[np.float32], line: Centerline, s: Array, along: Ar
     seen = np.interp(along, s, line.shape.seen.astype(float)) > 0.5
     part = strip[:, seen] if seen.any() else strip
     # every eighth pixel tells the range
-    low, high = (float(level) for level in np.percentile(part[::4, ::2], (0.5, 99.5)))
+    low, high = (quantile(part[::4, ::2], share) for share in (0.005, 0.995))
     strip = (strip - np.float32(low)) * np.float32(255.0 / max(high - low, 1e-6))
     levels: NDArray[np.uint8] = np.clip(strip, 0, 255, out=strip).astype(np.uint8)
     return levels

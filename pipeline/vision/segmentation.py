@@ -22,6 +22,7 @@ from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import SoughtCovers
 from pipeline.vision.judgement import Cable, judge_strip, refused
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
@@ -202,7 +203,7 @@ def _more_shown(
     tree = cKDTree(found.path_px)
     for refusal, path in going_on:
         longer = float(np.hypot(*np.diff(path, axis=0).T).sum()) > found.length_px
-        elsewhere = float(np.median(tree.query(path)[0])) > found.half_width_px
+        elsewhere = median(tree.query(path)[0]) > found.half_width_px
         at_end = refusal.code == "photo/hidden-end" and _ends_at(found, refusal, settings)
         if at_end or (longer and elsewhere):
             return refusal, path
@@ -245,7 +246,7 @@ def _lies_on(found: RoughCable, paths: list[Array]) -> bool:
     """True if most of the cable found lies within half a width of one of the paths (px)."""
     first, last = found.visible
     body = found.path_px[first : last + 1]
-    return any(float(np.median(cKDTree(path).query(body)[0])) < found.half_width_px for path in paths)
+    return any(median(cKDTree(path).query(body)[0]) < found.half_width_px for path in paths)
 
 
 def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wanted:

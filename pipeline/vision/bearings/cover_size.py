@@ -26,6 +26,7 @@ from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_rim
 from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.bearings.rings import find_marks
+from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.ends import CableEnd
@@ -53,7 +54,7 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSett
     for radii in (_at_ends(ends), (_to_mark(end) for end in ends)):
         alike = _alike(radii, settings)
         if alike is not None:
-            return float(np.median(alike))
+            return median(alike)
     return _common(ends, settings) if ends else None
 
 
@@ -97,7 +98,7 @@ def rim_radius(seen: Iterable[tuple[Photo, RoughCable]], expected_px: float, set
     ]
     radii = [rim.radius for rim in rims if rim is not None and rim.rim >= settings.min_rim]
     alike = _alike(radii, settings) if 2 * len(radii) >= max(len(rims), 4) else None
-    return None if alike is None else float(np.median(alike))
+    return None if alike is None else median(alike)
 
 
 def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[float] | None:
@@ -132,7 +133,7 @@ def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     first, last = cable.visible
     body = cable.path_px[first : last + 1]
     gaps = np.hypot(*np.diff(body, axis=0).T)
-    back = min(max(1, round(2.0 * cable.half_width_px / float(np.median(gaps)))), len(body) - 1)
+    back = min(max(1, round(2.0 * cable.half_width_px / median(gaps))), len(body) - 1)
     starts = body[0] - body[back], body[-1] - body[-1 - back]
     ends = [CableEnd(place, way / np.hypot(*way)) for place, way in zip(body[[0, -1]], starts, strict=True)]
     return ends[0], ends[1]
@@ -227,7 +228,7 @@ def _colour(photo: Photo, center: tuple[float, float], radii: Array, angles: Arr
     )
     inside = (u >= 0) & (v >= 0) & (u < photo.size[0]) & (v < photo.size[1])
     values = photo.pixels[v[inside], u[inside]].reshape(np.count_nonzero(inside), -1)
-    return np.asarray(np.median(values, axis=0) if len(values) else np.zeros(photo.channels), float)
+    return np.asarray(medians(values, axis=0) if len(values) else np.zeros(photo.channels), float)
 
 
 def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
@@ -241,7 +242,7 @@ def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
         ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
         radii = _alike((None if circle is None else circle.radius for circle in alike), settings)
         if radii is not None and max(ahead) <= settings.lost_cable_reach and min(ahead) <= settings.lost_before_rim:
-            return float(np.median(radii))
+            return median(radii)
     return None
 
 

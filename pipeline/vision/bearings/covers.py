@@ -20,6 +20,7 @@ from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.bearings.rings import find_marks, with_rings
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.ends import CableEnd
@@ -240,7 +241,7 @@ def _votes(
     gu = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 1, 0))
     gv = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 0, 1))
     strength = np.sqrt((gu**2 + gv**2).sum(axis=2))
-    gain = 1.0 / np.maximum(strength, settings.edge_over_texture * float(np.median(strength)) + 1e-6)
+    gain = 1.0 / np.maximum(strength, settings.edge_over_texture * median(strength) + 1e-6)
     gain[blind] = 0.0
     half = int(np.ceil(1.25 * radius))
     y, x = np.mgrid[-half : half + 1, -half : half + 1].astype(np.float32)

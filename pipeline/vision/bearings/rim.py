@@ -20,6 +20,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
+from pipeline.vision.median import median, medians, quantile
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 
@@ -173,7 +174,7 @@ def _radial_slopes(
         offsets=offsets,
         along=along,
         strength=np.maximum(along, 0.0) if one_sign else norm,
-        texture=float(np.median(norm[:, np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span])),
+        texture=median(norm[:, np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span]),
         seen=~(outside & inner).any(axis=1),
     )
 
@@ -240,7 +241,7 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: Beari
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(strength)), place]
     found = slopes.seen & (peak > settings.rim_over_texture * slopes.texture)
-    usual = float(np.percentile(peak[found], 75)) if found.any() else 1.0
+    usual = quantile(peak[found], 0.75) if found.any() else 1.0
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
 
@@ -270,7 +271,7 @@ def _spread(slopes: _Slopes, edge: Array, settings: BearingSettings) -> tuple[Ar
     low = np.clip(np.floor(places).astype(int), 0, len(slopes.offsets) - 2)
     share, rows = np.clip(places - low, 0.0, 1.0), np.arange(len(edge))[:, None]
     around = (1.0 - share) * slopes.along[rows, low] + share * slopes.along[rows, low + 1]
-    mean = np.median(around[found], axis=0)
+    mean = medians(around[found], axis=0)
     mass = np.clip(mean - np.min(mean), 0.0, None)
     inside = mass > 0.3 * mass.max()
     # Of a Gaussian cut at 0.3 of its height the variance is 0.58 of the whole one's.

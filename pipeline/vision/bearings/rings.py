@@ -18,6 +18,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, reduce_area
 
 
@@ -136,7 +137,7 @@ def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings
     slope = np.hypot.reduce(_slopes(photo, center[None], radius, 1.0)[0], axis=1)
     distance = 0.06 * radius + 0.5 + np.arange(len(slope))
     slope[(distance < settings.ring_range[0] * radius) | (distance > settings.ring_range[1] * radius)] = 0.0
-    least = settings.rim_over_texture * float(np.median(slope[slope > 0.0])) if slope.any() else np.inf
+    least = settings.rim_over_texture * median(slope[slope > 0.0]) if slope.any() else np.inf
     found: list[Circle] = []
     for _ in range(settings.rings):
         at = int(np.argmax(slope))

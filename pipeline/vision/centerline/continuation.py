@@ -37,6 +37,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve
 from pipeline.vision.centerline.curve_fit import CurveFit, rms_of_bow
+from pipeline.vision.median import quantile
 from pipeline.vision.rough import AxisKind
 from pipeline.vision.scale.chord import ChordFrame
 
@@ -126,7 +127,7 @@ def _updated(covariance: Array, rows: Array, values: Array, noise: Array) -> tup
 def _bow_at_ends(fit: CurveFit, covariance: Array, least: float) -> tuple[Array, Array, Array]:
     """Rows, values and noise of the departure from a bow at both ends: as along the seen part."""
     curve = fit.curve
-    first, last = (float(np.quantile(fit.s, share)) for share in (0.1, 0.9))
+    first, last = (quantile(fit.s, share) for share in (0.1, 0.9))
     a, b = _pull(curve, np.linspace(fit.s[0], fit.s[-1], _PLACES))
     along = _departure(curve, np.linspace(first, last, _PLACES), a, b)
     usual = along.mean(axis=0)

@@ -24,6 +24,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
 from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
+from pipeline.vision.median import median
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def fit_curve(
 
 def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int, iterations: int = 2) -> PlaneCurve:
     """Smooth curve along points ``(n, 2)`` of equal errors, for the next search: a step or two, no covariance."""
-    spacing = float(np.median(np.diff(s)))
+    spacing = median(np.diff(s))
     return _settle(
         points,
         np.ones(len(points)),
@@ -164,11 +165,11 @@ def _settle(
     """Gauss-Newton with robust weights, ``iterations`` steps at most."""
     weight = np.ones(len(points))
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
-    length = float(np.median(np.diff(s))) if correlation_length is None else correlation_length
+    length = median(np.diff(s)) if correlation_length is None else correlation_length
     moved = 0.0
     for iteration in range(iterations):
         s, residual = _step_to_foot(curve, points, s)
-        spread = max(1.4826 * float(np.median(np.abs(residual / std))), 1e-12)
+        spread = max(1.4826 * median(np.abs(residual / std)), 1e-12)
         if iteration:
             # A step leaves less than a tenth of its length: points as near as that may still be the curve's. A gap
             # among them starts the fit pixels off, and all beyond it would count as outliers.
@@ -179,7 +180,7 @@ def _settle(
         step = problem.estimate(length) - curve.parameters
         found = _Settled(curve.moved(step), curve, problem, s, weight, length)
         curve = found.curve
-        moved = float(np.max(np.abs(problem.design @ step)) / np.median(std))
+        moved = float(np.max(np.abs(problem.design @ step)) / median(std))
         # A hundredth of a point's error: the curve's own is a tenth to a third of it.
         if iteration > 1 and moved < 0.01 * spread:
             break

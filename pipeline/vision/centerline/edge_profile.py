@@ -22,6 +22,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
+from pipeline.vision.median import median, medians, quantile
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
@@ -152,8 +153,8 @@ def fit_profiles(
     bins = int(offset.max() / _BIN - low) + 1
     cell = np.floor(offset / _BIN - low).astype(np.int64) + bins * np.arange(2 * count)[:, None]
     rows = (2 * count, -1, pixels.across)
-    medians = np.median(value.reshape(rows), axis=1).astype(np.float64)
-    pooled = _Pooled(offset.reshape(rows).mean(axis=1, dtype=np.float64), medians, np.ones_like(medians))
+    middle = medians(value.reshape(rows), axis=1).astype(np.float64)
+    pooled = _Pooled(offset.reshape(rows).mean(axis=1, dtype=np.float64), middle, np.ones_like(middle))
     start = np.column_stack([np.zeros(2 * count), np.full(2 * count, blur)])
     for _ in range(2):
         start, linear = _variable_projection(pooled, start, ramps=True)
@@ -162,7 +163,7 @@ def fit_profiles(
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
         # every fourth pixel tells the usual scatter to a percent
         limit = np.maximum(
-            settings.pixel_outlier * np.median(_scatter(residual[:, ::4])), settings.plain_step * usual[:, 2:3]
+            settings.pixel_outlier * median(_scatter(residual[:, ::4])), settings.plain_step * usual[:, 2:3]
         )
         keep = residual < limit
         # A window that contradicts its neighbourhood as a whole is judged by itself: nothing of it would be left.
@@ -203,7 +204,7 @@ def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:
 
 def _scatter(residual: Float32) -> Array:
     """Robust standard deviation of each row of absolute residuals."""
-    return 1.4826 * np.median(residual, axis=1).astype(np.float64)
+    return 1.4826 * medians(residual, axis=1).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -298,7 +299,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
     blur, inside, outside = (
         profiles.at(s, name).reshape(-1, 1).astype(np.float32) for name in ("blur", "inside", "outside")
     )
-    noise = np.repeat(np.median(profiles.noise, axis=1), shape[1])
+    noise = np.repeat(medians(profiles.noise, axis=1), shape[1])
     softness = (1.0 / (1.5 * settings.pixel_outlier * noise + 1e-12)).astype(np.float32)[:, None]
     basis, one = np.ones((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
@@ -321,7 +322,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
         shift = np.clip(move[:, 2], -blur[:, 0], blur[:, 0])
         place = place + shift
         # Newton squares what is left: 1e-4 px. The other two per cent are sections that will be outliers anyway.
-        if np.quantile(np.abs(shift), 0.98) < 1e-2:
+        if quantile(np.abs(shift), 0.98) < 1e-2:
             break
     std = noise * np.sqrt(np.linalg.inv(gram)[:, 2, 2])
     lost = (weight.sum(axis=1) < settings.least_pixel_share * count) | (step <= 0.0)

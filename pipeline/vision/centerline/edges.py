@@ -29,6 +29,7 @@ from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
+from pipeline.vision.median import median, medians
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def search_edges(
     strip = straighten(ground, curve, s, t).reshape(count, block, len(t)).mean(axis=1)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
     ok = np.isfinite(strip).all(axis=1)
-    usual = np.median(rise, axis=0) if ok.all() else np.nanmedian(rise, axis=0)  # the latter takes ten times as long
+    usual = medians(rise, axis=0) if ok.all() else np.nanmedian(rise, axis=0)  # the latter takes ten times as long
     middle = _offset(usual, t, half_width, tolerance, settings)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
     sigma = settings.search_radii * half_width / 2.0 + 1.0
@@ -144,7 +145,7 @@ def edge_pixels(
         Distance of the expected edges from the path.
     window : (inside, outside) px
     """
-    spacing = float(np.median(np.diff(s))) / rows
+    spacing = median(np.diff(s)) / rows
     all_s = (s[:, None] + (np.arange(rows) - 0.5 * (rows - 1)) * spacing).ravel()
     where, angle = curve.at(all_s)
     across = normals(angle)

@@ -37,6 +37,7 @@ from pipeline.vision.centerline.refusal import (
     refusal_of_bend,
 )
 from pipeline.vision.centerline.smoothing import Witness
+from pipeline.vision.median import median
 from pipeline.vision.rough import AxisKind, RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
@@ -156,7 +157,7 @@ def follow_cable(
     options = settings.curve
     half_width = rough.half_width_px
     if diameter_m is not None:
-        scale = float(np.median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)])))
+        scale = median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)]))
         half_width = 0.5 * diameter_m * scale
     sections = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
     if isinstance(sections, Rejected):
@@ -170,10 +171,10 @@ def follow_cable(
     refused = refusal_beside_axis(rough, fit, chord, width, options) or refusal_of_bend(rough, fit, width, options)
     if refused is not None:
         return refused
-    metres = float(np.median(width / sections.width))
+    metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = _with_light(fit, *light)
-    covariance *= _width_excess(fit, sections.balance * (width - np.median(width)), covariance, options) ** 2
+    covariance *= _width_excess(fit, sections.balance * (width - median(width)), covariance, options) ** 2
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
@@ -191,7 +192,7 @@ def _fit(
         guide=points,
         s=s,
         length=float(s[-1] + after),
-        diameter=float(np.median(width)),
+        diameter=median(width),
         settings=options,
         breaks=breaks,
         witness=_half_widths(s, sections.balance, width, std, options),
@@ -211,8 +212,8 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
         return None
     s, width = s[two], width[two]
     slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, options.slow_width_order)
-    off = 0.5 * (width - np.median(width))
-    spread = 1.4826 * float(np.median(np.abs(off)))
+    off = 0.5 * (width - median(width))
+    spread = 1.4826 * median(np.abs(off))
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
@@ -229,7 +230,7 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
     options, (middle, scatter) = settings.curve, middle_width(width)
     misses = feet_of_axes(followed.fit, chord)[1]
-    metres = float(np.median(width / sections.width))
+    metres = median(width / sections.width)
     fit, covariance = followed.tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
@@ -240,7 +241,7 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
     covariance[0, 0] += chord.axis_std**2
     covariance[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
     used = fit.weight > 0.0
-    gap = float(np.median(np.diff(fit.s)))
+    gap = median(np.diff(fit.s))
     shape = MeasuredShape(
         s=s - feet[0],
         x=where[:, 0],
@@ -292,7 +293,7 @@ def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.
         "noise": sections.noise,
         "blur_px": sections.blur,
         "edge_asymmetry": sections.asymmetry,
-        "section_std_px": float(np.median(fit.std)) / metres * fit.smooth.sigma,
+        "section_std_px": median(fit.std) / metres * fit.smooth.sigma,
         "noise_scale": fit.smooth.sigma,
         "correlation_px": fit.smooth.correlation_length / metres,
         "systematic_px": sections.systematic_std,

@@ -34,6 +34,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
+from pipeline.vision.median import median, medians
 
 _MEDIAN = 15  # sections of a running median: two to three diameters
 
@@ -116,7 +117,7 @@ def measure_sections(
     outside = min(settings.outside_radii * half_width, settings.longest_side_px)
     least = settings.edge_window_blurs * blur + 0.5  # half a pixel for what the path may be off
     window = (max(inside, least), max(outside, least))
-    rows = max(1, int(np.median(np.diff(s))))
+    rows = max(1, int(median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
     thin = half_width < settings.small_radius_px
     shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings, thin=thin)
@@ -154,9 +155,9 @@ def measure_sections(
         systematic_std=_systematic(profiles, s, smooth_width, std, doubt, diameter),
         share=float(np.mean(keep)),
         profiles=profiles,
-        contrast=float(np.median(step)),
-        noise=float(np.median(profiles.noise)),
-        blur=float(np.median(profiles.blur)),
+        contrast=median(step),
+        noise=median(profiles.noise),
+        blur=median(profiles.blur),
         asymmetry=_asymmetry(step),
     )
 
@@ -179,7 +180,7 @@ def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
 
     A pale sleeve before a pale ground leaves the edges of shadows and shades, 0.3 diameters off.
     """
-    middle = float(np.median(width))
+    middle = median(width)
     smooth, own = (np.abs(w - middle) > settings.width_departure * middle for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
@@ -197,7 +198,7 @@ def _consistent(
     filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
     local = np.column_stack([_running_median(p) for p in filled.T])
     off = np.abs(filled - local)
-    limit = outlier * 1.4826 * np.median(off, axis=0) + 0.02  # px; a floor for pictures without noise
+    limit = outlier * 1.4826 * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
     good = good & (off < limit)
     width = local.sum(axis=1)
     out, spread = filled.copy(), std.copy()
@@ -232,17 +233,17 @@ def _systematic(profiles: Profiles, s: Array, width: Array, std: Array, doubt: A
     share = 0.5 if profiles.inside.any() or profiles.outside.any() else 1.0
     common = float(np.average(shift.sum(axis=0), weights=1.0 / doubt.sum(axis=0)))
     by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
-    noise2 = np.median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
-    by_width = 0.5 * np.sqrt(max(np.var(balance * (width - np.median(width))) - noise2, 0.0))
+    noise2 = median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
+    by_width = 0.5 * np.sqrt(max(np.var(balance * (width - median(width))) - noise2, 0.0))
     by_blur = 0.25 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's.
     by_likely = 0.5 * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))
     unequal = _asymmetry(profiles.step)
-    by_diameter = 0.0 if diameter is None else 0.5 * abs(float(np.median(width)) - diameter) * min(unequal, 1.0)
+    by_diameter = 0.0 if diameter is None else 0.5 * abs(median(width) - diameter) * min(unequal, 1.0)
     return float(np.sqrt(by_model**2 + by_width**2 + by_blur**2 + by_likely**2 + by_diameter**2))
 
 
 def _asymmetry(step: Array) -> float:
     """Relative difference of the two edges' contrast, from steps ``(2, n)``."""
-    one, two = np.median(step, axis=1)
+    one, two = medians(step, axis=1)
     return float(abs(two - one) / (0.5 * (two + one)))

@@ -11,6 +11,7 @@ from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_poi
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges
 from pipeline.vision.centerline.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.centerline.smoothing import Witness
+from pipeline.vision.median import median
 from pipeline.vision.rough import Bearing, RoughCable
 
 
@@ -64,7 +65,7 @@ def fit_along(
         )
 
     while intervals < most:  # long cables only
-        quick = fit(float(np.median(np.diff(s))), 2)
+        quick = fit(median(np.diff(s)), 2)
         if quick.smooth.freedom < settings.crowded_share * quick.curve.frame.size:
             break
         intervals = min(2 * intervals, most)
@@ -106,7 +107,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     tolerance = settings.width_tolerance * (1.0 if known else 2.0)
     found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance, settings=settings)
     width = found.edges[:, 1] - found.edges[:, 0]
-    middle = float(np.median(width[found.usable])) if found.usable.any() else np.nan
+    middle = median(width[found.usable]) if found.usable.any() else np.nan
     usable = found.usable & (np.abs(width - middle) < settings.search_radii * half_width)
     if np.count_nonzero(usable) < settings.least_sections:
         return _lost(rough, float(np.mean(usable)))

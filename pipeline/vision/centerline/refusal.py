@@ -12,6 +12,7 @@ from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
+from pipeline.vision.median import median
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.chord import ChordFrame
 
@@ -20,7 +21,7 @@ def refusal(
     rough: RoughCable, sections: Sections, width: Array, diameter: float | None, options: CurveSettings
 ) -> Rejected | None:
     """What the figures of the sections forbid; ``width`` (n,) m of the cable on them, ``diameter`` m if it is known."""
-    radius = 0.5 * float(np.median(sections.width))
+    radius = 0.5 * median(sections.width)
     middle, scatter = middle_width(width)
     ratio = sections.contrast / max(sections.noise, 1e-9)
     figure = {
@@ -143,5 +144,5 @@ def feet_of_axes(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
 
 def middle_width(width: Array) -> tuple[float, float]:
     """Median width, and its robust relative scatter along s."""
-    middle = float(np.median(width))
-    return middle, 1.4826 * float(np.median(np.abs(width - middle))) / middle
+    middle = median(width)
+    return middle, 1.4826 * median(np.abs(width - middle)) / middle

@@ -28,6 +28,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from pipeline.records import Array
+from pipeline.vision.median import median
 
 _GRID = 97  # weights tried, over all that can matter: steps of a factor of about two, likelihoods vary over decades
 _LENGTHS = 7  # correlation lengths tried: leaves 0.02 of Fisher's z, a third of what 240 points tell
@@ -236,7 +237,7 @@ class Problem:
         A ``witness`` tells of errors that last as long as a bend of the curve, which it does not follow. It makes the
         length longer only: what it lacks, such as a highlight that moves the points for a stretch, they tell alone.
         """
-        gap = float(np.median(self.gaps))
+        gap = median(self.gaps)
         shortest = 0.2 * gap
         # Even in Fisher's z of neighbours, by which likelihoods of correlations are nearly parabolas.
         low, high = (np.arctanh(np.exp(-gap / length)) for length in (shortest, max(longest, 2.0 * shortest)))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
@@ -117,10 +118,10 @@ def _centred(count: int) -> Array:
 def _robust_fit(terms: Array, values: Array) -> Array:
     """Least squares with Tukey's biweight: cable and objects are outliers of the ground."""
     coefficients = np.zeros(6)
-    coefficients[0] = np.median(values)
+    coefficients[0] = median(values)
     for _ in range(8):
         residual = values - terms @ coefficients
-        spread = _MAD_TO_STD * float(np.median(np.abs(residual))) + 1e-6
+        spread = _MAD_TO_STD * median(np.abs(residual)) + 1e-6
         weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
         normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
         coefficients[:] = np.linalg.solve(normal, terms.T @ (weight * values))
@@ -133,7 +134,7 @@ def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
     sample = residual[::stride, ::stride].reshape(-1, residual.shape[2])
     off = np.abs(sample)
-    spread = _MAD_TO_STD * np.median(off, axis=0) + settings.min_ground_std
+    spread = _MAD_TO_STD * medians(off, axis=0) + settings.min_ground_std
     calm = sample[np.all(off < 3.0 * spread, axis=1)]
     enough = len(calm) > sample.shape[1] + 1
     covariance = np.atleast_2d(np.cov(calm, rowvar=False, dtype=np.float64)) if enough else 0.0

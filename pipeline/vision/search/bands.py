@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median
 from pipeline.vision.search.backdrop import Image
 from pipeline.vision.search.crosscut import path_normals, smooth_path, straighten
 from pipeline.vision.search.flanks import find_flanks
@@ -76,6 +77,6 @@ def _cable_within(
     return replace(
         band,
         path=path + np.interp(np.arange(len(path)), rows, middle)[:, None] * normal,
-        width=float(np.median(across)),
-        width_scatter=_MAD_TO_STD * float(np.median(np.abs(across - np.median(across)))) / width,
+        width=median(across),
+        width_scatter=_MAD_TO_STD * median(np.abs(across - median(across))) / width,
     )

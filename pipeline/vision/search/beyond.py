@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
@@ -49,13 +50,13 @@ def fades(standout: Standout, cut: CrossCut, width: float, settings: Segmentatio
     """
     path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
     near = slice(round(0.75 * width), round(settings.beyond_least_widths * width))
-    before = float(np.median(step[::-1][near]))
+    before = median(step[::-1][near])
     _, ahead = _led_into_picture(standout, path, width, settings.beyond_leads_widths[0], settings)
     if len(ahead) < near.stop or before <= 0.0:
         return False
     more = cut_across(standout, ahead[: near.stop + round(width)], width, settings, known=True, weights=cut.weights)
     same = np.abs(more.width[near] / width - 1.0) < settings.beyond_width_off
-    faint = float(np.median(more.step[near])) > settings.fading_share * before
+    faint = median(more.step[near]) > settings.fading_share * before
     return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
 
 
@@ -78,7 +79,7 @@ def rest_ahead(
     """
     path, width = cut.path[::-1] if at_start else cut.path, cut.usual_width
     leaving = end_direction(path, width)
-    usual = float(np.median(_weber(standout, cut, width, settings)))
+    usual = median(_weber(standout, cut, width, settings))
     facing = [
         (float(np.hypot(*(rest[0] - path[-1]))), rest)
         for other in others
@@ -133,7 +134,7 @@ def followed_in(
     """
     width = reading.width
     tree = cKDTree(whole.path)
-    others = [strip for strip in reading.strips if float(np.median(tree.query(strip.path)[0])) > 0.5 * width]
+    others = [strip for strip in reading.strips if median(tree.query(strip.path)[0]) > 0.5 * width]
     added = whole.path[cKDTree(piece.path).query(whole.path)[0] > width]
     drawn, around = np.zeros_like(reading.mask), np.zeros_like(reading.mask)
     cv2.polylines(drawn, [np.rint(whole.path).astype(np.int32)], False, 1, max(1, round(width)))
@@ -158,7 +159,7 @@ def _ahead(
     A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place; and
     the width of a mask, by which the strip's edges were sought, may be that of the cable or not.
     """
-    usual = float(np.median(_weber(standout, cut, width, settings)))
+    usual = median(_weber(standout, cut, width, settings))
     best, scraps = None, 0
     for lead in settings.beyond_leads_widths:
         led, ahead = _led_into_picture(standout, path, width, lead, settings)
@@ -230,7 +231,7 @@ def _led_into_picture(
 
 def shaded(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> NDArray[np.bool_]:
     """Sections ``(k,)`` that look like most of the strip but for the light on them."""
-    return _alike(standout, cut, width, float(np.median(_weber(standout, cut, width, settings))), settings)
+    return _alike(standout, cut, width, median(_weber(standout, cut, width, settings)), settings)
 
 
 def _alike(

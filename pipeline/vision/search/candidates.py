@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median, quantile
 from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.bands import strips_in_bands
 from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
@@ -231,6 +232,6 @@ def _split_by_highlight(reading: Reading) -> float | None:
     beside = apart[apart < 4.0 * side.width]
     if len(beside) < 0.6 * len(apart):
         return None
-    distance = float(np.median(beside))
-    calm = float(np.percentile(beside, 80) - np.percentile(beside, 20)) < 0.35 * distance
+    distance = median(beside)
+    calm = quantile(beside, 0.8) - quantile(beside, 0.2) < 0.35 * distance
     return distance + side.width if calm else None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.crosscut import path_normals
 
@@ -71,7 +72,7 @@ def take_closeup(
         grey=grey,
         origin_px=(int(low[0]), int(low[1])),
         noise=_pixel_noise(grey, local, width_px),
-        blur_px=float(np.median(seen)) if len(seen) else 0.0,
+        blur_px=median(seen) if len(seen) else 0.0,
         motion_px=_motion(spreads, angles),
     )
 
@@ -104,7 +105,7 @@ def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
     before, here, after = (grey.ravel()[at + k] for k in (-1, 0, 1))
     differences = before - 2.0 * here + after
     # 1 + 4 + 1 = 6 pixel variances in each difference
-    return _MAD_TO_STD * float(np.median(np.abs(differences))) / np.sqrt(6.0) if len(differences) else 0.0
+    return _MAD_TO_STD * median(np.abs(differences)) / np.sqrt(6.0) if len(differences) else 0.0
 
 
 def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median, medians
 from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
@@ -64,7 +65,7 @@ class CrossCut:
     @cached_property
     def usual_width(self) -> float:
         """Median of the widths; NaN where no section shows both edges."""
-        return float(np.median(self.seen_widths)) if len(self.seen_widths) else np.nan
+        return median(self.seen_widths) if len(self.seen_widths) else np.nan
 
 
 def smooth_path(path: Array, sigma: float) -> Array:
@@ -81,7 +82,9 @@ def smooth_path(path: Array, sigma: float) -> Array:
 
 def path_normals(path: Array) -> tuple[Array, Array]:
     """Unit tangents and normals ``(k, 2)`` of a path."""
-    tangent = np.gradient(path, axis=0)
+    tangent = np.empty_like(path)
+    tangent[1:-1] = 0.5 * (path[2:] - path[:-2])
+    tangent[[0, -1]] = path[[1, -1]] - path[[0, -2]]
     tangent /= np.hypot(*tangent.T)[:, None] + 1e-12
     return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
@@ -110,7 +113,7 @@ def cut_across(
     grey = straight @ weights.astype(np.float32)
     relief, ground = against_ground(grey, offsets / width)
     core = np.abs(offsets) < 0.35 * width
-    sign = -1.0 if np.median(np.median(relief[:, core], axis=1)) < 0 else 1.0
+    sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
     pitch = len(path) / len(rows)
     flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
@@ -124,7 +127,7 @@ def cut_across(
         path=path + normal * np.interp(np.arange(len(path)), rows, middle)[:, None],
         width=(flanks.right - flanks.left)[nearest],
         step=step[nearest],
-        contrast=float(np.median(step)),
+        contrast=median(step),
         texture=float(np.hypot(texture, settings.min_ground_std)),
         weights=weights,
         dark=sign < 0,
@@ -134,7 +137,7 @@ def cut_across(
 
 def against_ground(grey: Image, offset_widths: Array) -> tuple[Image, Image]:
     """A straightened picture ``(n, m)`` less the ground on each section, and that ground ``(n,)``: beside the cable."""
-    ground = np.median(grey[:, _beside(offset_widths)], axis=1)
+    ground = medians(grey[:, _beside(offset_widths)], axis=1)
     return grey - ground[:, None], ground
 
 
@@ -154,10 +157,10 @@ def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, 
     # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
     # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
     values = values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="reflect")
-    values = np.abs(values - np.median(values, axis=0))
+    values = np.abs(values - medians(values, axis=0))
     right = offset_widths[beside] > 0.0
     sides = (values[:, right], values[:, ~right]) if shaded else (values,)
-    return _MAD_TO_STD * min(float(np.median(side)) for side in sides)
+    return _MAD_TO_STD * min(median(side) for side in sides)
 
 
 def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:
@@ -165,7 +168,7 @@ def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) ->
     spacing = float(offsets[1] - offsets[0])
     half = int(0.35 * flanks.width / spacing)
     column = np.rint((flanks.middle - offsets[0]) / spacing).astype(int)[:, None] + np.arange(-half, half + 1)
-    return np.asarray(np.median(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
+    return np.asarray(medians(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
 
 
 def straighten(
@@ -194,8 +197,8 @@ def _centres(many: int, few: int) -> Array:
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:
     """Fisher's discriminant of core against flanks, kept from chasing channels that hardly differ."""
-    core = np.median(straight[:, np.abs(offset_widths) < 0.35].reshape(-1, straight.shape[2]), axis=0)
-    ground = np.median(straight[:, _beside(offset_widths)].reshape(-1, straight.shape[2]), axis=0)
+    core = medians(straight[:, np.abs(offset_widths) < 0.35].reshape(-1, straight.shape[2]), axis=0)
+    ground = medians(straight[:, _beside(offset_widths)].reshape(-1, straight.shape[2]), axis=0)
     difference = (core - ground).astype(np.float64)
     if len(difference) == 1:
         return np.ones(1)

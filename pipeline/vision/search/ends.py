@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
@@ -135,9 +136,9 @@ def settle_end(
     known = np.array([place for place in places if place is not None])
     if len(known) < 5:
         return settled, path
-    middle = float(np.median(known))
+    middle = median(known)
     # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
-    std = float(np.hypot(1.4826 * np.median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
+    std = float(np.hypot(1.4826 * median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
     path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 
@@ -158,7 +159,7 @@ def led_on(body: Array, outward: Array, reach: float, width: float, *, base: flo
 
 def _half_level(profile: Array, along: Array, width: float, stroke: float) -> float | None:
     """Where the grey leaves the cable's for the ground's for longer than ``stroke``; None without a clear step."""
-    cable, ground = np.median(profile[along < -0.6 * width]), np.median(profile[along > 0.6 * width])
+    cable, ground = median(profile[along < -0.6 * width]), median(profile[along > 0.6 * width])
     relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
     low = relief < 0.5
     # a stroke of print is no end: the sheath goes on beyond it
@@ -213,7 +214,7 @@ def between_axes(path: Array, axes: tuple[Bearing, Bearing], margin: float) -> t
     if len(indices) < 5:
         return path, None
     body = path[indices[0] : indices[-1] + 1]
-    spacing = float(np.median(np.hypot(*np.diff(body, axis=0).T)))
+    spacing = median(np.hypot(*np.diff(body, axis=0).T))
     head, tail = _lead(left, body[0], spacing), _lead(right, body[-1], spacing)[::-1]
     return np.vstack([head, body, tail]), (len(head), len(head) + len(body) - 1)
 

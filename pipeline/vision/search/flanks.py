@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def find_flanks(
     slope = np.gradient(soft, spacing, axis=1)
     # Most sections tell how strong an edge is; letters count no more, and a highlight's edge, which may be three times
     # as strong as a flank, less than twice (the root).
-    usual = float(np.median(np.abs(slope).max(axis=1))) + 1e-12
+    usual = median(np.abs(slope).max(axis=1)) + 1e-12
     pooling = settings.pair_pooling_widths * width / pitch
     rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
     near = np.flatnonzero(np.abs(offsets) <= settings.pair_search_widths * width)

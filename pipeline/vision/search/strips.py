@@ -19,6 +19,7 @@ from skimage.morphology import skeletonize
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.median import median
 
 Mask = NDArray[np.uint8]
 
@@ -234,9 +235,9 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     depth = cv2.distanceTransform(piece, cv2.DIST_L2, 5)
     along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
     inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
-    median = float(np.median(inner))
-    scatter = 1.4826 * float(np.median(np.abs(inner - median))) / max(median, 1e-9)
-    return Strip(path, median, scatter, _longest_branch(skeleton, vu[nodes], width))
+    middle = median(inner)
+    scatter = 1.4826 * median(np.abs(inner - middle)) / max(middle, 1e-9)
+    return Strip(path, middle, scatter, _longest_branch(skeleton, vu[nodes], width))
 
 
 def _farthest(reach: Array) -> int:
