@@ -7,6 +7,9 @@ chord frame is laid through the moved bearings, so chord and shape change togeth
     scale_error      p -> p / (1 + e)                       e: stated px/mm over true px/mm, minus 1
     lens_distortion  p -> p (1 + k1 |p|^2 / R^2)            R: half the picture's diagonal on the plane
     camera_tilt      p -> p / (1 + g . p)                   g: perspective terms along and across the chord, 1/m
+
+A tilt phi seen from the distance D has g = sin(phi) / D, and foreshortens its own direction by cos(phi) as well: half a
+percent at 6 degrees, fifty times what a photo shows. A tilt that large has the distance as a second number.
 """
 
 from __future__ import annotations
@@ -21,6 +24,15 @@ from pipeline.diagnosis.causes.cause import PLAIN, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
+DISTANCES = (1.0, 3.0, 15.0)
+"""Camera to cable in lengths: nearest (all of it is hardly seen), usual, and farthest (a tilt is none from there)."""
+
+STEEP = 4.0
+"""Multiple of the usual amount at which the trace of a steep tilt is computed: nearly its plausible size."""
+
+STEEPEST = 0.95
+"""Sine of the largest tilt."""
+
 Move = Callable[[Array, Array], tuple[Array, Array]]
 
 
@@ -198,14 +210,33 @@ class CameraTilt:
         return float(np.tan(np.radians(2.0)) / (2.0 * facts.length))
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Tilt along and across the chord."""
-        return (Variant("along the chord", at=0.0), Variant("across the chord", at=1.0))
+        """Tilt along and across the chord, each without and with what it foreshortens, seen from ``width`` (m)."""
+        plain = (Variant("along the chord", at=0.0), Variant("across the chord", at=1.0))
+        labels = ("along the chord, and foreshortened", "across the chord, and foreshortened")
+        steep = tuple(
+            replace(
+                form,
+                label=label,
+                width=DISTANCES[1] * facts.length,
+                tuned=("width",),
+                width_range=(DISTANCES[0] * facts.length, DISTANCES[-1] * facts.length),
+                setting="foreshortened",
+                trace=trace,
+            )
+            for form, label in zip(plain, labels, strict=True)
+            # what is foreshortened does not change its sign with the tilt, so neither trace tells of the other
+            for trace in (STEEP, -STEEP)
+        )
+        return (*plain, *steep)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The scale falls by ``amount`` per metre along (``at`` 0) or across (``at`` 1) the chord."""
+        across = variant.at > 0.5
+        # a refit may step anywhere: beyond 70 degrees the camera looks along the table
+        shorter = float(np.sqrt(1.0 - min(abs(amount) * variant.width, STEEPEST) ** 2))
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:
-            shrink = 1.0 + amount * (y if variant.at > 0.5 else x)
-            return x / shrink, y / shrink
+            shrink = 1.0 + amount * (y if across else x)
+            return x * (1.0 if across else shorter) / shrink, y * (shorter if across else 1.0) / shrink
 
         return model.observed(seen_through(move))

@@ -48,6 +48,16 @@ class Variant:
     trace: float = 1.0
     known: float = np.inf
 
+    @property
+    def has_place(self) -> bool:
+        """Whether a refit may put it elsewhere; beside itself it is then another form."""
+        return "at" in self.tuned
+
+    @property
+    def as_usual(self) -> Variant:
+        """The same form wherever its trace is computed."""
+        return replace(self, trace=1.0)
+
     def range(self, name: str) -> tuple[float, float]:
         """Range of ``at`` or ``width``."""
         return self.at_range if name == "at" else self.width_range

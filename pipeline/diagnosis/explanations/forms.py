@@ -70,7 +70,10 @@ def may_join(term: Term, fitted: Fit, setting: str) -> bool:
     A form without a place of its own, put beside itself, is the same form again: what two opposite amounts of it remove
     (two tilts, together a distortion of the lens) is the trace of another cause.
     """
-    return term.variant.setting == setting and (bool(term.variant.tuned) or term not in fitted.extension.terms)
+    if term.variant.setting != setting:
+        return False
+    present = [(other.cause, other.variant.as_usual) for other in fitted.extension.terms]
+    return term.variant.has_place or (term.cause, term.variant.as_usual) not in present
 
 
 def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> float:

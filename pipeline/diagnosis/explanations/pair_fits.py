@@ -100,7 +100,7 @@ def with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSetti
     """
     fitted, hopeless, facts = pair.fitted, rival + settings.refit_least, bench.facts
     for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-        if not kind.combines or any(form.tuned for form in kind.variants(facts)):
+        if not kind.combines or any(form.has_place for form in kind.variants(facts)):
             continue
         for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
             fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
