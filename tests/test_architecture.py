@@ -49,7 +49,7 @@ INSIDE = {
     "pipeline.diagnosis.observations": [("prediction", "noise", "force_noise", "work"), ("simulation", "observation")],
     "pipeline.diagnosis.statistics": [
         ("score", "twins", "verdict", "pairs", "gain"),
-        ("smooth_fields", "photo_table"),
+        ("smooth_fields", "photo_table", "variance_component"),
         ("leftover",),
     ],
     "pipeline.diagnosis.fits": [

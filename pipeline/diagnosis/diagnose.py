@@ -24,11 +24,12 @@ from pipeline.diagnosis.explanations.pair_set import TwoCauses
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
-from pipeline.diagnosis.fits.displacement_scatter import with_scatter
+from pipeline.diagnosis.fits.displacement_scatter import scatter_beside, with_scatter
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input, outlier_fault, worst_item
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
+from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.leftover import Leftover, leftover_of
 from pipeline.diagnosis.statistics.pairs import pair_gains
@@ -39,7 +40,7 @@ from pipeline.diagnosis.words import spoken
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
-from pipeline.result import DiagnosisPart, ForceCorrectionPart
+from pipeline.result import Curve, DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import amount_unit
 from rod.measurement import MeasuredTest
@@ -83,17 +84,52 @@ def diagnose(
         if not isinstance(again, str) and again.largest <= again.limit:
             faults, bench = faults.joined(fault), again
     known = None if identification is None else curve_of(identification.inverse)
+    begun = newton_steps()
     conclusion = conclude(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
-    scattered = with_scatter(faults, bench, settings) if part.verdict == "unexplained" else None
-    if scattered is not None:
-        concluded = conclude(scattered[1], settings)
-        presented = present(scattered[1], concluded, settings, identified=known)
-        if presented.verdict != "unexplained":
-            (faults, bench), conclusion, part = scattered, concluded, presented
+    left = max(settings.search_newton_steps - (newton_steps() - begun), 1)  # a second search ends with the first's time
+    shorter = settings.model_copy(update={"search_newton_steps": left})
+    faults, bench, conclusion, part = _allowing_for_scatter(faults, bench, conclusion, part, shorter, known)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
     return part, (*findings, *_search_ended(conclusion))
+
+
+def _allowing_for_scatter(
+    faults: Faults,
+    bench: Workbench,
+    conclusion: Conclusion,
+    part: DiagnosisPart,
+    settings: DiagnosisSettings,
+    known: Curve | None,
+) -> tuple[Faults, Workbench, Conclusion, DiagnosisPart]:
+    """What is concluded with displacements that scatter, where they do so and that explains the data better.
+
+    Better is what is likelier, each number fitted paid with two of chi-square; nothing else where only that explains
+    the data at all.
+    """
+    exact, cost = (faults, bench, conclusion, part), _cost(bench, conclusion)
+    fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
+    scattered = scatter_beside(faults, bench, fitted, settings)
+    if scattered is not None:
+        concluded = conclude(scattered.bench, settings)
+        presented = present(scattered.bench, concluded, settings, identified=known)
+        likelier = _cost(scattered.bench, concluded) + scattered.price < cost
+        if presented.verdict != "unexplained" and (likelier or part.verdict == "unexplained"):
+            return scattered.faults, scattered.bench, concluded, presented
+    left_open = with_scatter(faults, bench, settings) if part.verdict == "unexplained" else None
+    if left_open is not None:
+        concluded = conclude(left_open[1], settings)
+        presented = present(left_open[1], concluded, settings, identified=known)
+        if presented.verdict != "unexplained":
+            return *left_open, concluded, presented
+    return exact
+
+
+def _cost(bench: Workbench, conclusion: Conclusion) -> float:
+    """Chi-square of what was concluded, plus two for every parameter."""
+    fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
+    return fitted.chi2 + 2.0 * fitted.extension.size
 
 
 def with_corrected_forces(test: MeasuredTest, corrections: Sequence[ForceCorrectionPart]) -> MeasuredTest:

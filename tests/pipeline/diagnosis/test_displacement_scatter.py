@@ -7,11 +7,16 @@ import pytest
 
 from fixtures.aliens import with_alien
 from fixtures.continuum import Cable
-from fixtures.effects import HIDE, LARGEST, PROTOCOLS
+from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test
 from fixtures.scores import SETTINGS
 from fixtures.trials import alien_size, random_cable
 from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.fits.displacement_scatter import scatter_beside
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
 from rod.measurement import MeasuredTest
 
 SCATTER = 10e-6  # of a dial gauge, m
@@ -56,3 +61,17 @@ def test_what_lies_outside_the_catalogue_is_no_scatter_of_displacements():
     part, findings = diagnose(strange, None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
     assert "log/displacement-scatter" not in {finding.code for finding in findings}
+
+
+@pytest.mark.parametrize("scatters", [True, False])
+def test_scatter_is_asked_for_beside_a_cause_that_was_named(scatters):
+    """Never asked for there, it made a class of a set and friction, with f_EI 1.7 % off instead of 0.4 %."""
+    cable, reading = HIDE["plastic_set"](0.08, Form())
+    test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=7, reading=reading)
+    faults = faults_of_input(scattering(test, 7) if scatters else test, SETTINGS)
+    own = [cause for cause in CATALOGUE if cause.name == "plastic_set"]
+    bench = prepare(faults, SETTINGS, knots=SETTINGS.knots, causes=own)
+    named = refit_one(bench.observation, bench.base, bench.suspicion, 0, SETTINGS)
+    found = scatter_beside(faults, bench, named.fitted, SETTINGS)
+    assert (found is not None) == scatters
+    assert found is None or found.faults.findings[-1].code == "log/displacement-scatter"
