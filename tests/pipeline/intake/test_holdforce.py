@@ -36,6 +36,10 @@ TRENDS = {
 }
 
 
+# 700 values: binomial standard deviation 0.8 %, three of those; one noise for all holds of a log correlates them
+COVERS_LEAST, COVERS_MOST = 0.925, 0.975
+
+
 @pytest.mark.parametrize("name", TRENDS)
 @pytest.mark.parametrize("samples", [8, 30, 200])
 def test_standard_deviation_covers(name, samples):
@@ -44,9 +48,7 @@ def test_standard_deviation_covers(name, samples):
         holds, truth = campaign(seed, trend=TRENDS[name], samples=samples)
         found = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
         z.append((np.array(found.force) - truth) / np.array(found.std))
-    inside = np.mean(np.abs(z) < 1.96)
-    # 700 values: binomial standard deviation 0.8 %; one noise for all holds of a log correlates them
-    assert 0.925 < inside < 0.975
+    assert COVERS_LEAST < np.mean(np.abs(z) < 1.96) < COVERS_MOST
 
 
 def test_correlated_samples_count_for_less():
@@ -55,7 +57,7 @@ def test_correlated_samples_count_for_less():
         holds, truth = campaign(seed, trend=TRENDS["none"], samples=100, correlation=0.6)
         found = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
         z.append((np.array(found.force) - truth) / np.array(found.std))
-    assert 0.90 < np.mean(np.abs(z) < 1.96) < 0.985
+    assert COVERS_LEAST < np.mean(np.abs(z) < 1.96) < COVERS_MOST
 
 
 def test_mean_of_a_steady_hold():
@@ -64,21 +66,21 @@ def test_mean_of_a_steady_hold():
     assert found.degree == 0
     np.testing.assert_allclose(found.force, [hold.forces.mean() for hold in holds], rtol=1e-12)
     pooled = np.sqrt(np.mean([hold.forces.var(ddof=1) for hold in holds]))
-    np.testing.assert_allclose(found.std, pooled / np.sqrt(8.0), rtol=1e-6)
+    np.testing.assert_allclose(found.std, pooled / np.sqrt(8.0), rtol=1e-6)  # a last digit of 1e-5 N adds 5e-7 of it
 
 
 def test_holds_with_different_noise_keep_their_own():
     quiet, _ = campaign(1, trend=TRENDS["none"], sigma=0.002, samples=40, holds=3)
     loud, _ = campaign(2, trend=TRENDS["none"], sigma=0.05, samples=40, holds=3)
     found = hold_forces([*quiet, *loud], resolution=1e-6, settings=SETTINGS)
+    # 0.22: in a variance of 43 samples four are the common one; a sigma of 39 samples is known to 11 %, three of those
     assert max(found.std[:3]) < 0.3 * min(found.std[3:])
 
 
 def test_never_zero():
     same = [Hold(np.arange(4.0), np.full(4, level), 3.0) for level in (0.0, 1.0, 2.0)]
     found = hold_forces(same, resolution=0.01, settings=SETTINGS)
-    # never below a constant distribution over the last digit
-    np.testing.assert_array_less(0.99 * 0.01 / np.sqrt(12.0), found.std)
+    assert min(found.std) >= 0.01 / np.sqrt(12.0)  # a constant distribution over the last digit
     zero = hold_forces([Hold(np.zeros(1), np.zeros(1), None)], resolution=0.0, settings=SETTINGS)
     assert zero.std[0] > 0.0
 
@@ -94,14 +96,16 @@ def test_unknown_moment_costs_the_run_of_the_trend():
     holds, _ = campaign(3, trend=TRENDS["drift"], samples=50)
     at_photo = hold_forces(holds, resolution=1e-5, settings=SETTINGS)
     nowhere = hold_forces([Hold(h.times, h.forces, None) for h in holds], resolution=1e-5, settings=SETTINGS)
-    run = float(np.std(holds[-1].forces))
+    run = float(np.sqrt(np.var(holds[-1].forces) - 0.01**2))  # what is not noise
     assert nowhere.std[-1] > at_photo.std[-1]
-    assert nowhere.std[-1] == pytest.approx(run, rel=0.35)
+    # the variance of 50 samples of noise is known to a fifth, which is 1 % of the run: three of those
+    assert nowhere.std[-1] == pytest.approx(run, rel=0.03)
 
 
 def test_scale_of_forces_does_not_matter():
     holds, _ = campaign(4, trend=TRENDS["relaxation"])
     small = [Hold(h.times, 1e-3 * h.forces, h.photo_time) for h in holds]
     one, other = (hold_forces(h, resolution=r, settings=SETTINGS) for h, r in ((holds, 1e-5), (small, 1e-8)))
-    np.testing.assert_allclose(np.array(other.force), 1e-3 * np.array(one.force), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(np.array(other.std), 1e-3 * np.array(one.std), rtol=1e-6)
+    # roundings; the first force is one of noise about zero, 1e-5 N
+    np.testing.assert_allclose(np.array(other.force), 1e-3 * np.array(one.force), rtol=1e-9)
+    np.testing.assert_allclose(np.array(other.std), 1e-3 * np.array(one.std), rtol=1e-9)

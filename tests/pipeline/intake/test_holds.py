@@ -95,22 +95,22 @@ def test_force_at_displacement_zero_is_not_force_free(read):
 
 def test_sign_of_the_force_is_inferred_aloud(read):
     log = read(log_text(UP, sign=-1.0))
-    assert log.steps[-1].force_N == pytest.approx(2.75, abs=1e-6)
+    assert log.steps[-1].force_N == pytest.approx(2.75)
     finding = next(f for f in log.findings if f.code == "log/force-sign")
     assert finding.level == "warning"
-    assert "4 of 4 bent steps" in finding.message or "3 of 3 bent steps" in finding.message
+    assert "3 of 3 bent steps" in finding.message  # 2 of 14 mm is less than a fifth of the way
 
 
 def test_sign_of_the_force_as_the_user_says(read):
     log = read(log_text(UP, sign=-1.0), force_sign="tension")
-    assert log.steps[-1].force_N == pytest.approx(2.75, abs=1e-6)
+    assert log.steps[-1].force_N == pytest.approx(2.75)
     assert "log/force-sign" not in codes(log)
 
 
 @pytest.mark.parametrize(("sign", "said"), [(-1.0, "compression"), (1.0, "tension")])
 def test_contradicted_sign_is_kept_and_told(sign, said, read):
     log = read(log_text(UP, sign=sign), force_sign=said)
-    assert log.steps[-1].force_N == pytest.approx(-2.75, abs=1e-6)
+    assert log.steps[-1].force_N == pytest.approx(-2.75)
     assert codes(log).count("log/force-sign") == 1
 
 
@@ -192,7 +192,7 @@ def test_a_wild_force_is_left_out_and_its_photo_kept(read):
     assert codes(log) == ["log/wild-force"]
     assert "line 25" in log.findings[0].message
     assert log.steps[3].image == "p3.png"
-    assert log.steps[3].force_N == pytest.approx(2.600, abs=2e-3)
+    assert log.steps[3].force_N == pytest.approx(np.mean([2.601, 2.601, 2.598, 2.598, 2.601]))
     assert codes(read("\n".join(lines).replace("2.6010,p3.png", "2601.0,p3.png"))) == []
 
 

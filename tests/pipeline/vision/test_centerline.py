@@ -42,7 +42,10 @@ def lit(rng, **options):
     return bow_scene(rng, **({"light": directional(rng), "sheath": Sheath(gloss=0.4, text=text)} | options))
 
 
-# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. At 5 % noise 0.15 inside is missed:
+# Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. In side light 0.1 px, 0.2 % and 2 %;
+# an edge blurred by 2 px is told root two worse, at 5 % noise errors nearly double; at 5 px/mm 1 % inside, twice as
+# much as at 12 px/mm at the ends. At a quarter of the noise even light is to reach what the best prototype did,
+# 0.005 px, 0.1 % and 0.5 %. At 5 % noise 0.15 inside is missed in even light:
 # 0.164 on these scenes, 0.158 on 16 others. Edges at the limit of Cramer and Rao, a row's sqrt(2 sqrt(pi) w) n/A, by
 # this spline give 0.150 over 29 such bows if the grey values of sheath and ground were known exactly, and 0.175 if they
 # are found with the place; 0.13 with the penalty's weight chosen by the truth. A stiffer penalty (order 4) gained a
@@ -50,15 +53,15 @@ def lit(rng, **options):
 # side light.
 CASES = {
     "even": (even, {}, {}, (0.02, 0.15, 1.5)),
-    "even, noise 0.5 %": (even, {"noise": 0.005}, {}, (0.02, 0.15, 1.5)),
+    "even, noise 0.5 %": (even, {"noise": 0.005}, {}, (0.005, 0.1, 0.5)),
     "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.175, 1.5)),
-    "directional": (lit, {}, {}, (0.25, 0.35, 2.5)),
-    "directional, noise 5 %": (lit, {"noise": 0.05}, {}, (0.25, 0.35, 2.5)),
-    "directional, JPEG 75": (lit, {}, {"quality": 75}, (0.25, 0.35, 2.5)),
+    "directional": (lit, {}, {}, (0.1, 0.2, 2.0)),
+    "directional, noise 5 %": (lit, {"noise": 0.05}, {}, (0.1, 0.35, 2.5)),
+    "directional, JPEG 75": (lit, {}, {"quality": 75}, (0.1, 0.2, 2.0)),
     "even, 5 px/mm": (even, {"px_per_mm": 5.0}, {}, (0.1, 1.0, 4.0)),
-    "directional, 5 px/mm": (lit, {"px_per_mm": 5.0}, {}, (0.25, 1.0, 4.0)),
-    "directional, brushed metal": (lit, {"ground": Ground("brushed", contrast=0.03)}, {}, (0.25, 0.35, 2.5)),
-    "directional, blur 2 px": (lit, {"blur": 2.0}, {}, (0.25, 0.35, 2.5)),
+    "directional, 5 px/mm": (lit, {"px_per_mm": 5.0}, {}, (0.1, 1.0, 4.0)),
+    "directional, brushed metal": (lit, {"ground": Ground("brushed", contrast=0.03)}, {}, (0.1, 0.2, 2.0)),
+    "directional, blur 2 px": (lit, {"blur": 2.0}, {}, (0.1, 0.28, 2.5)),
 }
 
 
@@ -90,15 +93,18 @@ def test_frame_signs_and_lengths():
         shape = found.shape
         assert found.mirrored is mirrored
         assert shape.y[100] > 0.01
-        assert abs(shape.x[0]) < 1e-4
-        assert_allclose(shape.x[-1], found.chord_m, atol=1e-4)
-        assert_allclose(np.gradient(shape.x, shape.s)[1:-1], np.cos(shape.theta)[1:-1], atol=1e-4)
-        assert_allclose(np.gradient(shape.y, shape.s)[1:-1], np.sin(shape.theta)[1:-1], atol=1e-4)
-        assert_allclose(-np.gradient(shape.theta, shape.s)[1:-1], shape.kappa[1:-1], atol=2e-2)
+        assert abs(shape.x[0]) < 4.0 * found.chord_std_m
+        assert_allclose(shape.x[-1], found.chord_m, atol=4.0 * found.chord_std_m)
+        # central differences over h = 0.9 mm are off by h^2 / 6 of the third derivative: some 90 1/m^2, 1700 1/m^3
+        assert_allclose(np.gradient(shape.x, shape.s)[1:-1], np.cos(shape.theta)[1:-1], atol=2e-5)
+        assert_allclose(np.gradient(shape.y, shape.s)[1:-1], np.sin(shape.theta)[1:-1], atol=2e-5)
+        assert_allclose(-np.gradient(shape.theta, shape.s)[1:-1], shape.kappa[1:-1], atol=5e-4)
         assert np.all(shape.kappa[20:-20] > 0.0)
         assert abs(found.chord_m - picture.curve.chord) < 4.0 * found.chord_std_m
         assert abs(found.traced_length_m - LENGTH) < 4.0 * found.traced_length_std_m
-        assert found.traced_length_std_m < 1e-4 * LENGTH
+        # both axes were given to 0.03 px at 12 px/mm; the line between them adds next to nothing
+        assert found.chord_std_m == pytest.approx(np.sqrt(2.0) * 0.03 / 12e3)
+        assert found.traced_length_std_m == pytest.approx(found.chord_std_m, rel=0.01)
 
 
 def test_camera_turned_by_a_quarter():
@@ -118,9 +124,10 @@ def test_covered_ends_are_marked_and_less_certain():
     found = trace(even(rng), rng)[1]
     seen, std = found.shape.seen, found.kappa_std
     hidden = found.shape.s[~seen]
+    # 6 mm of cover, and beside it what the search for edges keeps clear
     assert np.all((hidden < 0.008) | (hidden > LENGTH - 0.008))
     assert seen[0] == np.False_ and seen[-1] == np.False_
-    assert std[0] > 3.0 * np.median(std)
+    assert std[0] > 6.0 * np.median(std)  # the end of a window alone is six times worse than its middle
     assert np.all(np.diff(found.position_std[:8]) < 0.0)  # certainty grows from the axis to where the cable is seen
     assert found.shape.section_s.min() > 0.0055  # the cover's radius is 6 mm, sections begin where both edges are free
 
@@ -136,8 +143,8 @@ def test_raw_sections_scatter_as_their_noise_model_says():
         normal = (-np.sin(theta) * away[:, 0] + np.cos(theta) * away[:, 1]) / shape.section_std
         ratio.append(normal.std())
         beyond.append(np.mean(np.abs(normal) > 3.0))
-    assert_allclose(np.mean(ratio), 1.0, atol=0.1)
-    assert np.mean(beyond) < 0.01
+    assert_allclose(np.mean(ratio), 1.0, atol=0.1)  # some 800 sections, neighbours alike: known to 3 %, three of those
+    assert np.mean(beyond) < 0.01  # 0.3 % if normal, and a few that were no edges of the cable
 
 
 def exact_plane(camera) -> PlaneMap:
@@ -168,7 +175,7 @@ def test_tilt_and_barrel_are_taken_out(camera):
     inner = slice(15, -15)
     top = reference.shape.kappa.max()
     assert np.sqrt(np.mean((found.shape.kappa - reference.shape.kappa)[inner] ** 2)) < 1e-3 * top
-    assert np.sqrt(np.mean((raw.shape.kappa - reference.shape.kappa)[inner] ** 2)) > 3e-3 * top
+    assert np.sqrt(np.mean((raw.shape.kappa - reference.shape.kappa)[inner] ** 2)) > 3e-3 * top  # else it shows nothing
 
 
 def refused(rough, scene, *, diameter=DIAMETER, settings=None):
@@ -192,7 +199,7 @@ def test_path_on_one_strip_beside_the_highlight_is_caught():
     off = 0.35 * rough.half_width_px
     strip = replace(rough, path_px=rough.path_px + np.array([0.0, off]), half_width_px=0.5 * rough.half_width_px)
     found = refused(strip, scene)
-    assert isinstance(found, Rejected) or errors(picture, found, scene.camera.px_per_m).position() < 0.25
+    assert isinstance(found, Rejected) or errors(picture, found, scene.camera.px_per_m).position() < 0.02  # even light
 
 
 @pytest.mark.parametrize("wrong", [0.7, 1.4])
@@ -203,7 +210,7 @@ def test_wrong_diameter_is_refused_with_the_figure(wrong):
     assert isinstance(found, Rejected)
     assert found.code in ("photo/width", "photo/contrast")
     if found.code == "photo/width":
-        assert_allclose(found.figure["width_over_diameter"], 1.0 / wrong, rtol=0.05)
+        assert_allclose(found.figure["width_over_diameter"], 1.0 / wrong, rtol=0.01)  # half a pixel of 55
 
 
 def test_too_little_contrast_and_too_much_blur_are_refused():
@@ -284,7 +291,7 @@ def test_a_stretch_of_another_width_does_not_bend_the_line(monkeypatch):
     assert isinstance(line, Centerline), line.reason
     true = CubicSpline(np.arange(1001), np.column_stack([picture.u_px, picture.v_px]))(np.linspace(0, 1000, 20_001))
     distance = cKDTree(true).query(np.column_stack([line.u_px, line.v_px])[line.shape.seen])[0]
-    assert distance.max() < 0.01 * diameter
+    assert distance.max() < 0.1  # px, five times the rms asked for in even light; the flank lies 11 px inside
 
 
 def test_a_bend_that_no_cable_makes_is_refused():
@@ -303,7 +310,8 @@ def test_a_bend_that_no_cable_makes_is_refused():
         )
         assert isinstance(line, Rejected) == refusal
     assert line.code == "photo/outline"
-    assert line.figure["bend_radius_diameters"] == pytest.approx(1.0 / bend, rel=0.05)
+    # kappa inside is known to 0.15 %: three of those
+    assert line.figure["bend_radius_diameters"] == pytest.approx(1.0 / bend, rel=0.005)
 
 
 def test_path_beside_the_cable_is_refused():
@@ -348,5 +356,5 @@ def test_chord_frame_goes_there_and_back():
     scene = even(rng)
     frame = chord_frame(rough_cable(scene, render(scene), rng), PlaneMap.from_scale(12_000.0))
     uv = np.array([[100.0, 50.0], [1500.0, 400.0]])
-    assert_allclose(frame.to_pixels(frame.to_frame(uv)), uv, atol=1e-8)
+    assert_allclose(frame.to_pixels(frame.to_frame(uv)), uv, rtol=1e-13)  # roundings
     assert_allclose(frame.axes[1], [frame.chord, 0.0])

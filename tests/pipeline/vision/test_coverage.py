@@ -53,12 +53,14 @@ def test_band_of_kappa_covers_the_truth(make):
     found = traced_errors(SCENES, make, seed=30)
     covered = np.array([e.covered() for e in found])
     assert 0.90 <= covered.mean() <= 0.99
-    # Nor may the good mean hide bad ends: they alone.
+    # Nor may the good mean hide bad ends: they alone. A scene's points there are right or wrong together: fifty scenes
+    # tell the mean to 3 %, two of those below 95 %.
     ends = np.array([e.covered()[~e.inner].mean() for e in found])
     assert ends.mean() >= 0.88
-    # Errors in units of their bands: not a few scenes off by many.
+    # Errors in units of their bands: not a few scenes off by many. Normal errors at forty places give 3.2; bands are
+    # known to a tenth, and a quantile of fifty scenes to another.
     worst = [np.max(np.abs(e.kappa / e.kappa_std)) for e in found]
-    assert np.quantile(worst, 0.95) < 4.5
+    assert np.quantile(worst, 0.95) < 4.0
 
 
 def measured_on_second_renderer(seed: int):
@@ -93,9 +95,9 @@ def measured_on_second_renderer(seed: int):
 
 
 def test_band_holds_on_photos_of_another_renderer():
-    """Other shading, shadow, texture, demosaicing, tone curve, sharpening, 4 to 9 px/mm: the targets of 5 px/mm."""
+    """Other shading, shadow, texture, demosaicing, tone curve, sharpening, 4 to 9 px/mm: targets of 5 px/mm."""
     found = [measured_on_second_renderer(seed) for seed in range(SECOND)]
     assert 0.90 <= np.mean([e.covered().mean() for e in found]) <= 0.99
-    assert rms([e.position() for e in found]) < 0.25
+    assert rms([e.position() for e in found]) < 0.1
     assert rms([e.interior() for e in found]) < 1.0
     assert rms([e.ends() for e in found]) < 4.0

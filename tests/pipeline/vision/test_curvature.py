@@ -86,12 +86,13 @@ def test_bases_are_the_derivatives():
         moved, back = curve.moved(step), curve.moved(-step)
         size = 2.0 * step[j]
         change = ((moved.at(s)[0] - back.at(s)[0]) * across).sum(axis=1) / size
-        # Between the ends of a cell the basis is linear; it gives the steps and the bands, not the curve.
+        # Between the ends of a cell the basis is linear; it gives the steps and the bands, not the curve. Curvature is
+        # linear in the coefficients: roundings over the step are left.
         assert_allclose(normal[:, j], change, atol=2e-3 * np.abs(change).max())
         assert_allclose(
             turn[:, j], (moved.at(s)[1] - back.at(s)[1]) / size, atol=2e-3 * np.abs(turn[:, j]).max() + 1e-9
         )
-        assert_allclose(bend[:, j], (moved.curvature(s) - back.curvature(s)) / size, atol=1e-6)
+        assert_allclose(bend[:, j], (moved.curvature(s) - back.curvature(s)) / size, atol=1e-9)
 
 
 def test_feet_are_the_nearest_points():
@@ -106,7 +107,8 @@ def test_exact_points_give_back_the_curvature():
     s, points = noisy(bow, np.random.default_rng(0), std=0.0, correlation=0.0)
     found = fit(s, points)
     at = np.linspace(0.0, LENGTH, 101)
-    assert np.max(np.abs(found.curve.curvature(at) - bow(at))) < 2e-3 * 9.0  # unseen ends included
+    # unseen ends included; a third of the 0.15 % that noise may make
+    assert np.max(np.abs(found.curve.curvature(at) - bow(at))) < 5e-4 * 9.0
 
 
 def test_ends_keep_pre_curvature_and_slope():
@@ -116,7 +118,8 @@ def test_ends_keep_pre_curvature_and_slope():
         [fit(*noisy(bow, rng, std=1e-6, correlation=0.001)).curve.curvature(np.array([0.0, 1e-3])) for _ in range(20)]
     )
     assert abs(np.mean(ends[:, 0]) - 2.0) < 0.015 * 9.0  # the target for the last 10 mm, 6 mm beyond the last point
-    assert_allclose(np.mean(np.diff(ends)) / 1e-3, 7.0 * np.pi / LENGTH, rtol=0.15)
+    # twenty slopes tell theirs to 1 %; what the penalty makes of 6 mm that nobody saw may be off by ten times that
+    assert_allclose(np.mean(np.diff(ends)) / 1e-3, 7.0 * np.pi / LENGTH, rtol=0.1)
 
 
 def test_correlated_noise_is_estimated_and_bands_are_true():
@@ -139,8 +142,10 @@ def test_correlated_noise_is_estimated_and_bands_are_true():
     covered = np.array(covered)
     assert 0.90 <= covered[:, inner].mean() <= 0.99
     assert 0.90 <= covered[:, ~inner].mean() <= 1.0
-    assert_allclose(np.median(sigma), 3e-6, rtol=0.1)  # its own scatter is 7 % with 75 independent sections
-    assert_allclose(np.median(length), 0.0015, rtol=0.2)
+    # 75 independent sections tell sigma to 8 %, the median of forty curves to 1.6 %: three of those
+    assert_allclose(np.median(sigma), 3e-6, rtol=0.05)
+    # the length of one curve scatters by a fifth, the median by 4 %: three of those
+    assert_allclose(np.median(length), 0.0015, rtol=0.12)
 
 
 def test_white_noise_bands_are_too_narrow_for_correlated_errors():
@@ -158,8 +163,8 @@ def test_white_noise_bands_are_too_narrow_for_correlated_errors():
             )
             std = np.linalg.norm(found.curve.bases(at)[2] @ found.smooth.root, axis=1)
             covered[name].append(np.mean(np.abs(found.curve.curvature(at) - bow(at)) < 1.96 * std))
-    assert np.mean(covered["estimated"]) > 0.9
-    assert np.mean(covered["white"]) < 0.8
+    assert np.mean(covered["estimated"]) > 0.9  # the target
+    assert np.mean(covered["white"]) < 0.8  # far from it: of 95 % a variance too small by two leaves 83 %
 
 
 def test_third_derivative_is_the_better_penalty():
@@ -170,7 +175,7 @@ def test_third_derivative_is_the_better_penalty():
         s, points = noisy(bow, rng, std=3e-6, correlation=0.001)
         for order, found in error.items():
             found.append(np.sqrt(np.mean((fit(s, points, order=order).curve.curvature(at) - bow(at)) ** 2)))
-    assert np.mean(error[3]) < 0.85 * np.mean(error[2])
+    assert np.mean(error[3]) < 0.85 * np.mean(error[2])  # 0.67; both see the same noise
 
 
 def test_outliers_do_not_bend_the_curve():
@@ -180,7 +185,8 @@ def test_outliers_do_not_bend_the_curve():
     spoiled[100:108, 1] += 5e-4  # eight neighbours off by 250 standard deviations
     plain, robust = fit(s, points), fit(s, spoiled)
     assert np.all(robust.weight[100:108] == 0.0)
-    assert np.max(np.abs(robust.curve.curvature(at) - plain.curve.curvature(at))) < 0.01 * 9.0
+    # noise leaves 2e-4 of the curvature; without eight points of 240 it may change by about as much
+    assert np.max(np.abs(robust.curve.curvature(at) - plain.curve.curvature(at))) < 5e-4 * 9.0
 
 
 def test_a_gap_among_the_points_does_not_throw_away_what_lies_beyond():
@@ -190,7 +196,7 @@ def test_a_gap_among_the_points_does_not_throw_away_what_lies_beyond():
     walked = s[0] + np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     found = fit(walked, points, length=LENGTH - (s[-1] - walked[-1]))
     assert np.all(found.weight > 0.0)
-    assert np.sqrt(np.mean(found.residual**2)) < 2e-7
+    assert np.sqrt(np.mean(found.residual**2)) < 2e-7  # the noise
 
 
 def test_fewer_points_than_parameters_are_followed():
@@ -201,8 +207,8 @@ def test_fewer_points_than_parameters_are_followed():
     assert frame.size > len(points)
     s = 0.2 * turn
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=3)
-    # two steps from a start that is the circle but for its chords
-    assert_allclose(path.at(path.foot(points, s))[0], points, atol=1e-5 * LENGTH)
+    # two steps from a start that is the circle but for its chords, 1e-3 of the curvature: each squares what is off
+    assert_allclose(path.at(path.foot(points, s))[0], points, atol=1e-8 * LENGTH)
     assert_allclose(path.curvature(s), 5.0, rtol=1e-3)
 
 
@@ -218,8 +224,8 @@ def test_a_break_follows_a_point_load():
         np.max(np.abs(fit(s, points, breaks=breaks, intervals=20).curve.curvature(at) - kappa(at)))
         for breaks in ((), (0.5 * LENGTH,))
     ]
-    assert error[1] < 0.01 * 9.0
-    assert error[0] > 3.0 * error[1]
+    assert error[1] < 0.0015 * 9.0  # the target inside, at every point
+    assert error[0] > 0.01 * 9.0  # a kink of 120 1/m^2 between knots 10 mm apart is rounded by an eighth: 0.15 1/m
 
 
 def test_frames_refuse_nonsense():

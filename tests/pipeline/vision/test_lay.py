@@ -50,17 +50,17 @@ def test_what_all_photos_show_at_the_same_place_is_taken_off(shapes):
     seen = relieved([pushed(shape, lay) for shape in shapes], DIAMETER, SETTINGS)
     clean = relieved(shapes, DIAMETER, SETTINGS)
     for one, other in zip(seen, clean, strict=True):
-        assert abs(amplitude(one, other, lay)) < 0.1  # the running mean of 1.5 widths keeps a hundredth of it
-    # what is left scatters less, and is told so
-    assert (
-        np.mean([one.section_std.mean() / shape.section_std.mean() for one, shape in zip(seen, shapes, strict=True)])
-        < 0.8
-    )
+        # the running mean of 1.5 widths keeps a hundredth of it; cells of the mean and noise in it some more
+        assert abs(amplitude(one, other, lay)) < 0.1
+    # what is left scatters less, by the wave, and is told so; an rms of some hundred sections a photo
+    told = np.mean([one.section_std.mean() / shape.section_std.mean() for one, shape in zip(seen, shapes, strict=True)])
+    noise = np.mean([shape.section_std.mean() for shape in shapes])
+    assert told == pytest.approx(noise / np.hypot(noise, WAVE / np.sqrt(2.0)), rel=0.1)
 
 
 def test_what_one_photo_shows_stays(shapes):
     seen = relieved([pushed(shapes[0], lay), *shapes[1:]], DIAMETER, SETTINGS)
-    assert amplitude(seen[0], shapes[0], lay) > 0.75  # a fifth is what one of five photos has in their mean
+    assert amplitude(seen[0], shapes[0], lay) > 0.8  # a fifth is what one of five photos has in their mean
 
 
 def test_what_a_bend_could_do_stays(shapes):
@@ -72,14 +72,15 @@ def test_what_a_bend_could_do_stays(shapes):
     seen = relieved([pushed(shape, spot) for shape in shapes], DIAMETER, SETTINGS)
     clean = relieved(shapes, DIAMETER, SETTINGS)
     for one, other in zip(seen, clean, strict=True):
-        assert amplitude(one, other, spot) > 0.9
+        assert amplitude(one, other, spot) > 0.96  # 1 - 4 / sqrt(16 + 1.5^2 / 2) is what a mean of 1.5 widths takes
 
 
 def test_noise_alone_is_hardly_touched(shapes):
     for one, shape in zip(relieved(shapes, DIAMETER, SETTINGS), shapes, strict=True):
         moved = np.hypot(one.section_x - shape.section_x, one.section_y - shape.section_y)
-        assert np.sqrt(np.mean(moved**2)) < 0.25 * shape.section_std.mean()
-        assert one.section_std.mean() == pytest.approx(shape.section_std.mean(), rel=0.1)
+        # the mean of five photos has 0.45 of the noise of one; that it is chance must take half of it and more
+        assert np.sqrt(np.mean(moved**2)) < 0.22 * shape.section_std.mean()
+        assert one.section_std.mean() == pytest.approx(shape.section_std.mean(), rel=0.05)  # some hundred sections
 
 
 def test_a_single_photo_is_returned_as_it_is(shapes):

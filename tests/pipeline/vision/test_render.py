@@ -83,7 +83,7 @@ def test_curve_of_constant_curvature_is_a_circle() -> None:
     assert curve.y.max() == pytest.approx((1 - cos(0.8)) / 8.0, rel=1e-12)
     assert curve.theta[0] == pytest.approx(0.8, rel=1e-12)
     again = Curve.from_points(curve.s, curve.x, curve.y)
-    assert again.kappa[200:-200] == pytest.approx(8.0, rel=1e-6)
+    assert again.kappa[200:-200] == pytest.approx(8.0, rel=1e-6)  # second derivatives lose half of sixteen digits
 
 
 CAMERAS = [
@@ -161,7 +161,7 @@ def test_chessboard_photo_shows_the_exact_corners() -> None:
     exact = board.corners(camera)
     exact = exact if np.hypot(*(fine[0] - exact[0])) < 5 else exact[::-1]
     off = fine - exact
-    assert np.abs(off.mean(0)).max() < 0.01
+    assert np.abs(off.mean(0)).max() < 0.01  # 66 corners of that scatter: three standard errors
     assert np.sqrt((off**2).sum(1).mean()) < 0.05  # OpenCV's own corners scatter by 0.02 to 0.04 px at this noise
     with pytest.raises(ValueError, match="finite"):
         board.corners(replace(camera, distance_m=inf))
@@ -176,8 +176,8 @@ def test_shading_of_a_cylinder() -> None:
     diffuse, glossy = cylinder(side, across, one, zero, gloss=0.5, shininess=40.0)
     # The matt maximum faces the lamp (Lambert): across = cos(elevation); the highlight lies half way to it.
     flank = across[np.argmax(diffuse - 0.4 * (0.5 + 0.5 * np.sqrt(1 - across**2)))]
-    assert flank == pytest.approx(cos(0.8), abs=0.006)
-    assert across[np.argmax(glossy)] == pytest.approx(sin(0.5 * (pi / 2 - 0.8)), abs=0.006)
+    assert flank == pytest.approx(cos(0.8), abs=0.005)  # half a step of the grid, here and below
+    assert across[np.argmax(glossy)] == pytest.approx(sin(0.5 * (pi / 2 - 0.8)), abs=0.005)
 
 
 def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
@@ -205,7 +205,8 @@ def test_every_ground_in_every_format(kind: str, bit_depth: int, mode: str) -> N
     assert pixels.shape == {"grey": (200, 300), "colour": (200, 300, 3), "alpha": (200, 300, 4)}[mode]
     assert pixels.dtype == (np.uint8 if bit_depth == 8 else np.uint16)
     assert pixels[..., :1].max() < 2**bit_depth if mode == "grey" else pixels[..., :3].max() < 2**bit_depth
-    assert np.median(pixels[..., 0] if mode != "grey" else pixels) == pytest.approx(2 ** (bit_depth - 1), rel=0.1)
+    # a pattern of 5 % moves the median by less than a fifth of that; so does the last of 8 bits
+    assert np.median(pixels[..., 0] if mode != "grey" else pixels) == pytest.approx(2 ** (bit_depth - 1), rel=0.01)
 
 
 def test_cable_outside_the_picture_leaves_the_ground() -> None:
@@ -230,7 +231,7 @@ def test_exif_orientation_shows_the_picture_as_it_is(orientation: int) -> None:
     data = np.frombuffer(encode(pixels, ".jpg", exif_orientation=orientation), np.uint8)
     with_tag = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)  # OpenCV obeys the tag
     assert with_tag.shape == pixels.shape
-    assert np.abs(with_tag.astype(int) - pixels).max() < 6
+    assert np.abs(with_tag.astype(int) - pixels).max() <= 2  # levels that a jpg takes from a ramp
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])

@@ -65,6 +65,9 @@ def offset_widths(rough: RoughCable, picture: Picture) -> float:
     return float(distance.max() / (DIAMETER * SCALE))
 
 
+LESS_THAN_A_CELL = 0.1
+"""Widths; a cell of the reduced photo is an eighth of the width."""
+
 LOOKS: dict[str, dict[str, object]] = {
     "black on grey": {},
     "white on black": {"cable": strand((0.9,) * 3), "ground": Ground(colour=(0.12,) * 3)},
@@ -113,12 +116,14 @@ def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
     seen = np.hypot(*np.diff(rough.path_px[first : last + 1], axis=0).T).sum() / (LENGTH * SCALE)
     # Without knowing of covers, one of the ground's grey may pass for ground or its dark screw for cable.
     most = 1.01 * (1 - covered) if cable is KNOWN else 1.01
-    assert 0.97 * (1 - covered) < seen < most
-    assert rough.half_width_px == pytest.approx(0.5 * DIAMETER * SCALE, rel=0.3)
+    assert 0.97 * (1 - covered) < seen < most  # half a width at each end is 2.7 %
+    # shadow and gloss move the border of a mask by a tenth of the width
+    assert rough.half_width_px == pytest.approx(0.5 * DIAMETER * SCALE, rel=0.15)
     if cable is KNOWN:
         assert rough.left.kind == rough.right.kind == "cover"
-        assert np.hypot(*np.subtract(rough.left.center_px, picture.left_px)) < 0.5
-        assert np.hypot(*np.subtract(rough.right.center_px, picture.right_px)) < 0.5
+        # a tenth of a pixel, 0.02 mm, as every cover is to be found
+        assert np.hypot(*np.subtract(rough.left.center_px, picture.left_px)) < 0.1
+        assert np.hypot(*np.subtract(rough.right.center_px, picture.right_px)) < 0.1
 
 
 def strip_of(*corners: tuple[float, float]) -> Strip:
@@ -164,7 +169,7 @@ def test_ruler_beside_the_cable_is_no_crossing() -> None:
     assert isinstance(found, RoughCable)
     between = np.abs(found.path_px[:, 0] - 895.0) < 500.0  # without the covers, which nothing says are there
     assert cKDTree(bow).query(found.path_px[between])[0].max() < 8.0  # a quarter of the width
-    assert np.ptp(found.path_px[between, 0]) > 990.0
+    assert np.ptp(found.path_px[between, 0]) > 990.0  # all of it, but for the spacing of the points
 
 
 @pytest.mark.parametrize("azimuth", [-1.3, 1.7])
@@ -178,7 +183,7 @@ def test_cable_is_found_in_the_band_that_it_makes_with_a_hard_shadow(azimuth: fl
     true = np.column_stack([picture.u_px, picture.v_px])
     distance, nearest = cKDTree(true).query(rough.path_px)
     beside = (nearest > 0) & (nearest < len(true) - 1)  # the ends stick out, the truth stops at the axes
-    assert beside.mean() > 0.8
+    assert beside.mean() > 0.8  # a sixth of the path sticks out
     assert distance[beside].max() < 0.25 * 26.0
 
 
@@ -200,11 +205,11 @@ def test_camera_may_be_turned_and_mirrored(roll: float, mirrored: bool) -> None:
     camera = replace(camera, width=CAMERA.height, height=CAMERA.width) if upright else camera
     rough, picture = find(scene(camera=camera))
     assert isinstance(rough, RoughCable), rough.reason
-    assert offset_widths(rough, picture) < 0.1
+    assert offset_widths(rough, picture) < LESS_THAN_A_CELL
     left, right = np.array(rough.left.center_px), np.array(rough.right.center_px)
     assert (right - left)[1 if upright else 0] > 0
     assert np.hypot(*(rough.path_px[0] - left)) < 1e-6
-    assert np.hypot(*(rough.path_px[-1] - right)) < 1.0
+    assert np.hypot(*(rough.path_px[-1] - right)) < 1e-6
 
 
 def test_figures_of_the_photo_are_true() -> None:
@@ -212,11 +217,12 @@ def test_figures_of_the_photo_are_true() -> None:
     for noise, blur in ((0.01, 0.8), (0.03, 1.5)):
         rough, _ = find(scene(cable=flat, sensor=Sensor(noise=noise, blur_px=blur), light=Light(ambient=1.0)))
         assert isinstance(rough, RoughCable)
-        assert rough.noise == pytest.approx(noise, rel=0.1)
+        assert rough.noise == pytest.approx(noise, rel=0.1)  # it decides whether contrast suffices: a tenth does
         assert rough.dark
         # ambient light leaves a matt cylinder at its full colour in the middle and half of it at the flanks
         assert 0.75 - 0.17 <= rough.contrast <= 0.75 - 0.5 * 0.17
-        assert rough.blur_px == pytest.approx(blur, rel=0.35)
+        # the boxes of the pixel and of the interpolation add 1/12 and 1/6 px^2; a wide spread reads a tenth low
+        assert rough.blur_px == pytest.approx(np.sqrt(blur**2 + 1.0 / 12.0 + 1.0 / 6.0), rel=0.1)
 
 
 def test_window_is_the_photo_along_the_cable() -> None:
@@ -236,7 +242,7 @@ def test_neighbour_photo_narrows_the_search_and_changes_nothing() -> None:
     alone = find_cable(photo_of(picture), SETTINGS, cable=KNOWN)
     helped = find_cable(photo_of(picture), SETTINGS, cable=KNOWN, near=first)
     assert isinstance(alone, RoughCable) and isinstance(helped, RoughCable)
-    assert np.abs(np.subtract(alone.left.center_px, helped.left.center_px)).max() < 0.05
+    assert np.abs(np.subtract(alone.left.center_px, helped.left.center_px)).max() < 1e-9  # by the same pixels
     # a neighbour that misleads costs time, not the photo
     astray = replace(first, path_px=first.path_px * 0.2)
     assert isinstance(find_cable(photo_of(picture), SETTINGS, cable=KNOWN, near=astray), RoughCable)
@@ -248,7 +254,7 @@ def test_free_ends_are_the_axes_where_nothing_covers_them() -> None:
     for bearing, true in ((rough.left, picture.left_px), (rough.right, picture.right_px)):
         assert bearing.kind == "end"
         assert np.hypot(*np.subtract(bearing.center_px, true)) < 3.0 * bearing.std_px
-        assert bearing.std_px < 0.05 * DIAMETER * SCALE
+        assert bearing.std_px < 0.05 * DIAMETER * SCALE  # a square cut is centred to a twentieth of the width
 
 
 def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
@@ -258,7 +264,7 @@ def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
     rough = find_cable(photo_of(picture), SETTINGS, cable=Cable(DIAMETER * SCALE, LENGTH * SCALE, hints))
     assert isinstance(rough, RoughCable)
     assert rough.path_px[0] == pytest.approx(picture.left_px)
-    assert offset_widths(rough, picture) < 0.1
+    assert offset_widths(rough, picture) < LESS_THAN_A_CELL
 
 
 SECOND = Strand(CURVE, DIAMETER, place_m=(0.0, 0.022))

@@ -31,8 +31,9 @@ def traced(tmp_path, monkeypatch):
 
 def test_a_cable_pushed_against_its_natural_bow_has_a_negative_pre_curvature(traced):
     rest, *loaded = traced.photos
+    # 0.3 % of the largest curvature, what 5 px/mm leave inside
     assert np.median(rest.shape.kappa) == pytest.approx(-1.0, abs=0.02)
-    assert np.max(loaded[-1].shape.kappa) == pytest.approx(7.0, rel=0.01)
+    assert np.max(loaded[-1].shape.kappa) == pytest.approx(7.0, abs=0.02)
     assert len({line.side for line in traced.photos}) == 1
     told = [finding for finding in traced.findings if finding.code == "photo/other-side"]
     assert len(told) == 1

@@ -31,9 +31,9 @@ def test_a_wrong_diameter_is_one_finding_and_every_photo_is_traced_with_the_widt
     (told,) = [finding for finding in traces.findings if finding.code == "diameter/seen"]
     assert told.level == "error" and "cable 4.6" in told.message
     assert f"diameter_mm says {1e3 * factor * STATED:.3g}" in told.message
-    assert widths(traces) == pytest.approx([STATED] * 3, rel=0.03)
+    assert widths(traces) == pytest.approx([STATED] * 3, rel=0.02)  # half a pixel of 23
     lengths = [photo.traced_length_m for photo in traces.photos]
-    assert lengths == pytest.approx([specimen.length_m] * 3, rel=2e-3)
+    assert lengths == pytest.approx([specimen.length_m] * 3, rel=3e-4)  # two axes of 0.1 px on 920 px, twice that
 
 
 def test_the_right_diameter_is_not_doubted(specimen):
