@@ -4,6 +4,7 @@
 all specimens, ``frames`` a result as pandas frames for notebooks, ``paper`` the source paper's virtual experiments.
 
 Each has `pipeline.result.Result` as its only source and measures nothing. A number is shown with its standard deviation
-or said to be exact, in the unit and with the digits a reader wants (`pipeline.units`, `pipeline.rounding`); every text
-comes from ``templates/words.toml`` in English and German.
+or said to be exact, in the unit and with the digits a reader wants (`pipeline.units`, `pipeline.rounding`). Texts of
+report and index come from ``templates/words.toml``, sentences of other rooms from ``templates/german``; the page of the
+source paper is English alone.
 """

@@ -123,7 +123,7 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
             title=words("fig_curvatures"),
             description=words("fig_curvatures_alt", top=words.curvature(max(tops))),
         )
-    if result.inverse and len(result.inverse.branches) > 1:
+    if len(figures.fitted_branches(result)) > 1:
         drawn["branches"] = drawing(
             "branches",
             lambda f: figures.draw_branches(f, result, words, settings),

@@ -139,22 +139,26 @@ def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportS
         values = [unit.factor * v for v in part.tangent_Nm2]
         label = f"{words('step')} {part.step}" if len(pointwise) <= 3 else None
         axes.plot(part.kappa_per_m, values, ls="none", marker=".", ms=3.5, color=colour, label=label)
-    parts: dict[str, Visited] = {m: c for m, c in curves(result).items() if m == "balance"}
-    for method, curve in parts.items():
-        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
-        axes.set_ylim(
-            min(0.0, float(curve.tangent.min())), POINTWISE_HEADROOM * unit.factor * float(curve.tangent.max())
-        )
+    curve = curves(result).get("balance")
+    if curve is not None:
+        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, "balance", unit, words, settings)
+        lowest, highest = (unit.factor * float(value) for value in (curve.tangent.min(), curve.tangent.max()))
+        axes.set_ylim(min(0.0, lowest), POINTWISE_HEADROOM * highest)
     return finish(
         axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )
 
 
-def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
-    """Draw f_EI fitted to loading and to unloading apart."""
-    axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
+def fitted_branches(result: Result) -> dict[str, Visited]:
+    """Visited parts of f_EI fitted to loading and to unloading apart, by the name of the branch."""
     fitted = result.inverse.branches if result.inverse else {}
-    parts = {name: part for name in fitted if (part := visited("inverse", fitted[name])) is not None}
+    return {name: part for name in fitted if (part := visited("inverse", fitted[name])) is not None}
+
+
+def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+    """Draw f_EI fitted to loading and to unloading apart; at least one of them has a visited part."""
+    axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
+    parts = fitted_branches(result)
     for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
         low, high = (unit.factor * (curve.tangent + sign * half * curve.tangent_std) for sign in (-1.0, 1.0))
         axes.fill_between(curve.kappa, low, high, color=LIGHT[colour], alpha=0.2, lw=0.0)
