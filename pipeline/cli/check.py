@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pipeline.cli.options import settings_options
 from pipeline.cli.run import found, nothing_found
 from pipeline.errors import InputError
+
+if TYPE_CHECKING:
+    from pipeline.settings import IntakeSettings
 
 
 @click.command(short_help="What would run and what is wrong.")
@@ -42,7 +45,7 @@ def check(
     ctx.exit(3 if failed == len(rows) else 1 if failed or refused else 0)
 
 
-def checked(folder: Path, settings: Any) -> dict[str, Any]:
+def checked(folder: Path, settings: IntakeSettings) -> dict[str, Any]:
     """What a run would find in one folder."""
     from pipeline.intake.folder import read_specimen
 

@@ -46,11 +46,10 @@ def compare(
     settings = read_settings(settings_file, assignments)
     comparison = compared(read_result(a), read_result(b), settings=settings.compare)
     if out is not None:
-        from pipeline.report.files import write_atomic
         from pipeline.report.frames import comparison_frame
-        from pipeline.report.tables import csv_text
+        from pipeline.report.tables import write_csv
 
-        write_atomic(out, csv_text(comparison_frame(comparison)))
+        write_csv(comparison_frame(comparison), out)
     if as_json:
         click.echo(json.dumps(as_document(comparison), indent=1))
     else:

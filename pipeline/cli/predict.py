@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import POSITIVE, settings_options
 
 if TYPE_CHECKING:
     from pipeline.predict import Prediction
@@ -30,7 +30,7 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
     "--displacement-mm", "displacements_mm", required=True, multiple=True, callback=millimetres,
     metavar="MM[,MM...]", help="Displacement of each step; repeatable.",
 )  # fmt: skip
-@click.option("--length-mm", type=click.FloatRange(min=0, min_open=True), help="Cable length; that of the specimen.")
+@click.option("--length-mm", type=POSITIVE, help="Cable length; that of the specimen.")
 @click.option(
     "--zero", default="natural", show_default=True, type=click.Choice(["natural", "length"]),
     help="Displacement is counted from the mounted, force-free cable, or from the chord that equals the length.",
@@ -83,11 +83,10 @@ def predict(
         click.echo(f"cablebend: {measured.specimen.id} holds no characteristic to predict with", err=True)
         ctx.exit(MISSING)
     if out is not None:
-        from pipeline.report.files import write_atomic
         from pipeline.report.frames import prediction_frame
-        from pipeline.report.tables import csv_text
+        from pipeline.report.tables import write_csv
 
-        write_atomic(out, csv_text(prediction_frame(prediction)))
+        write_csv(prediction_frame(prediction), out)
     if as_json:
         from dataclasses import asdict
 
@@ -113,8 +112,8 @@ def echo_prediction(prediction: Prediction) -> None:
         if step.force_N is None:
             click.echo(f"{shown}{step.status}: {step.reason}")
             continue
-        middle = max(range(len(step.y_m)), key=lambda i: step.y_m[i])
-        rise = rounded(1e3 * step.y_m[middle], 1e3 * step.y_std_m[middle])
+        top = max(range(len(step.y_m)), key=lambda i: step.y_m[i])
+        rise = rounded(1e3 * step.y_m[top], 1e3 * step.y_std_m[top])
         bend = rounded(step.kappa_max_per_m, max(step.kappa_std_per_m))
         note = f"  {step.status}: {step.reason}" if step.reason else ""
         click.echo(f"{shown}P {rounded(step.force_N, step.force_std_N)} N, rise {rise} mm, kappa to {bend} 1/m{note}")

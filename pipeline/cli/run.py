@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import chosen_language, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_language, language_option, settings_options
 from pipeline.errors import InputError
 
 if TYPE_CHECKING:
-    from pipeline.batch import Tally
+    from pipeline.batch import Store, Tally
+    from pipeline.settings import IntakeSettings
 
 
 @click.command(short_help="Measure specimens and write their reports.")
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 )
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
-@click.option("--timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Limit per specimen.")
+@click.option("--timeout", type=POSITIVE, metavar="SECONDS", help="Limit per specimen.")
 @click.option(
     "--no-reports", is_flag=True, help="Leave report.html and report.pdf out; the same command without this draws them."
 )
@@ -72,7 +73,7 @@ def run(
     ctx.exit(exit_code(tally, len(refused)))
 
 
-def found(folders: tuple[Path, ...], settings: Any) -> tuple[list[Path], list[InputError]]:
+def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
     from pipeline.intake.folder import find_specimens, find_undescribed, misnamed
@@ -110,7 +111,7 @@ def exit_code(tally: Tally, refused: int = 0) -> int:
     return 1 if tally.failed or refused or tally.trouble else 0
 
 
-def stored_entries(store: Any, tally: Tally) -> Iterator[dict[str, Any]]:
+def stored_entries(store: Store, tally: Tally) -> Iterator[dict[str, Any]]:
     """What became of each specimen of this run, in the order of the folders; read one at a time."""
     for name in tally.names:
         entry = tally.unstored.get(name) or store.entry(name)

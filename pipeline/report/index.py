@@ -18,11 +18,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.intake.photos import natural_key
 from pipeline.report.document import asset, environment, palette_css, write_report
 from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
 from pipeline.report.repeats import repeats
-from pipeline.report.tables import csv_text
+from pipeline.report.tables import write_csv
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, from_json
 from pipeline.settings import ReportSettings
@@ -116,18 +117,12 @@ def _shapes(result: Result) -> str:
 def read_results(folder: Path) -> Iterator[tuple[Result, str]]:
     """Results below a folder one by one, each with its folder relative to it; an unreadable one counts as failed."""
     names = (path.parent.relative_to(folder).as_posix() for path in folder.glob("*/**/result.json"))
-    for name in sorted((name for name in names if not re.search(r"(^|/)\.", name)), key=natural):
+    for name in sorted((name for name in names if not re.search(r"(^|/)\.", name)), key=natural_key):
         path = folder / name / "result.json"
         try:
             yield from_json(path.read_text(encoding="utf-8")), name
         except (ValueError, OSError) as error:
             yield unreadable(path, name, error), name
-
-
-def natural(name: str) -> list[tuple[int, int, str]]:
-    """Order of names as people count: cable-2 before cable-10."""
-    parts = re.findall(r"\d+|\D+", name)
-    return [(0, int(part), "") if part.isdecimal() else (1, 0, part.casefold()) for part in parts]
 
 
 def unreadable(path: Path, name: str, error: Exception) -> Result:
@@ -162,7 +157,7 @@ def write_index(
     pairs = read_results(Path(results)) if isinstance(results, str | Path) else ((r, r.specimen.id) for r in results)
     rows = [index_row(result, _report(result, folder, out, settings), settings) for result, folder in pairs]
     page = write_atomic(out / "index.html", index_html(rows, settings))
-    return page, write_atomic(out / "summary.csv", csv_text(summary_frame(rows)))
+    return page, write_csv(summary_frame(rows), out / "summary.csv")
 
 
 def _report(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:

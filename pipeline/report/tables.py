@@ -41,7 +41,12 @@ def write_tables(result: Result, folder: Path, settings: ReportSettings | None =
         "moment_curve.csv": moment_frame(result),
         "simulation.csv": simulation_frame(result, bounds),
     }
-    return tuple(write_atomic(Path(folder) / name, csv_text(frame)) for name, frame in frames.items())
+    return tuple(write_csv(frame, Path(folder) / name) for name, frame in frames.items())
+
+
+def write_csv(frame: pd.DataFrame, path: Path) -> Path:
+    """Write a table, at once or not at all."""
+    return write_atomic(path, csv_text(frame))
 
 
 def csv_text(frame: pd.DataFrame) -> str:
