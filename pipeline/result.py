@@ -199,7 +199,9 @@ class CauseForm(Part):
     amount: float = Field(description="in the cause's unit")
     std: float
     at: float = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
-    width: float = Field(0.0, description="of a spot, in shares of the length")
+    width: float = Field(
+        0.0, description="of a spot, in shares of the length; of what a steep camera foreshortens its distance, m"
+    )
     tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
     factor: list[Floats] = Field(
         [],

@@ -1,4 +1,4 @@
-"""Times as clocks write them -> seconds: ``12:03:04,5``, ``21.11.2026 08:01:02``, ISO dates with or without a zone.
+"""Times as clocks write them -> seconds: ``12:03:04,5``, ``21.11.26 08:01:02``, ISO dates with or without a zone.
 
 Only differences count. Stamps with a zone are compared in UTC, so a log goes on through the end of summer time; times
 of the day without a date go on through midnight.
@@ -14,8 +14,10 @@ import numpy as np
 from pipeline.records import Array
 
 CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)", re.ASCII)
-GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T]+(\d{1,2}:\d{1,2}(?::\d{1,2})?)(?:[.,](\d+))?", re.ASCII)
-ISO_DATE = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d.*", re.ASCII)
+GERMAN_DATE = re.compile(
+    r"(\d{1,2})\.(\d{1,2})\.((?:20)?\d\d)[ T]+(\d{1,2}:\d{1,2}(?::\d{1,2})?)(?:[.,](\d+))?", re.ASCII
+)
+ISO_DATE = re.compile(r"(\d{4})[-/](\d\d)[-/](\d\d)([ T]\d\d:\d\d.*)", re.ASCII)
 DAY_S = 86400.0
 
 
@@ -24,8 +26,11 @@ def clock_s(cell: str) -> float | None:
     if found := CLOCK.fullmatch(cell):
         return 3600.0 * float(found[1] or 0) + 60.0 * float(found[2]) + float(found[3].replace(",", "."))
     if found := GERMAN_DATE.fullmatch(cell):
-        cell = f"{found[3]}-{found[2]:0>2}-{found[1]:0>2} {found[4]:0>5}" + (f".{found[5][:6]:0<6}" if found[5] else "")
-    elif not ISO_DATE.fullmatch(cell):
+        year, part = f"20{found[3][-2:]}", found[5]
+        cell = f"{year}-{found[2]:0>2}-{found[1]:0>2} {found[4]:0>5}" + (f".{part[:6]:0<6}" if part else "")
+    elif found := ISO_DATE.fullmatch(cell):
+        cell = "-".join(found.groups()[:3]) + found[4]
+    else:
         return None
     try:
         stamp = dt.datetime.fromisoformat(cell)

@@ -34,6 +34,21 @@ NAMES = {
     "image": "image|image file|picture|photo|file|filename|frame|bild|bilddatei|bildname|foto|datei|dateiname|aufnahme",
 }
 ROLE_OF = {name: role for role, names in NAMES.items() for name in names.split("|")}
+# Names of units as they are spelled out, in small letters.
+SPELLED = {"newton": "N", "newtons": "N", "millinewton": "mN", "kilonewton": "kN", "meter": "m", "metre": "m"} | {
+    word: unit
+    for unit, words in {
+        "mm": "millimeter|millimeters|millimetre|millimetres",
+        "s": "sekunde|sekunden|second|seconds|secs",
+        "ms": "millisekunden|milliseconds",
+        "min": "minuten|minutes",
+        "h": "stunden|hours",
+    }.items()
+    for word in words.split("|")
+}
+TEMPERATURES = ("°c", "degc", "c", "k", "°f", "grad c", "deg c")
+# A symbol behind the name, as in "Kraft F", "Verschiebung ux", and what was measured beside what was asked for
+SYMBOL = re.compile(r"(?P<base>.*\S)\s+(?:[A-Za-z][A-Za-z]?|[A-Za-z]_\w|[Ii]st|[Aa]ctual)")
 UNIT_IN_NAME = re.compile(
     r"(?P<base>.*?\S)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|(?:/|\bin\b)\s*(?P<behind>[^\s/]+))\s*"
 )
@@ -93,16 +108,23 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
                 best = found, row, separator
     if best is None:
         rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
-        raise InputError(
-            f"no line names a force column and a displacement column (first line: {column_names(rows)})",
-            path=path,
-            line=rows[0][0],
-            code="log/no-header",
-            remedy='name the columns in [force_log] of specimen.toml: columns = {force = "...", displacement = "..."}',
-        )
+        raise _no_header(rows, path)
     _, row, separator = best
     rows = cells(text, separator)
     return _columns(rows, row, separator, spec, path), rows
+
+
+def _no_header(rows: list[Row], path: Path) -> InputError:
+    """The error for a log without known names; its columns may stand apart by what is no separator here."""
+    apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
+    named = 'name the columns in [force_log] of specimen.toml: columns = {force = "...", displacement = "..."}'
+    return InputError(
+        f"no line names a force column and a displacement column (first line: {column_names(rows)})",
+        path=path,
+        line=rows[0][0],
+        code="log/no-header",
+        remedy="export the table with semicolons, commas or tabs between its columns" if apart else named,
+    )
 
 
 def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
@@ -111,7 +133,11 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
     Columns given by number are for logs without a header: there the first row with numbers at these places is found.
     """
     found: dict[str, list[int]] = {}
-    bases = [ROLE_OF.get(_plain(cell)) or ROLE_OF.get(_plain(_split_unit(cell)[0])) for cell in header]
+    bases = [_role(cell) for cell in header]
+    bases = [
+        base or (role if role not in bases else None)
+        for base, role in zip(bases, map(_role_beside_symbol, header), strict=True)
+    ]
     for role in ROLES:
         if role in spec.columns:
             wanted = spec.columns[role]
@@ -125,6 +151,21 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
         if places:
             found[role] = places
     return found if {"force", "displacement"} & found.keys() else {}
+
+
+def _role(cell: str) -> str | None:
+    """Role of a header cell by its name; a T in degrees is no time, and an s in mm is a way."""
+    name, unit = _split_unit(cell)
+    if name == "s" and unit in UNITS["displacement"]:
+        return "displacement"
+    role = ROLE_OF.get(_plain(cell)) or ROLE_OF.get(_plain(name))
+    return None if role == "time" and unit.casefold() in TEMPERATURES else role
+
+
+def _role_beside_symbol(cell: str) -> str | None:
+    """Role of a header cell whose name has a symbol of one or two letters behind it."""
+    found = SYMBOL.fullmatch(_split_unit(cell)[0])
+    return ROLE_OF.get(_plain(found["base"])) if found else None
 
 
 def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Path) -> Columns:
@@ -177,7 +218,9 @@ def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Pat
 
 def _factor(role: str, unit: str, path: Path, line: int) -> float:
     """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC)."""
-    unit = (unit or ASSUMED[role]).replace("μ", "µ")  # Greek mu and the micro sign look the same
+    unit = SPELLED.get(unit.casefold(), unit or ASSUMED[role]).replace(
+        "μ", "µ"
+    )  # Greek mu and the micro sign look the same
     known = UNITS[role]
     if unit in known:
         return known[unit]

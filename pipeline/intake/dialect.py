@@ -21,6 +21,13 @@ Row = tuple[int, list[str]]  # line number from 1, cells
 
 SEPARATORS = ("\t", ";", ",")
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+OTHER_FILES = {
+    b"PK\x03\x04": "an Excel workbook",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook",
+    b"%PDF": "a PDF document",
+}
+"""First bytes of what is renamed to a table most often."""
+
 POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 PLAIN = {".": re.compile(r"[+-]?\d+(?:\.\d+)?", re.ASCII), ",": re.compile(r"[+-]?\d+(?:,\d+)?", re.ASCII)}
@@ -44,12 +51,21 @@ def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str
     InputError
         ``log/encoding`` if the bytes are no text.
     """
+    for begin, kind in OTHER_FILES.items():
+        if data.startswith(begin):
+            raise InputError(
+                f"is {kind}, whatever its name says",
+                path=path,
+                code="log/encoding",
+                remedy="open it and save the table as CSV text",
+            )
     name = encoding or _guess(data)
     try:
         text = data.decode(name)
     except UnicodeDecodeError as error:
         raise _no_text(path) from error
-    text = text.removeprefix("\ufeff")
+    # some programs fill their last block up, or end a text as CP/M did
+    text = text.removeprefix("\ufeff").rstrip("\0\x1a")
     if "\0" in text:
         raise _no_text(path)
     return text.replace("\r\n", "\n").replace("\r", "\n"), name

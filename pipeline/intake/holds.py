@@ -61,7 +61,7 @@ def load_steps(
     """
     name = path.name
     travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
-    mounted = None if samples.branches is None else np.array([branch == "mounted" for branch in samples.branches])
+    mounted = _mounted(samples, settings.same_displacement_relative * travel, settings)
     displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
     displacements, turned = signed_displacements(displacements, name)
     tolerance = settings.same_displacement_relative * travel
@@ -119,6 +119,17 @@ def load_steps(
         *within,
         *order,
     )
+
+
+def _mounted(samples: Samples, tolerance: float, settings: IntakeSettings) -> NDArray[np.bool_]:
+    """Rows (n,) of the mounted cable: as the log calls them, else a first hold without force."""
+    if samples.branches is not None:
+        return np.array([branch == "mounted" for branch in samples.branches])
+    away = np.abs(samples.displacements - samples.displacements[0]) > tolerance
+    first = np.logical_and.accumulate(~away)
+    middle = abs(float(np.median(samples.forces[first])))
+    free = middle <= settings.zero_force_relative * float(np.max(np.abs(samples.forces)))
+    return np.asarray(first & free)
 
 
 def _runs(

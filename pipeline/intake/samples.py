@@ -7,6 +7,7 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +28,12 @@ BRANCHES: dict[Branch, str] = {
     "loading": "loading|load|up|forward|push|belastung|belasten|laden|hin|auf|hub",
     "unloading": "unloading|unload|down|backward|back|return|entlastung|entlasten|zurück|rück|ab",
 }
+SUMMARY = re.compile(
+    r"(mean|mittel(wert)?|average|avg|median|min(imum)?|max(imum)?|sum(me)?|total|gesamt|std|st\.?\s?dev|stddev|"
+    r"standardabw(eichung|\.)?|stabw|spannweite|range|count|anzahl)\b.{0,40}",
+    re.IGNORECASE,
+)
+"""First word of a row below the table, in a cell of its own."""
 BRANCH_OF: dict[str, Branch] = {word: branch for branch, words in BRANCHES.items() for word in words.split("|")}
 
 
@@ -86,7 +93,8 @@ def read_samples(
     InputError
         ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``.
     """
-    data, summary = _without_summary(rows[columns.first_row :], columns)
+    again = {tuple(cells) for _, cells in rows[: columns.first_row] if len(cells) >= columns.width}
+    data, summary = _without_summary([row for row in rows[columns.first_row :] if tuple(row[1]) not in again], columns)
     lines = [line for line, _ in data]
     _check_widths(data, columns, path)
     table = {role: [_cell(cells, place) for _, cells in data] for role, place in columns.index.items()}
@@ -126,12 +134,25 @@ def read_samples(
 
 
 def _without_summary(data: Sequence[Row], columns: Columns) -> tuple[Sequence[Row], Sequence[Row]]:
-    """Rows of samples, and rows at the end that are none: a mean or a remark below a table that is full above it."""
+    """Rows of samples, and rows at the end that are none: a mean or a remark below a table that is full above it.
+
+    Without a displacement where all rows above have one, or with the name of a mean where they have a number.
+    """
+    labels = [_is_summary(cells, columns) for _, cells in data]
+    named = next((row for row in range(len(data)) if all(labels[row:])), len(data))
+    if 0 < named < len(data):
+        below, summary = _without_summary(data[:named], columns)
+        return below, [*summary, *data[named:]]
     own = [not is_missing(_cell(cells, columns.index["displacement"])) for _, cells in data]
     end = max((row + 1 for row, there in enumerate(own) if there), default=0)
     # a displacement that stands only in the first row of each hold is missing above, too
     whole = all(own[:end]) and 2 * end > len(data)
     return (data[:end], data[end:]) if whole else (data, [])
+
+
+def _is_summary(cells: list[str], columns: Columns) -> bool:
+    """Whether a row is called a mean, a sum or the like; a photo may have any name."""
+    return any(SUMMARY.fullmatch(cell) for place, cell in enumerate(cells) if place != columns.index.get("image"))
 
 
 def _losses(
@@ -140,7 +161,7 @@ def _losses(
     """Rows that are no samples, rows without a force, and displacements carried down."""
     findings = []
     if summary:
-        message = f"the last {len(summary)} rows have no displacement, unlike all above: no samples, left out"
+        message = f"the last {len(summary)} rows are a summary or a remark, no samples, and were left out"
         findings.append(doubtful("log/summary", f"{name}, line {summary[0][0]}: {message}"))
     empty = [row for row, cell in enumerate(force) if is_missing(cell)]
     if empty:

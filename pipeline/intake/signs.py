@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.specimenfile import LogSpec
@@ -20,19 +21,19 @@ BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most o
 
 
 def from_mounted(
-    displacements: Array, mounted: Array | None, name: str, *, travel: float
+    displacements: Array, mounted: NDArray[np.bool_], name: str, *, travel: float
 ) -> tuple[Array, list[Finding]]:
     """Displacements counted from the mounted cable where the log counts from the end of a machine's own way.
 
     Parameters
     ----------
     displacements : (n,) m
-    mounted : (n,) bool, or None
-        Rows that are said to be of the mounted cable; None where the log names no branches.
+    mounted : (n,) bool
+        Rows of the mounted cable.
     travel : m
         Between the smallest and the largest. A zero that is off by more is no error of the zero.
     """
-    if mounted is None or not mounted.any():
+    if not mounted.any():
         return displacements, []
     zero = float(np.median(displacements[mounted]))
     if abs(zero) <= travel:

@@ -68,6 +68,17 @@ VARIANTS = {
         f"{row},{extra}" for row, extra in zip(PLAIN.splitlines(), ["Temperature [C]", *"abcdef"], strict=True)
     ),
     "step texts": PLAIN.replace("\n0,", "\nStufe 0,").replace("\n1,", "\nStufe 1,").replace("\n2,", "\nStufe 2,"),
+    "header again before every hold": PLAIN.replace("\n1,l", "\n" + PLAIN.splitlines()[0] + "\n1,l", 1),
+    "symbols behind the names": PLAIN.replace("time_s,displacement_mm,force_N", "Zeit t [s],Weg s [mm],Kraft Fx [N]"),
+    "symbols alone": PLAIN.replace("time_s,displacement_mm,force_N", "t [s],s [mm],F [N]"),
+    "temperature": PLAIN.replace("time_s,", "T [°C],t / s,").replace("d,", "d,23.5,").replace("g,", "g,23.5,"),
+    "asked for and measured": PLAIN.replace("time_s,displacement_mm", "Weg Soll [mm],time_s,Weg Ist [mm]")
+    .replace("d,", "d,4.0,")
+    .replace("g,", "g,4.0,"),
+    "spelled out": PLAIN.replace("time_s,displacement_mm,force_N", "Zeit [Sekunden],Weg [Millimeter],Kraft (newton)"),
+    "filled up with zeros": PLAIN.encode() + bytes(600),
+    "end of file as in DOS": PLAIN + "\x1a",
+    "Unicode text of Excel": b"\xff\xfe" + GERMAN.replace(";", "\t").encode("utf-16-le"),
     "surplus separators": PLAIN.replace("\n", ",,\n"),
 }
 
@@ -169,13 +180,15 @@ def test_clock_times_and_epochs_count_from_the_first_row(tmp_path):
     clock = ["12:00:01", "12:00:05", "12:01:01", "12:01:05", "12:02:01", "12:02:05"]
     dated = [f"2026-11-21 {time}" for time in clock]
     german = [f"21.11.2026 {time}" for time in clock]
+    short = [f"21.11.26 {time}" for time in clock]
+    slashes = [f"2026/11/21 {time}" for time in clock]
     epoch = [f"{1.8e9 + float(time):.1f}" for time in times]
     midnight = ["23:58:01", "23:58:05", "23:59:01", "23:59:05", "00:00:01", "00:00:05"]
     winter = [  # summer time ends between the first and the second step
         *("2026-10-25T02:59:01+02:00", "2026-10-25T02:59:05+02:00", "2026-10-25T02:00:01+01:00"),
         *("2026-10-25T02:00:05+01:00", "2026-10-25T01:01:01Z", "2026-10-25T01:01:05Z"),
     ]
-    for written in (clock, dated, german, epoch, midnight, winter):
+    for written in (clock, dated, german, short, slashes, epoch, midnight, winter):
         text = PLAIN
         for old, new in zip(times, written, strict=True):
             text = text.replace(f",{old},", f",{new},", 1)
@@ -202,6 +215,50 @@ def test_rows_of_a_summary_are_no_samples(tmp_path):
     assert [step.force_N for step in log.steps] == [step.force_N for step in plain.steps]
     assert log.steps[2].photo_time_s == plain.steps[2].photo_time_s
     assert [finding.code for finding in log.findings] == ["log/summary"]
+
+
+@pytest.mark.parametrize(
+    "below",
+    [
+        "Mittelwert,,,2.2,1.5,\nMax,,,4.5,1102.9,\n",
+        "Summe,,377.0,13.5,2210.4,\n",
+        "\n,,Standardabw.,0.1,0.2,\nStd,,,1,2,\n",
+    ],
+)
+def test_a_summary_with_numbers_is_none_either(below, tmp_path):
+    plain, log = read(PLAIN, tmp_path), read(PLAIN + below, tmp_path)
+    assert [step.force_N for step in log.steps] == [step.force_N for step in plain.steps]
+    assert log.steps[2].photo_time_s == plain.steps[2].photo_time_s
+    assert [finding.code for finding in log.findings] == ["log/summary"]
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_a_machine_that_counts_its_own_way_begins_where_there_is_no_force(towards, tmp_path):
+    """Its position at the mounted cable is none of the cable's: 312.45 mm stood for a displacement."""
+    rows = [(0.0, 0.001), (4.0, 2.3), (8.0, 2.9), (4.0, 2.1)]
+    text = "Weg;Kraft\n" + "".join(
+        f"{312.45 + towards * d:.2f};{f + e:.3f}\n" for d, f in rows for e in (0.0, 0.002, -0.001)
+    )
+    log = read(text.replace(".", ","), tmp_path)
+    np.testing.assert_allclose([step.displacement_m for step in log.steps], [0.0, 4e-3, 8e-3, 4e-3], atol=1e-9)
+    assert [step.branch for step in log.steps] == ["mounted", "loading", "loading", "unloading"]
+    assert "log/displacement-zero" in [finding.code for finding in log.findings]
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "told"),
+    [
+        (b"PK\x03\x04" + bytes(200), "log/encoding", "is an Excel workbook"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(200), "log/encoding", "is an Excel workbook"),
+        (b"%PDF-1.7\n1 0 obj", "log/encoding", "is a PDF document"),
+        ("t/s   Weg/mm   Kraft/N\n0.5   1.5   2.5\n", "log/no-header", "semicolons, commas or tabs"),
+        ("Weg [mm]|Kraft [N]\n1.5|2.5\n", "log/no-header", "semicolons, commas or tabs"),
+    ],
+)
+def test_what_is_no_table_is_called_by_its_name(content, code, told, tmp_path):
+    with pytest.raises(InputError) as refused:
+        read(content, tmp_path)
+    assert refused.value.code == code and told in refused.value.sentence
 
 
 def test_displacement_in_the_first_row_of_each_hold_is_no_summary(tmp_path):
