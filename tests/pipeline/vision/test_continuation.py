@@ -19,6 +19,8 @@ from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
 from tests.pipeline.vision.bow_scene import DIAMETER, LENGTH, bow
 
+LEAST_SCORE = 0.45
+"""Standard deviations, rms: a band twice as wide as its errors leaves room for cables that go on otherwise."""
 PARALLAX = 0.003  # covers 3 mm above the plane, a metre from the camera
 SETTINGS, HIDDEN, ERROR, COUNT = CurveSettings(), 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
 
@@ -94,11 +96,13 @@ def test_bow_of_a_straight_law_goes_on_as_one():
     # 0.34 and 0.13 1/m; as above
     assert _rms(errors) < 0.6 * alone
     assert np.mean(np.abs(errors) < 1.96 * std) > 0.85
+    assert _rms(errors / std) > LEAST_SCORE
 
 
 def test_band_covers_the_truth_when_covers_are_seen_too_far_apart(cases):
     for off in ({}, {"apart": 3e-4}, {"beside": 1e-4}, {"beside": -1e-4, "apart": 3e-4}):
         off_by = np.array([np.abs(e) / std for e, std in (_errors(case, **off) for case in cases)])
+        assert _rms(off_by) > LEAST_SCORE, off
         assert np.mean(off_by < 1.96) > 0.85, off  # 24 ends: two of a true 95 % band fall outside once in three times
 
 

@@ -314,13 +314,16 @@ def test_wrong_diameter_is_refused_with_both_widths() -> None:
     wrong = replace(KNOWN, diameter_px=1.9 * DIAMETER * SCALE)
     outcome, _ = find(scene(), wrong)
     assert isinstance(outcome, Rejected)
-    assert outcome.code in ("photo/width", "photo/contrast")
+    assert outcome.code == "photo/width"
+    # to a cell of the reduced photo, of which eight are to lie across the diameter that was given
+    assert outcome.figure["width_px"] / outcome.figure["diameter_px"] == pytest.approx(1.0 / 1.9, abs=1.0 / 8.0)
 
 
 def test_empty_table_is_refused() -> None:
     empty = Photo("a.png", np.full((400, 600), 180, np.uint8), 8)
     outcome = find_cable(empty, SETTINGS, cable=KNOWN)
     assert isinstance(outcome, Rejected)
+    assert outcome.code == "photo/blank"
 
 
 def test_cable_that_lies_on_itself_is_refused() -> None:
