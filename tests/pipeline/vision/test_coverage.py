@@ -7,6 +7,8 @@ A second renderer tells whether that holds on photos that nothing was fitted to.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,10 +65,12 @@ def test_band_of_kappa_covers_the_truth(make):
     assert np.quantile(worst, 0.95) < 4.0
 
 
-def measured_on_second_renderer(seed: int):
-    """Errors on a photo of the second renderer, from a path led astray as the first one's is."""
+def measured_on_second_renderer(seed: int, *, bright: bool = False, stated_m: float = DIAMETER):
+    """Centerline on a photo of the second renderer and its errors, from a path led astray as the first one's is."""
     rng = np.random.default_rng([31, seed])
     look = random_look(rng)
+    if bright:
+        look = replace(look, sheath=rng.uniform(0.5, 0.8, 3), ground=rng.uniform(0.04, 0.12, 3), shadow=0.3)
     picture = photograph(bow(rng), look, DIAMETER, rng)
     scale = 2.0 * look.radius / DIAMETER
     path = led_astray(picture, rng, spacing=0.5 * look.radius, amount=0.06 * look.radius)
@@ -84,20 +88,33 @@ def measured_on_second_renderer(seed: int):
         half_width_px=1.05 * look.radius,
         grey=closeup.grey,
         origin_px=closeup.origin_px,
-        dark=True,
+        dark=not bright,
         contrast=0.5,
         noise=closeup.noise,
         blur_px=closeup.blur_px,
     )
-    found = measure_centerline(rough, plane=PlaneMap.from_scale(scale), diameter_m=DIAMETER, settings=VisionSettings())
+    found = measure_centerline(rough, plane=PlaneMap.from_scale(scale), diameter_m=stated_m, settings=VisionSettings())
     assert isinstance(found, Centerline), found
-    return errors(picture, found, scale)
+    return found, errors(picture, found, scale)
 
 
 def test_band_holds_on_photos_of_another_renderer():
     """Other shading, shadow, texture, demosaicing, tone curve, sharpening, 4 to 9 px/mm: targets of 5 px/mm."""
-    found = [measured_on_second_renderer(seed) for seed in range(SECOND)]
+    found = [measured_on_second_renderer(seed)[1] for seed in range(SECOND)]
     assert 0.90 <= np.mean([e.covered().mean() for e in found]) <= 0.99
     assert rms([e.position() for e in found]) < 0.1
     assert rms([e.interior() for e in found]) < 1.0
     assert rms([e.ends() for e in found]) < 4.0
+
+
+def test_light_is_stated_about_as_large_as_its_error_is():
+    """Bright cables, whose shading is steep, by a diameter stated 1.3 % too large: no bound of the error, but its size.
+
+    A standard deviation of four scenes is right within a factor of two (chi squared, 95 %).
+    """
+    stated, true = [], []
+    for seed in (43, 45, 46, 47):
+        line, found = measured_on_second_renderer(seed, bright=True, stated_m=1.013 * DIAMETER)
+        stated.append(line.quality["systematic_px"])
+        true.append(float(np.sqrt(np.mean(found.normal[found.seen] ** 2))))
+    assert 0.5 < rms(stated) / rms(true) < 2.0
