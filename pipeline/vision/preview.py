@@ -64,9 +64,9 @@ def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSet
 
 def _stretched(strip: NDArray[np.float32], line: Centerline, s: Array, along: Array) -> NDArray[np.uint8]:
     seen = np.interp(along, s, line.shape.seen.astype(float)) > 0.5
-    part = strip[:, seen] if seen.any() else strip
     # every eighth pixel tells the range
-    low, high = (quantile(part[::4, ::2], share) for share in (0.005, 0.995))
+    part = strip[::4, seen if seen.any() else slice(None)][:, ::2]
+    low, high = (quantile(part, share) for share in (0.005, 0.995))
     strip = (strip - np.float32(low)) * np.float32(255.0 / max(high - low, 1e-6))
     levels: NDArray[np.uint8] = np.clip(strip, 0, 255, out=strip).astype(np.uint8)
     return levels

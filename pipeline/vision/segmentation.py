@@ -60,8 +60,7 @@ def find_cable(
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness, settings):
         return found
     # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
-    strips = stand_out(photo, choose_reduction(photo.size, None, settings.segmentation), settings.segmentation)
-    widths = [2.0 * near.half_width_px] if near is not None else _widths(strips, cable.slenderness, settings)
+    widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness, settings)
     for width in widths:
         again = _find_near(photo, settings, replace(cable, diameter_px=width), near)
         if _is_slender(again, cable.slenderness, settings):
@@ -99,8 +98,9 @@ def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
     return refused(photo, "photo/width", text, seen=_slenderness(found), stated=slenderness)
 
 
-def _widths(standout: Standout, slenderness: float, settings: VisionSettings) -> list[float]:
+def _widths(photo: Photo, slenderness: float, settings: VisionSettings) -> list[float]:
     """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
+    standout = stand_out(photo, choose_reduction(photo.size, None, settings.segmentation), settings.segmentation)
     wanted = _wanted(standout, Cable(), settings.segmentation)
     for readings in read_photo(standout, wanted, settings.segmentation):
         longest = max(reading.longest for reading in readings)

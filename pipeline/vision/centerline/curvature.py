@@ -50,6 +50,11 @@ class Frame:
     integrals: Array
     penalty: Array
 
+    @cached_property
+    def turns(self) -> Array:
+        """Derivatives ``(2 G + 1, J + 1)`` of the angle on the grid by turn and coefficients."""
+        return np.column_stack([np.ones(len(self.grid)), self.integrals])
+
     @property
     def size(self) -> int:
         """Number of parameters q."""
@@ -198,21 +203,20 @@ class PlaneCurve:
         """Derivatives ``(n, J + 2)`` of the displacement along the normal at ``s`` with respect to q."""
         frame = self.frame
         nodes, theta, tangent, _ = self._nodes
-        turns = np.column_stack([np.ones(len(theta)), frame.integrals])  # of the angle, by turn and coefficients
-        along_x = _integrate(-tangent[:, 1:] * turns, frame.grid, frame.anchor)
-        along_y = _integrate(tangent[:, :1] * turns, frame.grid, frame.anchor)
+        along_x = _integrate(-tangent[:, 1:] * frame.turns, frame.grid, frame.anchor)
+        along_y = _integrate(tangent[:, :1] * frame.turns, frame.grid, frame.anchor)
         inside = np.clip(s, nodes[0], nodes[-1])
         cell = np.clip(np.searchsorted(nodes, inside) - 1, 0, len(nodes) - 2)
         f = ((inside - nodes[cell]) / (nodes[cell + 1] - nodes[cell]))[:, None]
         angle = self.at(inside)[1]
         sin, cos = np.sin(angle)[:, None], np.cos(angle)[:, None]
         near, far = 1.0 - f, f
-        normal = (cos * near) * along_y[cell] + (cos * far) * along_y[cell + 1]
-        normal -= (sin * near) * along_x[cell] + (sin * far) * along_x[cell + 1]
+        normal = (cos * near) * along_y.take(cell, axis=0) + (cos * far) * along_y.take(cell + 1, axis=0)
+        normal -= (sin * near) * along_x.take(cell, axis=0) + (sin * far) * along_x.take(cell + 1, axis=0)
         beyond = np.asarray(s) - inside
         if beyond.any():
             nearest = 2 * np.where(beyond < 0.0, 0, len(nodes) - 1)
-            normal += beyond[:, None] * turns[nearest]
+            normal += beyond[:, None] * frame.turns[nearest]
         return np.column_stack([np.cos(angle - theta[frame.anchor]), normal])
 
     def moved(self, step: Array) -> PlaneCurve:

@@ -301,7 +301,8 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
     )
     noise = np.repeat(medians(profiles.noise, axis=1), shape[1])
     softness = (1.0 / (1.5 * settings.pixel_outlier * noise + 1e-12)).astype(np.float32)[:, None]
-    basis, one = np.ones((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
+    basis, one = np.empty((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
+    basis[:, 0] = 1.0
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
     for _ in range(iterations):
         place32, level32, step32 = (a.astype(np.float32)[:, None] for a in (place, level, step))

@@ -100,10 +100,11 @@ def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cov
     if not covers:
         return free
     where, angle = curve.at(s)
+    aside = offset * normals(angle)
     for cover in covers:
-        for side in (-1.0, 1.0):
-            point = where + side * offset * normals(angle)
-            free &= np.hypot(*(point - np.asarray(cover.center)).T) > cover.radius
+        for point in (where - aside, where + aside):
+            away = point - np.asarray(cover.center)
+            free &= (away * away).sum(axis=1) > cover.radius**2
     return free
 
 

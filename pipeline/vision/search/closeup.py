@@ -120,8 +120,9 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
     offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
     spreads = []
     for side in (-0.5, 0.5):
-        points = (centre[:, None, :] + (side * width + offsets)[None, :, None] * across[:, None, :]).astype(np.float32)
-        profile = cv2.remap(grey, points[..., 0], points[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        away = side * width + offsets
+        u, v = ((centre[:, k, None] + across[:, k, None] * away).astype(np.float32) for k in (0, 1))
+        profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets))
     along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
     return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])

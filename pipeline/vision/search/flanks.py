@@ -102,7 +102,8 @@ def _at(values: Array, columns: Array) -> Array:
     """Values ``(n, ...)`` at fractions of columns ``(...)``, linear between columns, 0 outside."""
     low = np.floor(columns).astype(int)
     share = (columns - low).astype(values.dtype)
-    padded = np.pad(values, ((0, 0), (1, 2)))
+    padded = np.zeros((len(values), values.shape[1] + 3), values.dtype)
+    padded[:, 1:-2] = values
     at = np.clip(low + 1, 0, values.shape[1] + 1)
     return np.asarray((1 - share) * padded[:, at] + share * padded[:, at + 1])
 
