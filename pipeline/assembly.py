@@ -205,6 +205,7 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
 TOLD_BETTER = {
     "photo/doubled": {"photo/doubled"},
     "photo/order": {"identify/chord-displacement"},
+    "photo/other-step": {"identify/chord-displacement"},
     "log/displacement": {"identify/chord-displacement"},
     "log/unit": {"identify/chord-displacement", "scale/displacement"},
     "length/traced": {"scale/length"},

@@ -60,7 +60,7 @@ INSIDE = {
         ("search", "extended", "stuck_forces", "maps"),
         ("faults",),
         ("workbench",),
-        ("identified_again", "heldout", "bootstrap", "force_breaks", "displacement_scatter"),
+        ("identified_again", "heldout", "bootstrap", "force_breaks", "outlier", "displacement_scatter"),
     ],
     "pipeline.diagnosis.explanations": [
         ("explanation", "candidates", "refit", "effort"),

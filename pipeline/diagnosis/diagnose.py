@@ -25,9 +25,10 @@ from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.explanations.two_causes import masking, second_cause
 from pipeline.diagnosis.fits.bootstrap import confirmed_limit
 from pipeline.diagnosis.fits.displacement_scatter import scatter_beside, with_scatter
-from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input, outlier_fault, worst_item
+from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
+from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
 from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.presentation.part import present
@@ -80,9 +81,10 @@ def diagnose(
     fault = _data_at_fault(bench, settings)
     if fault is not None:
         knots = len(bench.base.extension.base.knots)
-        again = prepare(faults.joined(fault), settings, knots=knots)
+        joined = joined_with_outlier(faults, fault, test)
+        again = prepare(joined, settings, knots=knots)
         if not isinstance(again, str) and again.largest <= again.limit:
-            faults, bench = faults.joined(fault), again
+            faults, bench = joined, again
     known = None if identification is None else curve_of(identification.inverse)
     begun = newton_steps()
     conclusion = conclude(bench, settings)

@@ -2,12 +2,10 @@
 
 Before anything is fitted, photographed chords are held against the displacement log (order of photos, unit), photos
 against each other (doubled), traced against stated length, forces against what a cable can do (unit, sign) and against
-each other (stuck). After the base fit, each photo and each hold is left out in turn, to first order: where the rest
-then agrees with the model and no cause explains as much, that one item is at fault, not the model.
+each other (stuck). After the base fit, breaks in the forces (`force_breaks`) and single items (`outlier`) are sought.
 
-Codes: ``photo/order``, ``photo/doubled``, ``photo/outlier``, ``force/outlier``, ``force/sign``, ``force/stuck``,
-``force/unit``, ``log/unit``, ``log/displacement``, ``length/traced``; see `force_breaks` for ``force/factor`` and
-``force/zero-moved``.
+Codes: ``photo/order``, ``photo/doubled``, ``force/sign``, ``force/stuck``, ``force/unit``, ``log/unit``,
+``log/displacement``, ``length/traced``.
 """
 
 from __future__ import annotations
@@ -19,9 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.stuck_forces import stuck_forces
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import Finding
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import quantity
@@ -328,53 +324,3 @@ def _stuck(found: Faults, settings: DiagnosisSettings) -> Faults:
         "froze; these forces are left out, repeat the test with a larger range"
     )
     return Faults(test, (Finding("force/stuck", "warning", message),), forces=frozenset(stuck))
-
-
-@dataclass(frozen=True)
-class Outlier:
-    """One item whose absence lets the model fit: step index, kind (``photo`` or ``force``), and what is then gained."""
-
-    index: int
-    kind: str
-    gain: float
-    rows: int
-    rest: float
-
-
-def worst_item(observation: Observation, fitted: Fit) -> Outlier | None:
-    """The photo or hold whose absence lowers chi-square most, refitted to first order; None with too few steps."""
-    kind, step = observation.rows.kind, observation.rows.step
-    extra = np.zeros(len(fitted.residual) - len(kind), dtype=bool)
-    best: Outlier | None = None
-    steps = sorted(set(step.tolist()))
-    if len(steps) < 3:
-        return None
-    for index in steps:
-        for name, own in (("photo", kind > 0), ("force", kind == 0)):
-            rows = np.r_[own & (step == index), extra]
-            if not rows.any() or (own & (step != index)).sum() == 0:
-                continue
-            kept = ~rows
-            moved = np.linalg.lstsq(fitted.jacobian[kept], fitted.residual[kept], rcond=1e-9)[0]
-            rest = float(np.sum((fitted.residual[kept] - fitted.jacobian[kept] @ moved) ** 2))
-            found = Outlier(index, name, fitted.chi2 - rest, int(rows.sum()), rest)
-            if best is None or found.gain - found.rows > best.gain - best.rows:
-                best = found
-    return best
-
-
-def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
-    """Finding and exclusion of an item at fault."""
-    name = test.steps[outlier.index].step
-    sigma = np.sqrt(max(outlier.gain - outlier.rows, 0.0))
-    what = "photo" if outlier.kind == "photo" else "force"
-    finding = Finding(
-        f"{what}/outlier",
-        "warning",
-        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is "
-        "left out",
-    )
-    index = frozenset({outlier.index})
-    return Faults(
-        test, (finding,), index if what == "photo" else frozenset(), index if what == "force" else frozenset()
-    )

@@ -11,8 +11,11 @@ the parameters v of the model, with all that the photos know of them, each of th
     one force    F_i = c p_i but for one step
 
 A break is a fault of the data if it brings all forces to their noise, where neither a cause, nor a pair of causes, nor
-one bad force does nearly as well. One step before or after it would be one bad force. Friction, relaxation and drift
-change forces step by step and differ with the bow: none of them keeps one factor, or one offset, on each side.
+one bad force does nearly as well. One step before or after it would be one bad force. A factor of nearly nothing is a
+load cell that died: its forces are left out, they are no measurement that could be corrected. Friction, relaxation and
+drift change forces step by step and differ with the bow: none of them keeps one factor, or one offset, on each side.
+
+Codes: ``force/factor``, ``force/zero-moved``, ``force/sign``, ``force/dead``.
 """
 
 from __future__ import annotations
@@ -36,6 +39,13 @@ Array = NDArray[np.float64]
 
 ZEROED = 4.0
 """Standard deviations: a force-free step that reads less shows that the load cell was zeroed before the break."""
+
+DEAD = 0.05
+"""Share of its force below which a load cell measures nothing: noise of 0.3 % of its range would be 6 % of a force that
+is corrected, and what a broken channel still shows (an offset, crosstalk) is of this size."""
+
+NO_FACTOR = 4.0
+"""Standard deviations: a factor nearer to zero than that, or its inverse, may be none at all."""
 
 UNTOLD = 9.0
 """Chi-square: three standard deviations. A factor and an offset nearer than that are not told apart."""
@@ -67,6 +77,11 @@ class Break:
     rest: float
     freedom: int
 
+    @property
+    def dead(self) -> bool:
+        """Whether the forces on one side of the break are none at all."""
+        return self.kind == "factor" and (abs(self.amount) < max(DEAD, NO_FACTOR * self.std))
+
 
 def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: float) -> Faults | None:
     """The break in the forces that explains what the base model misfits, with the forces corrected; None without one.
@@ -91,7 +106,8 @@ def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: floa
         return None
     others = (one for one in found if one.steps == best.steps and one.kind not in ("sign", best.kind))
     other = None if turned else next((one for one in others if one.rest < best.rest + UNTOLD), None)
-    return _as_fault(bench.test, best, other)
+    dead = next((one for one in (best, other) if one is not None and one.dead), None)
+    return _as_fault(bench.test, best, other) if dead is None else _without_dead(bench.test, dead)
 
 
 class _Trial(NamedTuple):
@@ -284,6 +300,25 @@ def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
     code = "force/factor" if found.kind == "factor" else "force/zero-moved"
     level: Level = "error" if found.kind == "factor" or other or not _zeroed(test, found) else "warning"
     return Faults(correction.applied(test), (Finding(code, level, message),), corrections=(correction,))
+
+
+def _without_dead(test: MeasuredTest, found: Break) -> Faults:
+    """The forces of a load cell that measured nothing from a step on, or up to it, left out."""
+    after, share, std = abs(found.amount) < 1.0, found.amount, found.std
+    if not after:
+        share, std = 1.0 / found.amount, found.std / found.amount**2
+    first, times = test.steps[found.steps[0]].step, rounded(share, std)
+    message = (
+        f"from step {first} on the load cell shows hardly any force, {times} times what the photos ask for: it failed, "
+        "or its cable or its range; these forces are left out"
+        if after
+        else f"before step {first} the load cell shows hardly any force, {times} times what the photos ask for: it "
+        "failed, or its cable or its range; these forces are left out"
+    )
+    # the force-free step tells no stiffness, and its photo is not to be lost
+    loaded = (i for i, step in enumerate(test.steps) if step.branch != "mounted")
+    dead = frozenset(i for i in loaded if (i in found.steps) == after)
+    return Faults(test, (Finding("force/dead", "warning", message),), forces=dead)
 
 
 def _size(found: Break) -> str:

@@ -71,6 +71,15 @@ def test_one_wrong_displacement_is_neither_a_bad_photo_nor_a_cause(honest, wrong
     assert part.verdict == "adequate" and part.left_out_photos == []
 
 
+@pytest.mark.parametrize(("step", "shown"), [(2, 4), (5, 2)])
+def test_a_photo_of_another_step_is_one_fault_and_its_force_stays(honest, step, shown):
+    other = hidden_test(Cable(), SIX, largest=0.0138, seed=77).steps[shown]
+    part, findings = diagnose(with_steps(honest, **{f"step{step}": picture(other)}), None, SETTINGS)
+    assert [finding.code for finding in findings] == ["photo/other-step"]
+    assert f"the photo of step {step} fits neither" in findings[0].message
+    assert (part.verdict, part.left_out_photos, part.left_out_forces) == ("adequate", [step], [])
+
+
 def test_play_before_the_first_step_is_no_wrong_displacement():
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=21, reading=Reading(play=1e-3))
     assert codes(faults_of_input(test, SETTINGS)) == []

@@ -48,6 +48,21 @@ def test_a_factor_from_one_step_on(honest, protocol, factor):
     assert [step.force for step in found.test.steps] == pytest.approx(kept, rel=5e-3)
 
 
+@pytest.mark.parametrize(("protocol", "dead"), [("six", {4, 5, 6}), ("loop", {1, 2})])
+def test_a_load_cell_that_died_is_left_out_and_not_multiplied(honest, protocol, dead):
+    rng = np.random.default_rng(5)
+    test = honest[protocol]
+
+    def silent(i, force):
+        return test.steps[i].force_std * rng.standard_normal(np.shape(force)) if i in dead | {0} else force
+
+    found = fault(spoiled(test, silent))
+    (finding,) = found.findings
+    assert (finding.code, finding.level) == ("force/dead", "warning")
+    assert ("from step 4 on" if protocol == "six" else "before step 3") in finding.message
+    assert found.forces == dead and not found.corrections
+
+
 @pytest.mark.parametrize("turned", [{2}, {1, 2}, {4, 5, 6}])
 def test_forces_of_the_other_sign_are_turned_whichever_they_are(honest, turned):
     found = fault(spoiled(honest["loop"], lambda i, force: -force if i in turned else force))

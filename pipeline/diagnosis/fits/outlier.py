@@ -1,0 +1,94 @@
+"""One photo or one hold that contradicts all other data, and a photo that is of another step.
+
+After the base fit, each photo and each hold is left out in turn, to first order: where the rest then agrees with the
+model and no cause explains as much, that one item is at fault, not the model.
+
+Codes: ``photo/outlier``, ``force/outlier``, ``photo/other-step``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.diagnosis.fits.faults import Faults
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.records import Finding
+from rod.measurement import MeasuredTest
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """One item whose absence lets the model fit: step index, kind (``photo`` or ``force``), and what is then gained."""
+
+    index: int
+    kind: str
+    gain: float
+    rows: int
+    rest: float
+
+
+def worst_item(observation: Observation, fitted: Fit) -> Outlier | None:
+    """The photo or hold whose absence lowers chi-square most, refitted to first order; None with too few steps."""
+    kind, step = observation.rows.kind, observation.rows.step
+    extra = np.zeros(len(fitted.residual) - len(kind), dtype=bool)
+    best: Outlier | None = None
+    steps = sorted(set(step.tolist()))
+    if len(steps) < 3:
+        return None
+    for index in steps:
+        for name, own in (("photo", kind > 0), ("force", kind == 0)):
+            rows = np.r_[own & (step == index), extra]
+            if not rows.any() or (own & (step != index)).sum() == 0:
+                continue
+            kept = ~rows
+            moved = np.linalg.lstsq(fitted.jacobian[kept], fitted.residual[kept], rcond=1e-9)[0]
+            rest = float(np.sum((fitted.residual[kept] - fitted.jacobian[kept] @ moved) ** 2))
+            found = Outlier(index, name, fitted.chi2 - rest, int(rows.sum()), rest)
+            if best is None or found.gain - found.rows > best.gain - best.rows:
+                best = found
+    return best
+
+
+def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
+    """Finding and exclusion of an item at fault."""
+    name = test.steps[outlier.index].step
+    sigma = np.sqrt(max(outlier.gain - outlier.rows, 0.0))
+    what = "photo" if outlier.kind == "photo" else "force"
+    finding = Finding(
+        f"{what}/outlier",
+        "warning",
+        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is "
+        "left out",
+    )
+    index = frozenset({outlier.index})
+    return Faults(
+        test, (finding,), index if what == "photo" else frozenset(), index if what == "force" else frozenset()
+    )
+
+
+def joined_with_outlier(found: Faults, outlier: Faults, measured: MeasuredTest) -> Faults:
+    """Both; where photo and displacement of the step at fault contradict each other too, its photo is of another step.
+
+    With the displacement taken from such a photo, the force of the step stands alone against it. Force and displacement
+    of ``measured``, the test as it came, are right then, and one photo is all that is wrong.
+    """
+    moved = {i for i, s in enumerate(measured.steps) if s.displacement != found.test.steps[i].displacement is None}
+    wrong = (outlier.photos | outlier.forces) & moved
+    if outlier.corrections or not wrong:
+        return found.joined(outlier)
+    (index,) = wrong
+    message = (
+        f"the photo of step {measured.steps[index].step} fits neither the displacement nor the force of its step, "
+        "which fit all others: it is a photo of another step and left out"
+    )
+    kept = tuple(finding for finding in found.findings if finding.code != "log/displacement")
+    steps = tuple(measured.steps[i] if i == index else step for i, step in enumerate(found.test.steps))
+    return replace(
+        found,
+        test=replace(found.test, steps=steps),
+        findings=(*kept, Finding("photo/other-step", "warning", message)),
+        photos=found.photos | wrong,
+    )
