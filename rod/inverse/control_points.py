@@ -163,7 +163,8 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
     """Fit with the number of control points that follows from the data.
 
     A fit with the largest number is linearised; the evidence of every smaller number follows from it. ``spare`` control
-    points more than the best are used: they leave the error of the spline itself within the smoothness prior's band.
+    points more than the best are used, or half as many as those if that is more: they leave the error of the spline
+    itself within the smoothness prior's band, and a law that asks for many (it has a kink) is followed least.
 
     Returns
     -------
@@ -182,7 +183,7 @@ def chosen_knots(first: Fit, options: InverseOptions) -> tuple[Fit, dict[int, fl
         for count in range(least, most + 1)
     }
     best = max(evidence, key=lambda count: evidence[count])
-    count = min(best + options.spare, most)
+    count = min(best + max(options.spare, best // 2), most)
     knots = place_knots(low, high, count)
     prior = rich.posterior(options.tau).prior.carried(rich.model.knots, knots)
     chosen = refit(rich, knots, prior, blur=rich.model.blur, evaluations=options.evaluations)
