@@ -54,7 +54,10 @@ def fades(standout: Standout, cut: CrossCut, width: float, settings: Segmentatio
     _, ahead = _led_into_picture(standout, path, width, settings.beyond_leads_widths[0], settings)
     if len(ahead) < near.stop or before <= 0.0:
         return False
-    more = cut_across(standout, ahead[: near.stop + round(width)], width, settings, known=True, weights=cut.weights)
+    ahead = ahead[: near.stop + round(width)]
+    if not _may_fade(standout, cut, ahead, near, width, settings.fading_share * before, settings):
+        return False
+    more = cut_across(standout, ahead, width, settings, known=True, weights=cut.weights)
     same = np.abs(more.width[near] / width - 1.0) < settings.beyond_width_off
     faint = median(more.step[near]) > settings.fading_share * before
     return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
@@ -214,6 +217,27 @@ def _may_go_on(
     enough = 0.25 * width / (offsets[1] - offsets[0])
     length = float(np.hypot(*np.diff(ahead, axis=0).T).sum())
     return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * length / (len(rows) - 1) > least)
+
+
+def _may_fade(
+    standout: Standout,
+    cut: CrossCut,
+    ahead: Array,
+    near: slice,
+    width: float,
+    least: float,
+    settings: SegmentationSettings,
+) -> bool:
+    """False where so little stands out of the ground by ``least`` about a lead that it shows no cable that only fades.
+
+    Half of the sections ``near`` would hold a core half a width broad (edges a width apart to 15 %, a pair's to 20 % of
+    that) that stands out so far in its median: a fifth of a width does then, on two fifths of them at the very least.
+    """
+    _, normal = path_normals(ahead)
+    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
+    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
+    strong = ((-relief if cut.dark else relief) > least).sum(axis=1) >= 0.2 * width / (offsets[1] - offsets[0])
+    return bool(np.count_nonzero(strong) * len(ahead) / len(rows) >= 0.4 * (near.stop - near.start))
 
 
 def _led_into_picture(
