@@ -73,7 +73,7 @@ INSIDE = {
     "pipeline.diagnosis.presentation": [("leftover", "named", "table"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
-        ("median", "photo", "rough", "render"),
+        ("guard", "median", "photo", "rough", "render"),
         ("scale", "search"),
         ("bearings", "centerline", "preview", "wholeness"),
         ("judgement",),

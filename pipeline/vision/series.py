@@ -23,6 +23,7 @@ from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable
 from pipeline.vision.centerline.side import on_one_side
+from pipeline.vision.guard import guarded, jointly
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
 from pipeline.vision.picture_size import of_one_size
@@ -40,8 +41,10 @@ from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
-from pipeline.vision.shots import Shot, find_cables, guarded, with_fixed_cover
+from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
 from pipeline.vision.stated_width import with_width_seen
+
+Line = Centerline | Rejected
 
 
 def trace_photo(
@@ -112,8 +115,7 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     shots, lines, side_findings = _measure_all(specimen, shots, calibration, parallax_std, settings)
     pairs = list(zip(shots, lines, strict=True))
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
-    lines = without_lay(lines, specimen.diameter_m, settings.curve)
-    lines, bow_findings = on_one_side(lines, specimen.diameter_m, settings.series)
+    lines, bow_findings = _alike(shots, lines, specimen, settings)
     lines = tuple(_doubted(line, calibration) for line in lines)
     found, displacements = _told_by(shots, lines)
     findings = (
@@ -126,6 +128,31 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
         *_check_lengths(specimen, lines, settings.series),
     )
     return Traces(lines, calibration.scale, findings, parallax_std)
+
+
+def _alike(
+    shots: Sequence[Shot], lines: tuple[Line, ...], specimen: Specimen, settings: VisionSettings
+) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
+    """Centerlines without the lay they have in common, and with one positive side; a photo that breaks it is refused.
+
+    Lines that break it whichever of them is left out stay as they are, and a finding says so.
+    """
+    names = [shot.found.image for shot in shots]
+    lay = partial(without_lay, diameter_m=specimen.diameter_m, settings=settings.curve)
+    side = partial(on_one_side, diameter_m=specimen.diameter_m, settings=settings.series)
+    lines, even = jointly(names, lines, lay)
+    lines, turned = jointly(names, lines if even is None else even, side)
+    lines, findings = (lines, ()) if turned is None else turned
+    if even is None or turned is None:
+        findings = (*findings, Finding("photo/program-error", "warning", NOT_ALIKE))
+    previews = [shot.preview for shot in shots]
+    return tuple(
+        replace(line, preview=shown) if line.preview is None else line
+        for line, shown in zip(lines, previews, strict=True)
+    ), findings
+
+
+NOT_ALIKE = "What all photos have in common could not be told; the centerlines stay as they are. Please report it."
 
 
 def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
@@ -187,14 +214,21 @@ def _tied(
         cable if isinstance(cable, Rejected) else guarded(cable.rough.image, partial(cable.sight, settings))
         for cable in cables
     ]
-    told = iter(told_by_others([sight for sight in sights if isinstance(sight, AxisSight)]))
-    expected = [next(told) if isinstance(sight, AxisSight) else None for sight in sights]
+    images = [shot.found.image for shot in shots]
+    # a photo on which that breaks is measured by itself
+    _, told = jointly(images, sights, _told)
     lines = []
-    for shot, cable, axes in zip(shots, cables, expected, strict=True):
+    for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True):
         line = guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes))
         # the picture is shown also where the work on it broke
         lines.append(replace(line, preview=shot.preview) if line.preview is None else line)
     return tuple(lines)
+
+
+def _told(sights: Sequence[AxisSight | Rejected | None]) -> list[AxesTold | None]:
+    """What the other photos tell of each that was not refused."""
+    told = iter(told_by_others([sight for sight in sights if isinstance(sight, AxisSight)]))
+    return [next(told) if isinstance(sight, AxisSight) else None for sight in sights]
 
 
 def _shown(

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
 
-import cv2
 import numpy as np
 
 from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen
@@ -19,14 +17,13 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
 from pipeline.vision.bearings.steady import apart_px, expected_covers, fixed_cover, is_sure, moved_axes
+from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.calibration import Calibration, from_number
 from pipeline.vision.segmentation import find_cable
-
-Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -181,16 +178,6 @@ def _expected(specimen: Specimen, calibration: Calibration | None, travel: float
     if rig.bearings_px is not None and cover is None:
         given = moved_axes(rig.bearings_px, rig.moving_bearing, travel * scale)
     return Cable(specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=cover, given_px=given))
-
-
-def guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
-    """The outcome of work on one photo; numbers nobody foresaw cost that photo, not the specimen."""
-    try:
-        return work()
-    except (ArithmeticError, LookupError, ValueError, cv2.error) as error:
-        told = " ".join(str(error).split())[:200]
-        reason = f"{image}: the tracing failed ({type(error).__name__}: {told}); please report it."
-        return Rejected(image, "photo/program-error", reason)
 
 
 def with_fixed_cover(

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.shots import guarded
+from pipeline.vision.guard import guarded
 
 MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
 """What photos are refused for when a strip of another width is looked for: edges beside the cable, or half of it."""

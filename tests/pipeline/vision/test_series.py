@@ -355,6 +355,31 @@ def test_photo_that_breaks_the_program_costs_that_photo_alone(
     assert second.preview is not None
 
 
+@pytest.mark.parametrize(
+    ("stage", "error"),
+    [("told_by_others", TypeError()), ("without_lay", AssertionError()), ("on_one_side", np.linalg.LinAlgError())],
+)
+def test_photo_that_breaks_the_work_on_all_costs_that_photo_at_most(
+    stage: str, error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second of three; an axis that the others cannot tell is measured by its own photo."""
+    sound, bad = getattr(series_module, stage), []
+
+    def broken(given: tuple[object, ...], *rest: object, **named: object) -> object:
+        own = [one for one in given if not isinstance(one, Rejected)]
+        bad.extend(own[1:2] if not bad else [])
+        if any(one is bad[0] or getattr(one, "image", None) == "step_01.png" for one in own):
+            raise error
+        return sound(given, *rest, **named)
+
+    monkeypatch.setattr(series_module, stage, broken)
+    first, second, third = trace_series(series(tmp_path), SETTINGS).photos
+    assert isinstance(first, Centerline) and isinstance(third, Centerline)
+    assert isinstance(second, Centerline) == (stage == "told_by_others") and second.preview is not None
+    if isinstance(second, Rejected):
+        assert second.code == "photo/program-error" and type(error).__name__ in second.reason
+
+
 def test_a_search_for_covers_that_breaks_costs_no_specimen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 

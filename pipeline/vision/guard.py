@@ -1,0 +1,78 @@
+"""Work on photos that must not cost a specimen: what breaks on one photo refuses that photo, and no more.
+
+``work on one photo -> its outcome, or why there is none``
+``work on all photos of a series together -> its outcome, without the photo on which it breaks``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TypeVar
+
+import cv2
+
+from pipeline.records import Rejected
+
+Found = TypeVar("Found")
+Outcome = TypeVar("Outcome")
+
+UNFORESEEN = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    cv2.error,
+)
+"""What a picture nobody foresaw can raise; trouble with the disk and a key pressed are none of the photo's."""
+
+
+def guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
+    """The outcome of work on one photo; numbers nobody foresaw cost that photo, not the specimen."""
+    try:
+        return work()
+    except UNFORESEEN as error:
+        told = " ".join(str(error).split())[:200]
+        reason = f"{image}: the tracing failed ({type(error).__name__}: {told}); please report it."
+        return Rejected(image, "photo/program-error", reason)
+
+
+def jointly(
+    names: Sequence[str],
+    outcomes: Sequence[Outcome | Rejected],
+    work: Callable[[tuple[Outcome | Rejected, ...]], Found],
+) -> tuple[tuple[Outcome | Rejected, ...], Found | None]:
+    """Work on all photos of a series together; where it breaks, without the first photo whose absence heals it.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the photos.
+    outcomes : sequence of object or Rejected
+        What there is of each so far.
+    work : callable
+        Passes over what was rejected.
+
+    Returns
+    -------
+    tuple of object or Rejected
+        The outcomes the work was done on: as given, or with the photo to blame rejected.
+    object or None
+        What the work found; None if it breaks whichever photo is left out.
+    """
+    given = tuple(outcomes)
+    whole = guarded("", partial(work, given))
+    if not isinstance(whole, Rejected):
+        return given, whole
+    for k, name in enumerate(names):
+        if isinstance(given[k], Rejected):
+            continue
+        without = (*given[:k], Rejected(name, whole.code, f"{name}{whole.reason}"), *given[k + 1 :])
+        found = guarded("", partial(work, without))
+        if not isinstance(found, Rejected):
+            return without, found
+    return given, None
