@@ -149,11 +149,17 @@ def _motion(spreads: Array, angles: Array) -> float:
 
 
 def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> Array:
-    """Spread of one edge on each group of sections; NaN where the profile is flat."""
+    """Spread of one edge on each group of sections; NaN where the profile is flat.
+
+    Medians over the sections of a group: letters cover less than half of them, and a mean would take their rims, and
+    the sections they misplace, for blur.
+    """
     spacing = float(offsets[1] - offsets[0])
     plateau = max(2, len(offsets) // 6)
-    step = profile[:, -plateau:].mean(axis=1) - profile[:, :plateau].mean(axis=1)
-    level = 0.5 * (profile[:, -plateau:].mean(axis=1) + profile[:, :plateau].mean(axis=1))
+    ends = np.stack([profile[:, :plateau].mean(axis=1), profile[:, -plateau:].mean(axis=1)])
+    usual = np.median(ends.reshape(2, _GROUPS, -1), axis=2)
+    low_end, high_end = np.repeat(usual, profile.shape[0] // _GROUPS, axis=1)
+    step, level = high_end - low_end, 0.5 * (low_end + high_end)
     above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
     crossing = np.argmax(above, axis=1)
     # Lined up at their own crossings, so a path half a pixel off does not count as blur: each is moved by whole columns
@@ -163,8 +169,8 @@ def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> Array:
     share = (columns - low).astype(np.float32)
     last = len(offsets) - 1
     first, second = (np.take_along_axis(profile, np.clip(low + k, 0, last), axis=1) for k in (0, 1))
-    lined = (first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)).mean(axis=1)
+    lined = np.median((first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)), axis=1)
     rise = np.abs(lined[:, 2:] - lined[:, :-2])[:, plateau - 1 : 1 - plateau]
     slope = rise.max(axis=1, initial=0.0) / (2.0 * spacing)
-    height = np.abs(step.reshape(_GROUPS, -1).mean(axis=1))
+    height = np.abs(usual[1] - usual[0])
     return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), np.nan))

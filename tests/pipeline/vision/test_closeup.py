@@ -19,12 +19,21 @@ from pipeline.vision.segmentation import find_cable
 WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis
 
 
-def arc(*, motion: float = 0.0, direction: float = 0.0, blur: float = 0.8, shadow: float = 0.0) -> Closeup:
-    """Close-up of a dark arc of 80 degrees, moved by so many px; ``shadow`` px of blur at its outer edge alone."""
+def arc(
+    *, motion: float = 0.0, direction: float = 0.0, blur: float = 0.8, shadow: float = 0.0, letters: bool = False
+) -> Closeup:
+    """Close-up of a dark arc of 80 degrees, moved by so many px; ``shadow`` px of blur at its outer edge alone.
+
+    With ``letters`` the sheath is bright, and bright strokes across it are a third of both ends of the arc.
+    """
     v, u = np.mgrid[0:420, 0:1100].astype(np.float32)
     away = np.hypot(u - 550.0, v - 760.0) - BEND
     outer = 0.5 * WIDTH - away
     grey = 0.8 - 0.6 * np.clip(np.minimum(outer, 0.5 * WIDTH + away) + 0.5, 0.0, 1.0)
+    if letters:
+        along = BEND * np.arctan2(u - 550.0, 760.0 - v)
+        inked = (np.abs(away) < 0.35 * WIDTH) & (np.abs(along) > 150.0) & (along % 23.0 < 9.0)
+        grey = np.where(inked, 0.9, 0.5 - 0.5 * grey)
     if shadow:
         soft = cv2.GaussianBlur(grey, (0, 0), shadow)
         grey = np.where(away > 0.0, soft, grey)
@@ -59,6 +68,11 @@ def test_defocus_is_not_motion(blur):
 
 def test_soft_shadow_at_one_edge_is_not_motion():
     assert arc(shadow=5.0).motion_px == 0.0
+
+
+def test_letters_on_the_sheath_are_not_motion():
+    """Ink brighter than the sheath misplaced the crossings of its sections: a sharp cable was "moved" by 8 px."""
+    assert arc(letters=True).motion_px == 0.0
 
 
 @pytest.mark.parametrize("sensor", [Sensor(motion_px=15.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
