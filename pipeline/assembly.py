@@ -208,7 +208,7 @@ TOLD_BETTER = {
     "photo/other-step": {"identify/chord-displacement"},
     "log/displacement": {"identify/chord-displacement"},
     "log/unit": {"identify/chord-displacement", "scale/displacement"},
-    "length/traced": {"scale/length"},
+    "length/traced": {"scale/length", "identify/length", "identify/scale"},
     "force/sign": {"identify/force-sign"},
 }
 """Findings of the diagnosis, and those by which earlier rooms noticed the same without knowing what it is."""

@@ -68,6 +68,10 @@ def test_what_the_diagnosis_names_is_said_once():
     unit = Finding("log/unit", "warning", "the log seems to hold cm instead of mm")
     assert [f.code for f in without_those_told_better(noticed, [unit])] == ["scale/length"]
     assert without_those_told_better(noticed, []) == noticed
+    pulled = [Finding(f"identify/{name}", "warning", "off by 9 standard deviations") for name in ("length", "scale")]
+    length = Finding("length/traced", "warning", "the photos show a cable of another length")
+    told = without_those_told_better([*noticed, *pulled], [length])
+    assert [f.code for f in told] == ["scale/displacement", "identify/chord-displacement"]
 
 
 def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
