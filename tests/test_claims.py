@@ -1,7 +1,7 @@
 """What the README claims of the whole road, on specimens of another simulator and renderer: from folder to result.
 
-The tolerances are the product's claims, not what happens to come out: midline 0.3 px, f_EI 1 % rms by either way, K0
-0.01 1/m, forces 1 %; where the README prints 0.3 % and 0.001 1/m, three times that is left to other noise.
+The tolerances are the product's claims, not what happens to come out: midline 0.1 px, forces 1 %, f_EI 2 % after an
+extension; where the README prints f_EI to 0.3 % and K0 to 0.001 1/m, three times that is left to other noise.
 """
 
 import json
@@ -52,13 +52,13 @@ def test_centerlines_follow_the_true_path(benches, truths, name):
             [np.interp(np.linspace(0, 1, 20001), np.linspace(0, 1, len(traced)), c) for c in traced.T]
         )
         distance, _ = cKDTree(fine).query(np.array(step["px"])[inside])
-        assert np.sqrt(np.mean(distance**2)) < 0.3  # px; what is promised of the visible interior
+        assert np.sqrt(np.mean(distance**2)) < 0.1  # px; what is promised of the visible interior
 
 
 def test_both_ways_find_the_characteristic(benches, truths):
     result, truth = benches["a"], truths["a"]
     for curve in (result.inverse.curve, result.balance.curve):
-        assert rms_relative(curve, truth) < 0.01  # promised are 3 and 6 %; both ways find this cable to 0.2 %
+        assert rms_relative(curve, truth) < 3.0 * 0.003
         kappa, tangent, std = (np.array(v) for v in (curve.kappa_per_m, curve.tangent_Nm2, curve.tangent_std_Nm2))
         covered = np.abs(tangent - stiffness(truth, kappa)) < 1.96 * std
         # one curve counts for about three independent points: with one of them outside two thirds would be left
@@ -72,10 +72,9 @@ def test_both_ways_find_the_characteristic(benches, truths):
 def test_pre_curvature_and_forces(benches, truths):
     result, truth = benches["a"], truths["a"]
     for value, std in result.agreement.pre_curvature.values():
-        assert abs(value - truth["K0"]) < max(0.01, 4.0 * std)
+        assert abs(value - truth["K0"]) < max(3.0 * 0.001, 4.0 * std)
     for part in (result.inverse, result.balance):
-        # promised is 0.1 1/m; this cable's is known to 0.001
-        assert part.pre_curvature_per_m == pytest.approx(truth["K0"], abs=0.01)
+        assert part.pre_curvature_per_m == pytest.approx(truth["K0"], abs=3.0 * 0.001)
     largest = max(step["F"] for step in truth["steps"])
     for step, true in zip(result.steps, truth["steps"], strict=True):
         # promised is 1 %, of what is true and of what the noisy log says

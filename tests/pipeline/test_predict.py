@@ -118,8 +118,8 @@ def test_zero_of_displacement(result):
     natural = predict(result, [5e-3 - (LENGTH - NATURAL)]).steps[0]
     length = predict(result, [5e-3], zero="length").steps[0]
     assert length.chord_m == pytest.approx(LENGTH - 5e-3)
-    # K0 is 0.1 % off the true one, by which the natural chord is taken here.
-    assert natural.force_N == pytest.approx(length.force_N, rel=5e-3)
+    # K0 is 0.03 % off the true one, by which the natural chord is taken here: 1 um of 5 mm, and forces grow slowly
+    assert natural.force_N == pytest.approx(length.force_N, rel=2e-4)
 
 
 def test_nothing_is_predicted_beyond_what_was_visited_unless_asked(result):
@@ -127,7 +127,8 @@ def test_nothing_is_predicted_beyond_what_was_visited_unless_asked(result):
     assert [step.status for step in refused.steps] == ["predicted", "refused"]
     assert refused.steps[1].force_N is None
     assert "leaves the visited range" in refused.steps[1].reason
-    assert refused.reachable_m == pytest.approx(STEPS[-1], rel=0.01)
+    # the largest curvature seen is known to a thousandth, and the chord shortens with its square
+    assert refused.reachable_m == pytest.approx(STEPS[-1], rel=2e-3)
     marked = predict(result, [25e-3], extrapolate=True).steps[0]
     assert marked.status == "extrapolated"
     assert marked.force_N > 0.0
@@ -161,7 +162,7 @@ def test_the_extended_characteristic_answers_unless_it_is_refuted(result, verdic
     prediction = predict(result.model_copy(update={"diagnosis": extended}), [8e-3])
     assert prediction.method == method
     factor = 1.1 if method == "extended" else 1.0
-    assert prediction.steps[0].force_N == pytest.approx(factor * predict(result, [8e-3]).steps[0].force_N, rel=1e-3)
+    assert prediction.steps[0].force_N == pytest.approx(factor * predict(result, [8e-3]).steps[0].force_N)
     assert [finding.code for finding in prediction.findings] == codes
 
 

@@ -32,7 +32,8 @@ def test_three_sources_of_pre_curvature_agree_with_the_truth(found, law):
     assert set(sources) == {"photo", "balance", "inverse"}
     for value, std in sources.values():
         assert abs(value - law.K0) < 4 * std
-    assert sources["photo"][1] < 0.01
+    # sections to 5 um over 0.2 m tell a curvature to 0.0003 1/m if independent, and these are alike over a millimetre
+    assert sources["photo"][1] < 0.001
 
 
 def test_both_ways_are_compared_on_the_range_both_visited(found):
@@ -205,7 +206,7 @@ def test_residual_figures_are_those_of_the_noise(found, measured):
     # Sections: 0.05 px at 11 px/mm, and a block mean of two correlation lengths keeps about two thirds of it.
     assert 2e-6 < misfit.shape_rmse_m < 5e-6
     assert misfit.force_rmse_N < 3 * max(s.force_std for s in measured.steps)
-    assert misfit.chi2 / misfit.degrees_of_freedom == pytest.approx(1.0, abs=0.25)
+    assert misfit.chi2 == pytest.approx(misfit.degrees_of_freedom, abs=3.0 * np.sqrt(2.0 * misfit.degrees_of_freedom))
     assert 0 < misfit.curvature_rmse_per_m < 1.0
 
 
@@ -216,6 +217,6 @@ def test_photo_residuals_stand_at_the_points_of_the_centerline(found, measured):
         seen = step.shape.seen
         assert residual.size == step.shape.s.size
         z = residual[seen] / np.array(photos[step.step].shape_residual_std_m)[seen]
-        assert np.abs(z).max() < 6
+        assert np.abs(z).max() < 4  # of 200 points, alike over a few millimetres
         fitted = np.array(photos[step.step].kappa_fit_per_m)
-        assert np.abs(fitted - step.shape.kappa)[step.shape.s.size // 2] < 0.2
+        assert np.abs(fitted - step.shape.kappa)[step.shape.s.size // 2] < 0.1  # 1 % of the largest
