@@ -87,26 +87,11 @@ def assemble(
     parts = identification_parts(identification)
     photos = photo_parts(specimen, traces, parts)
     measured = parts.inverse.converged or parts.balance.curve is not None
-    diagnosed = list(findings)
-    earlier = [
-        *specimen.findings,
-        *traces.findings,
-        *folded((photo.image, finding) for photo in traces.photos for finding in photo_findings(photo)),
-        *parts.findings,
-    ]
-    gathered = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
-    told = [FindingPart(code=f.code, level=f.level, message=f.message) for f in gathered]
+    told = _gathered(specimen, traces, parts, list(findings))
     return Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
         headline=headline(parts, diagnosis, photos, leading(told)),
-        specimen=SpecimenPart(
-            id=specimen.id,
-            length_m=specimen.length_m,
-            diameter_m=specimen.diameter_m,
-            folder=str(specimen.folder),
-            moving_bearing=specimen.rig.moving_bearing,
-            description=specimen.description,
-        ),
+        specimen=_specimen_part(specimen),
         scale=ScalePart(
             px_per_mm=traces.scale.px_per_m / 1e3,
             std_relative=traces.scale.std_relative,
@@ -121,6 +106,31 @@ def assemble(
         diagnosis=diagnosis,
         findings=told,
         provenance=provenance(specimen, settings, command),
+    )
+
+
+def _gathered(
+    specimen: Specimen, traces: Traces, parts: IdentificationParts, diagnosed: Sequence[Finding]
+) -> list[FindingPart]:
+    """Findings of all stages in their order, each fault told once."""
+    earlier = [
+        *specimen.findings,
+        *traces.findings,
+        *folded((photo.image, finding) for photo in traces.photos for finding in photo_findings(photo)),
+        *parts.findings,
+    ]
+    found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
+    return [FindingPart(code=f.code, level=f.level, message=f.message) for f in found]
+
+
+def _specimen_part(specimen: Specimen) -> SpecimenPart:
+    return SpecimenPart(
+        id=specimen.id,
+        length_m=specimen.length_m,
+        diameter_m=specimen.diameter_m,
+        folder=str(specimen.folder),
+        moving_bearing=specimen.rig.moving_bearing,
+        description=specimen.description,
     )
 
 
