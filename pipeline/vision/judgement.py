@@ -341,7 +341,7 @@ def _assemble(
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
-        findings=tuple(_hidden_end(axis) for axis in axes if axis.kind == "clamp"),
+        findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
 
 
@@ -351,9 +351,18 @@ def _seen(standout: Standout, cut: CrossCut, stage: SegmentationSettings) -> NDA
     return (cut.step > stage.seen_share * cut.contrast) | dimmed
 
 
-def _hidden_end(axis: Bearing) -> Finding:
-    """Say that the line ends where the light does: what the cable does in front of or behind a thing is not seen."""
+def _hidden_end(axis: Bearing, cable: Cable) -> Finding:
+    """Say that the line ends where the light does: what the cable does in front of or behind a thing is not seen.
+
+    A warning where the length is unknown: a known one is held against the line, and tells whether a piece is missing.
+    """
     u, v = axis.center_px
+    if cable.length_px is None and cable.slenderness is None:
+        text = (
+            f"the cable vanishes at something larger near ({u:.0f}, {v:.0f}) px; the line ends there, and the traced "
+            "length may be short of the cable's"
+        )
+        return Finding("photo/hidden-end", "warning", text)
     text = (
         f"the cable vanishes at something larger near ({u:.0f}, {v:.0f}) px; the line ends there, not at the cable's "
         "end"

@@ -187,13 +187,16 @@ def test_cable_is_found_in_the_band_that_it_makes_with_a_hard_shadow(azimuth: fl
     assert distance[beside].max() < 0.25 * 26.0
 
 
-def test_end_at_a_larger_thing_is_told() -> None:
+@pytest.mark.parametrize(("length", "level"), [(None, "warning"), (LENGTH * SCALE, "info")], ids=["unknown", "known"])
+def test_end_at_a_larger_thing_is_told(length: float | None, level: str) -> None:
+    """Where no length tells whether a piece is missing, that the line may be short is a warning."""
     box = Thing("box", (0.0, 0.0), (0.03, 0.03), 0.0, (0.1,) * 3)
-    rough, _ = find(scene(covers=(None, None), things=(box,)), Cable(DIAMETER * SCALE))
+    rough, _ = find(scene(covers=(None, None), things=(box,)), Cable(DIAMETER * SCALE, length))
     assert isinstance(rough, RoughCable)
     assert (rough.left.kind, rough.right.kind) == ("clamp", "end")
     (finding,) = rough.findings
-    assert finding.code == "photo/hidden-end"
+    assert (finding.code, finding.level) == ("photo/hidden-end", level)
+    assert ("may be short" in finding.message) is (length is None)
     assert f"({rough.left.center_px[0]:.0f}, {rough.left.center_px[1]:.0f}) px" in finding.message
 
 
