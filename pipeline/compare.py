@@ -132,13 +132,13 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     (K0_a, std_a), (K0_b, std_b) = pre_curvature(a, one), pre_curvature(b, two)
     rest = _difference(K0_a, K0_b, float(np.hypot(std_a, std_b)))
     mean = _mean(first, second, grid, bands)
-    verdict, statement = _verdict(a, b, (p, rest, mean), ratio, settings)
+    verdict = _verdict(a, b, Tested(p, rest, mean), ratio, settings)
     return Comparison(
         a=a.specimen.id,
         b=b.specimen.id,
         methods=methods,
-        verdict=verdict,
-        statement=statement,
+        verdict=verdict.name,
+        statement=verdict.statement,
         range_per_m=(float(grid[0]), float(grid[-1])),
         kappa_per_m=grid,
         ratio=ratio,
@@ -173,20 +173,39 @@ def _difference(a: float, b: float, std: float) -> Difference:
     return Difference(a, b, b - a, std, float(2.0 * ndtr(-float(z))))
 
 
+@dataclass(frozen=True)
+class Tested:
+    """What two results were compared by: p of their whole curves (None where that is not known), K0, mean stiffness."""
+
+    p_characteristic: float | None
+    rest: Difference
+    mean: Difference
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Verdict, and the statement in plain words that says why."""
+
+    name: str
+    statement: str
+
+
 def _verdict(
     a: Result,
     b: Result,
-    tested: tuple[float | None, Difference, Difference],
+    tested: Tested,
     ratio: Array,
     settings: CompareSettings,
-) -> tuple[str, str]:
+) -> Verdict:
     """Verdict and statement in plain words."""
-    p, rest, mean = tested
+    p, rest, mean = tested.p_characteristic, tested.rest, tested.mean
     names = f"{a.specimen.id} and {b.specimen.id}"
     rms, most = np.sqrt(np.mean((ratio - 1.0) ** 2)), np.max(np.abs(ratio - 1.0))
     size = f"f_EI differs by {plain(100 * rms, 2)} % rms, {plain(100 * most, 2)} % at most"
     if p is None:
-        return "not comparable", f"{size}, but a result holds no covariance along its curve: it cannot be tested."
+        return Verdict(
+            "not comparable", f"{size}, but a result holds no covariance along its curve: it cannot be tested."
+        )
     bent = min(1.0, TESTS * p) < settings.level
     set_off = min(1.0, TESTS * rest.p_value) < settings.level
     stiffer = b.specimen.id if mean.difference > 0.0 else a.specimen.id
@@ -196,10 +215,10 @@ def _verdict(
     if set_off:
         seen.append(f"the pre-curvature (by {rounded(rest.difference, rest.std)} 1/m, {p_text(rest.p_value)})")
     if seen:
-        return "differ", f"{names} differ beyond their bands in {' and in '.join(seen)}. {size}."
+        return Verdict("differ", f"{names} differ beyond their bands in {' and in '.join(seen)}. {size}.")
     found = f"{size}, which is within both bands ({p_text(p)})"
     seen_from = f"a mean difference of {plain(200 * mean.std / mean.a, 2)} % is twice its standard deviation"
-    return "no difference seen", f"{names} do not differ beyond their bands: {found}; {seen_from}."
+    return Verdict("no difference seen", f"{names} do not differ beyond their bands: {found}; {seen_from}.")
 
 
 def _not_comparable(
