@@ -206,22 +206,26 @@ def _concluded(
     left = _left_over(bench, bench.base if accepted is None else accepted.fitted, settings)
     names = [bench.suspicion.causes[k].name for k in accepted.causes] if accepted and two else []
     both = len(names) == 2 and LAW not in names  # another control point of the law is no second cause
-    free = accepted is not None and any(is_wave(term.variant) for term in accepted.fitted.extension.terms)
-    alien = left.p_value < settings.alien_false_alarm and (
-        left.excess > settings.explained_share * (accepted.gain if accepted else 0.0)
-        or ((both or free) and not _fits(accepted, settings))
-    )
+    alien = _beyond_catalogue(accepted, left, settings, both=both)
     return Conclusion(singles, chance, members, accepted, two, left, alien)
 
 
-def _fits(accepted: Explanation | None, settings: DiagnosisSettings) -> bool:
-    """Whether an explanation leaves little more than noise.
+def _beyond_catalogue(accepted: Explanation | None, left: Leftover, settings: DiagnosisSettings, *, both: bool) -> bool:
+    """Whether what an explanation leaves is more than noise and too much for it to be believed.
 
-    Two causes with all their forms come close to much that they are not: five strong pairs that left more than twice
-    the noise had a wrong name in them, the right ones left the noise. So do waves along the cable: stiff ends passed
-    for a stiffness that varies by 200 % and left six times the noise; right profiles of any form leave the noise.
+    Too much is a share of what it removed, or, for two causes and for waves along the cable, more than the noise: with
+    all their forms they come close to much that they are not. Five strong pairs that left more than twice the noise had
+    a wrong name in them, the right ones left the noise; stiff ends passed for a stiffness that varies by 200 % and left
+    six times the noise, right profiles of any form leave the noise.
     """
-    return accepted is not None and accepted.fitted.reduced_chi2 < settings.fits
+    if left.p_value >= settings.alien_false_alarm:
+        return False
+    if accepted is None:
+        return left.excess > 0.0
+    pliable = both or any(is_wave(term.variant) for term in accepted.fitted.extension.terms)
+    return left.excess > settings.explained_share * accepted.gain or (
+        pliable and accepted.fitted.reduced_chi2 >= settings.fits
+    )
 
 
 def _members(

@@ -4,10 +4,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.diagnose import _refitted
+from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.diagnose import _beyond_catalogue, _refitted
 from pipeline.diagnosis.statistics.score import score
 from pipeline.diagnosis.statistics.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
 from pipeline.settings.diagnosis import DiagnosisSettings
+
+LINEAR, WAVE = Variant("growing along the cable"), Variant("in waves", at=-3.0, known=0.3)
 
 
 def weigh(gains, **kind):
@@ -110,3 +113,28 @@ def test_a_cause_that_no_score_announced_is_not_refitted_alone(monkeypatch, bran
     monkeypatch.setattr(room, "_explanations", explanations)
     _refitted(bench, DiagnosisSettings())
     assert tried == ([[0], [1]] if others else [[0]])
+
+
+@pytest.mark.parametrize(
+    ("variant", "both", "reduced", "excess", "p_value", "alien"),
+    [
+        (WAVE, False, 6.0, 50.0, 0.0, True),  # stiff ends taken for waves of the stiffness: 98 % removed, names nothing
+        (WAVE, False, 1.1, 50.0, 0.0, False),
+        (LINEAR, False, 6.0, 50.0, 0.0, False),  # one form alone imitates little: its share of the misfit decides
+        (LINEAR, False, 6.0, 500.0, 0.0, True),
+        (LINEAR, True, 6.0, 50.0, 0.0, True),
+        (LINEAR, True, 1.1, 50.0, 0.0, False),
+        (WAVE, True, 6.0, 500.0, 0.2, False),  # chance alone leaves as much
+    ],
+)
+def test_what_can_imitate_much_must_leave_no_more_than_noise(variant, both, reduced, excess, p_value, alien):
+    extension = SimpleNamespace(terms=(SimpleNamespace(variant=variant),))
+    accepted = SimpleNamespace(gain=2000.0, fitted=SimpleNamespace(extension=extension, reduced_chi2=reduced))
+    left = SimpleNamespace(p_value=p_value, excess=excess)
+    assert _beyond_catalogue(accepted, left, DiagnosisSettings(), both=both) is alien
+
+
+@pytest.mark.parametrize(("excess", "p_value", "alien"), [(50.0, 0.0, True), (50.0, 0.2, False)])
+def test_without_an_explanation_anything_beyond_chance_is_unexplained(excess, p_value, alien):
+    left = SimpleNamespace(p_value=p_value, excess=excess)
+    assert _beyond_catalogue(None, left, DiagnosisSettings(), both=False) is alien
