@@ -123,7 +123,7 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
         away = side * width + offsets
         u, v = ((centre[:, k, None] + across[:, k, None] * away).astype(np.float32) for k in (0, 1))
         profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets))
+        spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets, outward=side > 0.0))
     along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
     return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
 
@@ -148,18 +148,12 @@ def _motion(spreads: Array, angles: Array) -> float:
     return float(np.sqrt(24.0 * np.hypot(fitted[1], fitted[2]))) if smooth.min() < 0.5 * smooth.max() else 0.0
 
 
-def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> Array:
-    """Spread of one edge on each group of sections; NaN where the profile is flat.
-
-    Medians over the sections of a group: letters cover less than half of them, and a mean would take their rims, and
-    the sections they misplace, for blur.
-    """
+def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: bool) -> Array:
+    """Spread of one edge on each group of sections; NaN where the profile is flat. ``outward``: sheath first."""
     spacing = float(offsets[1] - offsets[0])
     plateau = max(2, len(offsets) // 6)
     ends = np.stack([profile[:, :plateau].mean(axis=1), profile[:, -plateau:].mean(axis=1)])
-    usual = np.median(ends.reshape(2, _GROUPS, -1), axis=2)
-    low_end, high_end = np.repeat(usual, profile.shape[0] // _GROUPS, axis=1)
-    step, level = high_end - low_end, 0.5 * (low_end + high_end)
+    step, level = ends[1] - ends[0], 0.5 * (ends[0] + ends[1])
     above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
     crossing = np.argmax(above, axis=1)
     # Lined up at their own crossings, so a path half a pixel off does not count as blur: each is moved by whole columns
@@ -169,8 +163,26 @@ def _spread_of_groups(profile: NDArray[np.float32], offsets: Array) -> Array:
     share = (columns - low).astype(np.float32)
     last = len(offsets) - 1
     first, second = (np.take_along_axis(profile, np.clip(low + k, 0, last), axis=1) for k in (0, 1))
-    lined = np.median((first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)), axis=1)
+    kept = _without_print(ends[::-1] if outward else ends)
+    lined = np.average(
+        (first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)),
+        axis=1,
+        weights=np.broadcast_to(kept[..., None], (*kept.shape, len(offsets))),
+    )
     rise = np.abs(lined[:, 2:] - lined[:, :-2])[:, plateau - 1 : 1 - plateau]
     slope = rise.max(axis=1, initial=0.0) / (2.0 * spacing)
-    height = np.abs(usual[1] - usual[0])
+    height = np.abs(np.average(step.reshape(_GROUPS, -1), axis=1, weights=kept))
     return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), np.nan))
+
+
+def _without_print(ends: NDArray[np.float32]) -> Array:
+    """Weights ``(groups, sections)``: 0 where the sheath differs from that of the group; ground and sheath ``(2, n)``.
+
+    Letters cover less than half of the sections. Their rims are no edges of the cable, and where the ink is brighter
+    than a bright sheath, half of its height is reached at the rim and not at the cable's edge.
+    """
+    grouped = ends.reshape(2, _GROUPS, -1)
+    usual = np.median(grouped, axis=2, keepdims=True)
+    # A quarter of the step: texture and light vary by less, fainter ink does not reach half of the height.
+    plain = np.abs(grouped[1] - usual[1]) < 0.25 * np.abs(usual[1] - usual[0])
+    return np.where(plain.any(axis=1, keepdims=True), plain, True).astype(float)
