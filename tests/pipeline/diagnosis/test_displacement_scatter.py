@@ -65,7 +65,7 @@ def test_what_lies_outside_the_catalogue_is_no_scatter_of_displacements():
 
 @pytest.mark.parametrize("scatters", [True, False])
 def test_scatter_is_asked_for_beside_a_cause_that_was_named(scatters):
-    """Never asked for there, it made a class of a set and friction, with f_EI 1.7 % off instead of 0.4 %."""
+    """Never asked for there, it made a class of a set and friction on another draw, f_EI 1.7 % off instead of 0.4 %."""
     cable, reading = HIDE["plastic_set"](0.08, Form())
     test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=7, reading=reading)
     faults = faults_of_input(scattering(test, 7) if scatters else test, SETTINGS)
