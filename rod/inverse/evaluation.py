@@ -102,7 +102,7 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
     """Residuals and jacobian at the unknowns `u`; `starts` are the equilibria of a neighbour."""
     if np.any(np.abs(u[: model.knots.size]) > LOG_RANGE):
         return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=Outcome.LIMIT_POINT)
-    imposed = [_imposed_chord(model, u, d) for d in model.data]
+    imposed = [imposed_chord(model, u, d) for d in model.data]
     bent = [k for k, d in enumerate(model.data) if not d.at_rest]
     shapes = {k: _arc(model, u) for k, d in enumerate(model.data) if d.at_rest}
     equilibria: tuple[Equilibrium, ...] = ()
@@ -130,7 +130,7 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
     return _whitened(model, u, fits, equilibria)
 
 
-def _imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Array]:
+def imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Array]:
     """Chord imposed on a step, m, and its derivative by all unknowns (q,)."""
     by = np.zeros(model.size)
     if data.chord is not None:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rod.equilibrium import Outcome
 from rod.inverse.control_points import FIRST_BLUR, START_PRECISION, Fit, chosen_knots, fit
 from rod.inverse.estimate import Estimate, InverseOutcome, read_off
-from rod.inverse.evaluation import Evaluation, evaluate
+from rod.inverse.evaluation import Evaluation, evaluate, imposed_chord
 from rod.inverse.fit_model import FitModel, StepData, fit_model, step_data
 from rod.inverse.knots import place_knots
 from rod.inverse.options import InverseOptions
@@ -38,6 +38,12 @@ Array = NDArray[np.float64]
 
 OPPOSITE = -0.5
 """Correlation of curvature and moment below which forces contradict photos; noise brings it to zero, not below."""
+
+REACHING = 10
+"""Chords shortened one after the other at most; they share their nuisances, so one or two bring all within reach."""
+
+REACH = 4.0
+"""Standard deviations of what is stated by which chords may be shortened; a length that is wrong asks for more."""
 
 
 def estimate(
@@ -126,9 +132,31 @@ def first_fit(
     model = replace(fit_model(test, data, knots, elements=options.elements, unit=line[0]), blur=FIRST_BLUR)
     u = model.start(np.full(3, EI), K0)
     trial = evaluate(model, u)
+    if trial.failure is Outcome.UNREACHABLE:
+        u = within_reach(model, u)
+        trial = evaluate(model, u)
     if trial.failure is None:
         u = rescaled(model, trial)
     return fit(model, u, starts=trial.equilibria, evaluations=options.evaluations, precision=START_PRECISION)
+
+
+def within_reach(model: FitModel, u: Array) -> Array:
+    """Unknowns (q,) whose nuisances bring every imposed chord down to that of the force-free cable.
+
+    Covers that are seen too far apart, or a scale a little off, make chords of hardly bent cables longer than the cable
+    itself: those before the first bend and, unloaded again, after the last. What is doubted most is moved most: the
+    change is the smallest in units of the priors that will do. Where that is beyond all doubt the unknowns are returned
+    as they are.
+    """
+    given, u = u, u.copy()
+    natural = model.bending_test(u).zero_chord
+    for _ in range(REACHING):
+        chord, by = max((imposed_chord(model, u, d) for d in model.data if not d.at_rest), key=lambda one: one[0])
+        by = by[model.laws :]
+        if chord <= natural or not by.any():
+            break
+        u[model.laws :] -= by * (chord - natural) / (by @ by)
+    return u if np.linalg.norm(u[model.laws :]) < REACH else given
 
 
 def rescaled(model: FitModel, trial: Evaluation) -> Array:

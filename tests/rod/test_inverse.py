@@ -169,6 +169,20 @@ def test_axes_seen_too_far_apart_are_found_and_leave_the_law_alone(seed, foot):
     assert result.evaluation.chi2("shape")[0] < 1.2 * result.evaluation.chi2("shape")[1]
 
 
+def test_hardly_bent_steps_whose_axes_are_seen_farther_apart_than_the_cable_is_long():
+    """As before the first bend and after the last: no cable reaches such a chord until the parallax is fitted."""
+    parallax = 8e-3
+    chords = np.append(force_free(LAW, LENGTH).chord - 5e-5, CHORDS)
+    test = parted_axes(measured(chords=chords), parallax, (0.1, 0.0))
+    steps = tuple(replace(step, picture_centre=(0.1, 0.01)) for step in test.steps)
+    test = replace(test, steps=steps, axis_parallax_std=1e-2, camera_foot_std=0.05)
+    assert max(step.chord for step in test.steps if step.branch != "mounted") > LENGTH
+    result = estimate(test, options=QUICK)
+    assert result.outcome is InverseOutcome.CONVERGED
+    assert result.model.nuisance(result.unknowns, "parallax") == pytest.approx(parallax, abs=0.1 * parallax)
+    assert rms(result, LAW) < 0.02  # as above
+
+
 def test_forces_scale_the_stiffness_only():
     test = measured()
     doubled = replace(test, steps=tuple(replace(s, force=2 * s.force, force_std=2 * s.force_std) for s in test.steps))
