@@ -49,6 +49,7 @@ SPELLED = {"newton": "N", "newtons": "N", "millinewton": "mN", "kilonewton": "kN
 TEMPERATURES = ("°c", "degc", "c", "k", "°f", "grad c", "deg c")
 # A symbol behind the name, as in "Kraft F", "Verschiebung ux", and what was measured beside what was asked for
 SYMBOL = re.compile(r"(?P<base>.*\S)\s+(?:[A-Za-z][A-Za-z]?|[A-Za-z]_\w|[Ii]st|[Aa]ctual)")
+COMPONENT = re.compile(r"f[ _]?[xyz]", re.IGNORECASE)  # of a force, where a cell measures several
 UNIT_IN_NAME = re.compile(
     r"(?P<base>.*?\S)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|(?:/|\bin\b)\s*(?P<behind>[^\s/]+))\s*"
 )
@@ -134,10 +135,9 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
     """
     found: dict[str, list[int]] = {}
     bases = [_role(cell) for cell in header]
-    bases = [
-        base or (role if role not in bases else None)
-        for base, role in zip(bases, map(_role_beside_symbol, header), strict=True)
-    ]
+    for less_sure in (_role_beside_symbol, _role_of_component):
+        roles = zip(bases, map(less_sure, header), strict=True)
+        bases = [base or (role if role not in bases else None) for base, role in roles]
     for role in ROLES:
         if role in spec.columns:
             wanted = spec.columns[role]
@@ -166,6 +166,11 @@ def _role_beside_symbol(cell: str) -> str | None:
     """Role of a header cell whose name has a symbol of one or two letters behind it."""
     found = SYMBOL.fullmatch(_split_unit(cell)[0])
     return ROLE_OF.get(_plain(found["base"])) if found else None
+
+
+def _role_of_component(cell: str) -> str | None:
+    """Force for a header cell that names one component of it."""
+    return "force" if COMPONENT.fullmatch(_split_unit(cell)[0]) else None
 
 
 def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Path) -> Columns:
@@ -205,7 +210,7 @@ def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Pat
     return Columns(
         index=index,
         names={role: header[place] for role, place in index.items()},
-        factor={role: _factor(role, unit, path, line) for role, unit in units.items()},
+        factor={role: factor_of(role, unit, path, line) for role, unit in units.items()},
         separator=separator,
         header_line=line,
         first_row=row + (0 if headless else 2 if unit_row else 1),
@@ -216,8 +221,14 @@ def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Pat
     )
 
 
-def _factor(role: str, unit: str, path: Path, line: int) -> float:
-    """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC)."""
+def factor_of(role: str, unit: str, path: Path, line: int | None) -> float:
+    """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC).
+
+    Raises
+    ------
+    InputError
+        ``log/unit``.
+    """
     unit = SPELLED.get(unit.casefold(), unit or ASSUMED[role]).replace(
         "μ", "µ"
     )  # Greek mu and the micro sign look the same

@@ -37,7 +37,7 @@ INFINITE = ("inf", "-inf", "+inf", "infinity")
 SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
 MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
 # Digit grouping by space or apostrophe, and the typographic minus sign
-SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
+_SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
 
 
 def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str, str]:
@@ -117,6 +117,12 @@ def cells(text: str, separator: str, *, most: int | None = None) -> list[Row]:
     return rows
 
 
+def smooth(cell: str) -> str:
+    """A number without grouping blanks, its minus sign an ASCII one in front: SAP writes ``1,2-``."""
+    token = cell.translate(_SMOOTH)
+    return f"-{token[:-1]}" if token[-1:] == "-" and token[:1].isdigit() else token
+
+
 def is_missing(cell: str) -> bool:
     """True for the ways in which programs write "no value", infinity included."""
     return cell.casefold() in MISSING
@@ -149,8 +155,8 @@ def decimal_sign(
     """
     if decimal is not None:
         return decimal
-    smooth = [token.translate(SMOOTH) for token in tokens if not is_missing(token)]
-    marked = [token for token in smooth if "." in token or "," in token]
+    written = [smooth(token) for token in tokens if not is_missing(token)]
+    marked = [token for token in written if "." in token or "," in token]
     if not marked or (separator == "," and not any("," in token for token in marked)):
         return "."
     point = [token for token in marked if not _fits(POINT, token)]
@@ -178,7 +184,7 @@ def _decisive(cell: str) -> Decimal | None:
     """
     if CLOCK_WITH_COMMA.search(cell):
         return ","
-    token = cell.translate(SMOOTH)
+    token = smooth(cell)
     point, comma = _fits(POINT, token), _fits(COMMA, token)
     return None if point == comma else "." if point else ","
 
@@ -195,7 +201,7 @@ def _zero_group(pattern: re.Pattern[str], token: str) -> bool:
 
 def looks_like_number(cell: str) -> bool:
     """True for a number in either notation."""
-    token = cell.translate(SMOOTH)
+    token = smooth(cell)
     return _fits(POINT, token) or _fits(COMMA, token)
 
 
@@ -206,7 +212,7 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
     """
     if PLAIN[decimal].fullmatch(cell):  # nearly every cell of a long log: nothing to smooth, nothing grouped
         return float(cell.replace(",", "."))
-    token = cell.translate(SMOOTH)
+    token = smooth(cell)
     if not _fits(POINT if decimal == "." else COMMA, token):
         return None
     plain = token.replace("," if decimal == "." else ".", "").replace(",", ".")
@@ -215,7 +221,7 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
 
 def decimals(cell: str, decimal: Decimal) -> int:
     """Digits behind the decimal sign: the resolution of the log."""
-    mantissa = EXPONENT.split(cell.translate(SMOOTH), maxsplit=1)
+    mantissa = EXPONENT.split(smooth(cell), maxsplit=1)
     shift = int(mantissa[1]) if len(mantissa) > 1 else 0
     return len(mantissa[0].partition(decimal)[2].strip()) - shift
 

@@ -56,7 +56,7 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> Force
         read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
     )
     columns, rows = find_columns(text, spec, path=path, settings=settings)
-    samples = read_samples(rows, columns, spec, path=path, settings=settings)
+    samples, columns = read_samples(rows, columns, spec, path=path, settings=settings)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
     check_response(steps, path=path, settings=settings)
     return ForceLog(steps, columns, encoding, (*_reading(columns, encoding, path), *samples.findings, *findings))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -47,19 +47,20 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
 def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings) -> tuple[str, ...]:
     """Names (relative, with ``/``) of the photos of a folder in natural order.
 
-    Photos lie in ``images`` (or a folder of the like, see ``FOLDERS``) or beside ``specimen.toml``.
+    Photos lie in ``images`` (or a folder of the like, see ``FOLDERS``), or in the only folder within it that holds any,
+    or beside ``specimen.toml``.
 
     Raises
     ------
     InputError
         ``folder/too-many-photos``.
     """
-    names = []
-    for place in _places(folder, settings):
-        directory = folder / place
-        if without is not None and os.path.realpath(directory) == os.path.realpath(without):
-            continue
-        names += [str(PurePosixPath(place) / entry) for entry in _entries(directory) if _is_photo(entry)]
+    names = [
+        str(PurePosixPath(place) / entry)
+        for place in _places(folder, settings, without)
+        for entry in _entries(folder / place)
+        if _is_photo(entry)
+    ]
     if len(names) > settings.photos_max:
         raise InputError(
             f"holds {len(names)} photos, the limit is {settings.photos_max}",
@@ -74,22 +75,60 @@ def no_photos(
     folder: Path, told: str, settings: IntakeSettings, *, remedy: str = "put the photos into its folder images"
 ) -> InputError:
     """The error for a folder without a photo; pictures that only need to be converted are named."""
-    entries = [entry for place in _places(folder, settings) for entry in _entries(folder / place)]
-    other = [entry for entry in entries if PurePosixPath(entry).suffix.casefold() in OTHER_SUFFIXES]
+    other = [PurePosixPath(name).name for name in _of_other_kinds(folder, None, settings)]
     if other:
         told = f"{told}, only pictures of other kinds: {_some(other)}"
         remedy = "convert them to png or jpg at full size"
-    elsewhere = [entry for entry in _entries(folder) if any(map(_is_photo, _entries(folder / entry)))]
-    aside = [entry for entry in elsewhere if entry.casefold() not in FOLDERS]
+    below = [f"{place}/{entry}" for place in _named(folder, settings) for entry in _entries(folder / place)]
+    aside = [entry for entry in _entries(folder) if entry.casefold() not in FOLDERS]
+    aside = [entry for entry in (*aside, *below) if any(map(_is_photo, _entries(folder / entry)))]
     if aside:
         remedy = f"move the photos from {_some(aside)} into its folder images"
     return InputError(told, path=folder, code="folder/no-photos", remedy=remedy)
 
 
-def _places(folder: Path, settings: IntakeSettings) -> list[str]:
-    """Where photos may lie: beside ``specimen.toml``, and in folders named after them that do not lead out of it."""
+def _named(folder: Path, settings: IntakeSettings) -> list[str]:
+    """Folders named after photos that do not lead out of the specimen's."""
     named = [entry for entry in _entries(folder) if entry.casefold() in FOLDERS]
-    return ["", *(place for place in named if inside(folder, place, allow_outside=settings.allow_outside) is not None)]
+    return [place for place in named if inside(folder, place, allow_outside=settings.allow_outside) is not None]
+
+
+def _places(folder: Path, settings: IntakeSettings, without: Path | None) -> list[str]:
+    """Where photos may lie, the folder of calibration photos left out.
+
+    Beside ``specimen.toml``; in folders named after photos, and where one of these holds no photo itself, in the only
+    folder within it that does, as cameras make it.
+    """
+
+    def calibrates(place: str) -> bool:
+        return without is not None and os.path.realpath(folder / place) == os.path.realpath(without)
+
+    places = [""]
+    for place in _named(folder, settings):
+        within = [f"{place}/{entry}" for entry in _entries(folder / place) if not NO_PHOTO.search(entry)]
+        within = [
+            deeper
+            for deeper in within
+            if any(map(_is_photo, _entries(folder / deeper)))
+            and inside(folder, deeper, allow_outside=settings.allow_outside) is not None
+            and not calibrates(deeper)
+        ]
+        alone = len(within) == 1 and not any(map(_is_photo, _entries(folder / place)))
+        places.append(within[0] if alone else place)
+    return [place for place in places if not calibrates(place)]
+
+
+def _of_other_kinds(folder: Path, without: Path | None, settings: IntakeSettings) -> list[str]:
+    """Pictures of kinds that are not read, and of which no photo of the same name is there."""
+    names = [
+        PurePosixPath(place) / entry
+        for place in _places(folder, settings, without)
+        for entry in _entries(folder / place)
+        if not NO_PHOTO.search(entry)
+    ]
+    read = {name.with_suffix("") for name in names if _is_photo(name.name)}
+    other = [name for name in names if name.suffix.casefold() in OTHER_SUFFIXES and name.with_suffix("") not in read]
+    return sorted(map(str, other), key=natural_key)
 
 
 def _entries(directory: Path) -> list[str]:
@@ -116,7 +155,8 @@ def match_photos(
         photos does not fit the steps.
     """
     present = list_photos(folder, without=calibration, settings=settings)
-    findings: list[Finding] = []
+    other = _of_other_kinds(folder, calibration, settings)
+    findings = [_other_kinds(other)] if other and present else []
     if not any(step.image for step in steps):
         steps, noted = _by_order(folder, steps, present, log_name, settings)
         findings += noted
@@ -154,6 +194,14 @@ def match_photos(
     return FoundPhotos(paths, hashes, tuple(matched), (*findings, *_same_contents(hashes)))
 
 
+def _other_kinds(names: Sequence[str]) -> Finding:
+    message = (
+        f"pictures of a kind that is not read were not measured: {_some(names)}; "
+        "convert them to png or jpg at full size"
+    )
+    return doubtful("photo/other-kind", message)
+
+
 def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
@@ -166,11 +214,11 @@ def _by_order(
         raise no_photos(folder, "has no photos", settings)
     numbers = [_last_number(name) for name in present]
     at = {step.step: place for place, step in enumerate(steps)}
-    if len(present) == len(steps):
-        chosen, how = dict(enumerate(present)), "in the natural order of their names"
-    elif None not in numbers and len(set(numbers)) == len(numbers) and set(numbers) <= at.keys():
+    if None not in numbers and len(set(numbers)) == len(numbers) and set(numbers) <= at.keys():
         chosen = {at[number]: name for number, name in zip(numbers, present, strict=True) if number is not None}
         how = "by the step numbers in their names"
+    elif len(present) == len(steps):
+        chosen, how = dict(enumerate(present)), "in the natural order of their names"
     else:
         raise InputError(
             f"names no photos, and {len(present)} photos cannot be told to {len(steps)} steps",
@@ -181,7 +229,21 @@ def _by_order(
     assigned = [replace(step, image=chosen.get(place)) for place, step in enumerate(steps)]
     pairs = ", ".join(f"{step.step}: {step.image}" for step in assigned[:3])
     message = f"{log_name} names no photos; {len(chosen)} photos were given to the steps {how} ({pairs}, ...)"
-    return assigned, [(inferred if len(chosen) == len(steps) else doubtful)("photo/inferred", message)]
+    whole = len(chosen) == len(steps)
+    return assigned, [(inferred if whole else doubtful)("photo/inferred", message), *_misnumbered(assigned)]
+
+
+def _misnumbered(steps: Sequence[LoadStep]) -> Iterator[Finding]:
+    """A photo that has the number of another step in its name, unless all photos count from another number on."""
+    numbers = {step.step: _last_number(step.image or "") for step in steps}
+    apart = {None if number is None else number - step for step, number in numbers.items()}
+    wrong = [step for step in steps if numbers[step.step] in numbers.keys() - {step.step}]
+    if len(apart) > 1 and wrong and wrong[0].image is not None:
+        message = (
+            f"{wrong[0].image} was given to step {wrong[0].step}, but its name has the number of another step; "
+            "add a column image with the name of the photo of each step"
+        )
+        yield doubtful("photo/number", message)
 
 
 def _last_number(name: str) -> int | None:
@@ -236,7 +298,7 @@ def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | 
         return None, "", [doubtful("photo/outside", f"{name} leads out of the folder and was not read")]
     try:
         check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
-        begin = read_begin(path, max(map(len, SIGNATURES)))
+        begin = read_begin(path, 8)
         # The stage that decodes it says so, too; here it is said before anything is measured.
         told = [] if begin.startswith(SIGNATURES) else [_no_picture(name, begin)]
         return path, sha256(path), told
@@ -247,7 +309,8 @@ def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | 
 def _no_picture(name: str, begin: bytes) -> Finding:
     if not begin:
         return doubtful("photo/no-picture", f"{name}: the file is empty; copy it again from the camera")
-    return doubtful("photo/no-picture", f"{name}: the file is no png, jpg, bmp or tif; copy it again from the camera")
+    again = "convert it to png or jpg at full size" if begin[4:8] == b"ftyp" else "copy it again from the camera"
+    return doubtful("photo/no-picture", f"{name}: the file is no png, jpg, bmp or tif; {again}")
 
 
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:

@@ -31,6 +31,8 @@ LOOSE_MPA_MM2 = 3.0
 """Modulus times square of the diameter of loose copper wires (120 GPa), 0.01 mm thick, on a quarter of the section."""
 
 READINGS = {
+    1e9: "MN written for mN",
+    1e6: "MN written for N",
     1e3: "mN taken for N, or N for kN",
     102.0: "grams taken for N",
     9.81: "N taken for kgf",
@@ -109,7 +111,7 @@ def _too_large(modulus_mpa: float, usual: tuple[float, float]) -> str:
     """By which factor the forces may be off, if a mistaken unit brings the modulus back among those of cables."""
     stiff = modulus_mpa > usual[1]
     readings = [
-        (f"{factor:.7g} times too large" if stiff else f"{1.0 / factor:.7g} times too small") + f" ({said})"
+        (f"{factor:.10g} times too large" if stiff else f"{1.0 / factor:.10g} times too small") + f" ({said})"
         for factor, said in READINGS.items()
         if (factor > 1.0) == stiff and usual[0] <= modulus_mpa / factor <= usual[1]
     ]

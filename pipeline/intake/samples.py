@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import InputError
+from pipeline.intake.cellunits import without_units
 from pipeline.intake.clock import clock_s, through_midnight
 from pipeline.intake.columns import Columns
 from pipeline.intake.dialect import Decimal, Row, decimal_sign, decimals, is_missing, to_number
@@ -85,19 +86,27 @@ class Samples:
 
 def read_samples(
     rows: Sequence[Row], columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings
-) -> Samples:
+) -> tuple[Samples, Columns]:
     """Convert the rows below the header.
+
+    Returns
+    -------
+    Samples
+    Columns
+        With the units that stand in the cells.
 
     Raises
     ------
     InputError
-        ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``.
+        ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``,
+        ``log/unit``.
     """
     again = {tuple(cells) for _, cells in rows[: columns.first_row] if len(cells) >= columns.width}
     data, summary = _without_summary([row for row in rows[columns.first_row :] if tuple(row[1]) not in again], columns)
     lines = [line for line, _ in data]
     _check_widths(data, columns, path)
     table = {role: [_cell(cells, place) for _, cells in data] for role, place in columns.index.items()}
+    table, columns = without_units(table, columns, path=path, line=lines[0] if lines else None)
     force = table["force"]
     displacement, carried = _carry_down(table["displacement"])
     kept = [row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]]
@@ -120,7 +129,7 @@ def read_samples(
     branches = _branches(table["branch"], lines, path) if "branch" in table else None
     times, noted = _times(table["time"], kept, numbers, settings) if "time" in table else (None, [])
     images = _kept_images(table.get("image"), kept, len(data))
-    return Samples(
+    samples = Samples(
         lines=tuple(lines[row] for row in kept),
         forces=numbers.column("force", force, kept),
         displacements=numbers.column("displacement", displacement, kept),
@@ -131,6 +140,7 @@ def read_samples(
         resolution=columns.factor["force"] * 10.0 ** -max(decimals(force[row], decimal) for row in kept),
         findings=(*_losses(path.name, lines, force, carried, summary), *noted),
     )
+    return samples, columns
 
 
 def _without_summary(data: Sequence[Row], columns: Columns) -> tuple[Sequence[Row], Sequence[Row]]:

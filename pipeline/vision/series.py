@@ -8,10 +8,11 @@ A photo that cannot be measured is a `pipeline.records.Rejected` in its place; t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -45,6 +46,10 @@ from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
 from pipeline.vision.stated_width import with_width_seen
 
 Line = Centerline | Rejected
+Told = TypeVar("Told")
+
+NOT_ALIKE = "What all photos have in common could not be told; the centerlines stay as they are. Please report it."
+_UNTOLD = Finding("photo/program-error", "warning", NOT_ALIKE)
 
 
 def trace_photo(
@@ -102,14 +107,16 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     """All photos with the diameter as stated."""
     calibration = _given_calibration(specimen, settings)
     shots, cover_findings = find_cables(specimen, calibration, settings)
-    shots, size_findings = of_one_size(shots, settings.series)
+    shots, sized = _together(shots, lambda some: of_one_size(some, settings.series))
+    shots, size_findings = sized or (shots, (_UNTOLD,))
     if calibration is None:
-        found, displacements = _told_by(shots, [shot.found for shot in shots])
-        calibration = from_found(specimen, found, displacements, settings.calibration)
+        shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, settings),))
+        calibration = _by_what_is_seen(specimen, shots, settings) if told is None else told[0]
     if calibration is None:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, "none: no photo could be measured"))
-    shots = with_fixed_cover(specimen, shots, calibration, settings)
+    shots, settled = _together(shots, lambda some: with_fixed_cover(specimen, some, calibration, settings))
+    shots = shots if settled is None else settled
     found, _ = _told_by(shots, [shot.found for shot in shots])
     parallax_std = axis_parallax_std(specimen, found, settings.calibration)
     shots, lines, side_findings = _measure_all(specimen, shots, calibration, parallax_std, settings)
@@ -117,17 +124,27 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
     lines, bow_findings = _alike(shots, lines, specimen, settings)
     lines = tuple(_doubted(line, calibration) for line in lines)
-    found, displacements = _told_by(shots, lines)
-    findings = (
-        *calibration.findings,
-        *cover_findings,
-        *size_findings,
-        *side_findings,
-        *bow_findings,
-        *check_scale(specimen, calibration, found, displacements, settings.calibration),
-        *_check_lengths(specimen, lines, settings.series),
-    )
-    return Traces(lines, calibration.scale, findings, parallax_std)
+    lines, check_findings = _checked(specimen, shots, lines, calibration, settings)
+    untold = () if settled is not None else (_UNTOLD,)
+    findings = (*cover_findings, *size_findings, *untold, *side_findings, *bow_findings, *check_findings)
+    findings = (*calibration.findings, *dict.fromkeys(findings))
+    return Traces(_with_pictures(shots, lines), calibration.scale, findings, parallax_std)
+
+
+def _together(shots: list[Shot], work: Callable[[list[Shot]], Told]) -> tuple[list[Shot], Told | None]:
+    """Work on all photos together; the one on which it breaks is refused. None where that heals nothing."""
+
+    def without(outcomes: Sequence[RoughCable | Rejected]) -> list[Shot]:
+        return [replace(shot, found=found) for shot, found in zip(shots, outcomes, strict=True)]
+
+    names, given = [shot.found.image for shot in shots], [shot.found for shot in shots]
+    outcomes, told = jointly(names, given, lambda some: work(without(some)))
+    return without(outcomes), told
+
+
+def _by_what_is_seen(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Calibration | None:
+    found, displacements = _told_by(shots, [shot.found for shot in shots])
+    return from_found(specimen, found, displacements, settings.calibration)
 
 
 def _alike(
@@ -143,16 +160,33 @@ def _alike(
     lines, even = jointly(names, lines, lay)
     lines, turned = jointly(names, lines if even is None else even, side)
     lines, findings = (lines, ()) if turned is None else turned
-    if even is None or turned is None:
-        findings = (*findings, Finding("photo/program-error", "warning", NOT_ALIKE))
-    previews = [shot.preview for shot in shots]
-    return tuple(
-        replace(line, preview=shown) if line.preview is None else line
-        for line, shown in zip(lines, previews, strict=True)
-    ), findings
+    return lines, (*findings, _UNTOLD) if even is None or turned is None else findings
 
 
-NOT_ALIKE = "What all photos have in common could not be told; the centerlines stay as they are. Please report it."
+def _checked(
+    specimen: Specimen,
+    shots: Sequence[Shot],
+    lines: tuple[Line, ...],
+    calibration: Calibration,
+    settings: VisionSettings,
+) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
+    """Scale and lengths of all photos held against what else is known; a photo that breaks that is refused."""
+
+    def check(some: tuple[Line, ...]) -> tuple[Finding, ...]:
+        found, displacements = _told_by(shots, some)
+        return (
+            *check_scale(specimen, calibration, found, displacements, settings.calibration),
+            *_check_lengths(specimen, some, settings.series),
+        )
+
+    lines, findings = jointly([shot.found.image for shot in shots], lines, check)
+    return lines, (_UNTOLD,) if findings is None else findings
+
+
+def _with_pictures(shots: Sequence[Shot], lines: tuple[Line, ...]) -> tuple[Line, ...]:
+    """The picture is shown also where the work on it broke."""
+    pairs = zip(shots, lines, strict=True)
+    return tuple(replace(line, preview=shot.preview) if line.preview is None else line for shot, line in pairs)
 
 
 def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
@@ -188,15 +222,20 @@ def _measure_all(
         )
         return guarded(found.image, work)
 
-    cables = [follow(shot.found) for shot in shots]
-    found, _ = _told_by(shots, cables)
-    named, findings = _name_sides(specimen, shots, found, calibration, settings)
-    if named is not shots:
-        cables = [follow(shot.found) for shot in named]
-    wandering = wandering_px(found, calibration.scale.px_per_m, settings.series)
+    def sides(cables: Sequence[Followed | Rejected]) -> tuple[bool, tuple[Finding, ...], float]:
+        found, _ = _told_by(shots, cables)
+        turned, findings = _name_sides(specimen, found, calibration, settings)
+        return turned, findings, wandering_px(found, calibration.scale.px_per_m, settings.series)
+
+    cables, told = jointly([shot.found.image for shot in shots], [follow(shot.found) for shot in shots], sides)
+    turned, findings, wandering = told or (False, (_UNTOLD,), 0.0)
+    if turned:
+        shots = [replace(shot, found=_reversed(shot.found)) for shot in shots]
+        pairs = zip(shots, cables, strict=True)
+        cables = tuple(c if isinstance(c, Rejected) else follow(shot.found) for shot, c in pairs)
     if wandering > 0.0:
-        cables = [c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables]
-    return named, _tied(named, cables, settings), findings
+        cables = tuple(c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables)
+    return shots, _tied(shots, cables, settings), findings
 
 
 def _loosened(cable: Followed, std_px: float) -> Followed:
@@ -217,12 +256,10 @@ def _tied(
     images = [shot.found.image for shot in shots]
     # a photo on which that breaks is measured by itself
     _, told = jointly(images, sights, _told)
-    lines = []
-    for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True):
-        line = guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes))
-        # the picture is shown also where the work on it broke
-        lines.append(replace(line, preview=shot.preview) if line.preview is None else line)
-    return tuple(lines)
+    return tuple(
+        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes))
+        for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
+    )
 
 
 def _told(sights: Sequence[AxisSight | Rejected | None]) -> list[AxesTold | None]:
@@ -250,33 +287,31 @@ def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerlin
 
 
 def _name_sides(
-    specimen: Specimen,
-    shots: list[Shot],
-    found: list[RoughCable],
-    calibration: Calibration,
-    settings: VisionSettings,
-) -> tuple[list[Shot], tuple[Finding, ...]]:
-    """Which axis moves over the series; where the chord stands upright, that decides which one is called left."""
+    specimen: Specimen, found: list[RoughCable], calibration: Calibration, settings: VisionSettings
+) -> tuple[bool, tuple[Finding, ...]]:
+    """Which axis moves over the series; where the chord stands upright, that decides which one is called left.
+
+    Returns whether all cables are to be named from their other ends.
+    """
     axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
     if len(found) < 2:
-        return shots, ()
+        return False, ()
     steps = np.hypot(*np.ptp(axes, axis=0).T)  # (2,) px: how far the left and the right axis went
     least = settings.series.min_travel_m * float(calibration.scale.px_per_m)
     if steps.max() < max(least, 4.0 * max(cable.left.std_px for cable in found)):
-        return shots, ()
+        return False, ()
     moving = "left" if steps[0] > steps[1] else "right"
     findings = []
     if moving != specimen.rig.moving_bearing:
         du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
         if du <= np.tan(np.radians(settings.bearings.vertical_deg)) * dv:
-            flipped = [replace(shot, found=_reversed(shot.found)) for shot in shots]
-            return flipped, _fixed_moved(steps, moving, found, calibration, settings.series)
+            return True, _fixed_moved(steps, moving, found, calibration, settings.series)
         text = (
             f"The {moving} bearing moves on the photos, specimen.toml says moving_bearing = "
             f'"{specimen.rig.moving_bearing}"; the camera may be turned by 180 degrees or the photos mirrored.'
         )
         findings.append(Finding("rig/moving-bearing", "warning", text))
-    return shots, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))
+    return False, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))
 
 
 def _fixed_moved(

@@ -144,7 +144,7 @@ def _find_all(
         if step.image is None or path is None:
             continue
         first = step if first is None else first
-        photo = load_photo(path, settings.photo, name=step.image)
+        photo = guarded(step.image, partial(load_photo, path, settings.photo, name=step.image))
         if isinstance(photo, Rejected):
             shots.append(Shot(step, photo, None))
             continue
@@ -159,7 +159,8 @@ def _find_all(
         found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near))
         if isinstance(found, RoughCable):
             near, last = found, step
-        shots.append(Shot(step, found, reduce_photo(photo, settings.preview), photo.size))
+        shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))
+        shots.append(Shot(step, found, None if isinstance(shown, Rejected) else shown, photo.size))
     return shots
 
 
@@ -212,7 +213,8 @@ def _find_beside(
     specimen: Specimen, shot: Shot, cover: Bearing, calibration: Calibration, settings: VisionSettings
 ) -> RoughCable | Rejected:
     """The cable on a photo once more, with a cover known."""
-    photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+    name = str(shot.step.image)
+    photo = guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
     if isinstance(photo, Rejected):
         return photo
     scale = calibration.scale.px_per_m

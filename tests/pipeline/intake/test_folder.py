@@ -65,6 +65,20 @@ def test_pictures_of_a_telephone_are_to_be_converted(specimen_folder):
     )
 
 
+def test_a_picture_of_a_telephone_among_others_is_named(specimen_folder):
+    folder = specimen_folder()
+    folder.write("images/step_1.HEIC", b"\0\0\0\x18ftypheic")
+    assert "photo/other-kind" not in folder.codes()  # the same picture twice, as telephones keep it
+    (folder.path / "images/step_1.png").unlink()
+    assert folder.message("photo/other-kind") == (
+        "pictures of a kind that is not read were not measured: images/step_1.HEIC; "
+        "convert them to png or jpg at full size"
+    )
+    assert len(folder.read().images) == 2
+    folder.write("images/step_1.png", b"\0\0\0\x18ftypheic")
+    assert "convert it to png or jpg" in folder.message("photo/no-picture")
+
+
 def test_doubled_photos_are_told(specimen_folder):
     folder = specimen_folder()
     folder.write("images/step_2.png", (folder.path / "images/step_1.png").read_bytes())
@@ -118,6 +132,26 @@ def test_photos_without_names_by_step_numbers(specimen_folder):
     folder = specimen_folder(log=log, photos=("images/s_0.png", "images/s_2.png"), name="unnamed")
     assert [step.image for step in folder.read().steps] == ["images/s_0.png", None, "images/s_2.png"]
     assert [f.level for f in folder.read().findings if f.code == "photo/inferred"] == ["warning"]
+
+
+def test_numbers_in_the_names_go_before_their_order(specimen_folder):
+    """The log counts unloading down again: in natural order, photo 2 was given to step 10."""
+    rows = [(0, 0.0, 0.0), (10, 4.0, 2.3), (30, 8.0, 2.9), (2, 3.0, 2.1)]
+    log = "step,displacement_mm,force_N\n" + "".join(f"{step},{d},{f}\n" for step, d, f in rows)
+    folder = specimen_folder(log=log, photos=[f"images/step_{n}.png" for n in (0, 2, 10, 30)], name="unnamed")
+    assert [step.image for step in folder.read().steps] == [f"images/step_{n}.png" for n in (0, 10, 30, 2)]
+    folder = specimen_folder(log=log, photos=[f"images/step_{n}.png" for n in (0, 1, 2, 30)], name="other")
+    assert folder.message("photo/number").startswith("images/step_2.png was given to step 30, but its name has the")
+    folder = specimen_folder(log=log, photos=[f"images/IMG_{n}.png" for n in (41, 42, 43, 44)], name="counted")
+    assert "photo/number" not in folder.codes()
+
+
+def test_photos_in_the_only_folder_within_images_are_read(specimen_folder):
+    folder = specimen_folder(photos=[f"images/DCIM/step_{n}.png" for n in range(3)])
+    assert list(folder.read().images) == [f"images/DCIM/step_{n}.png" for n in range(3)]
+    folder.write("images/again/step_0.png", b"\x89PNG")
+    with pytest.raises(InputError, match=r"move the photos from images/DCIM, images/again into its folder images"):
+        folder.read()
 
 
 def test_thumbnails_system_files_and_calibration_are_no_photos(specimen_folder):

@@ -1,5 +1,7 @@
 """One log in every way people and machines write it: the same steps come out."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,10 @@ VARIANTS = {
     "end of file as in DOS": PLAIN + "\x1a",
     "Unicode text of Excel": b"\xff\xfe" + GERMAN.replace(";", "\t").encode("utf-16-le"),
     "surplus separators": PLAIN.replace("\n", ",,\n"),
+    "units in the cells": re.sub(r"(\d),(a_|\n)", r"\1 N,\2", PLAIN.replace("force_N", "Kraft")),
+    "units in the cells and above": re.sub(r"(\d),(a_|\n)", r"\1N,\2", PLAIN),
+    "minus behind": PLAIN.replace("-0.002", "0.002-"),
+    "one component": PLAIN.replace("force_N", "Fx [N]"),
 }
 
 
@@ -120,6 +126,13 @@ def test_units_of_displacement_and_time(tmp_path):
     log = read(PLAIN.replace("displacement_mm", "Weg [µm]").replace("time_s", "Zeit [min]"), tmp_path)
     assert log.steps[1].displacement_m == pytest.approx(4.5e-6)
     assert log.steps[1].photo_time_s == pytest.approx(65.0 * 60.0)
+
+
+def test_a_unit_in_every_cell_is_that_of_the_column(tmp_path):
+    text = re.sub(r"(\d),(a_|\n)", r"\1 mN,\2", PLAIN.replace("force_N", "Kraft"))
+    log = read(text, tmp_path)
+    np.testing.assert_allclose(log.steps[1].forces_N, [2.301e-3, 2.304e-3], rtol=1e-12)
+    assert "log/unit-assumed" not in [finding.code for finding in log.findings]
 
 
 def test_what_the_user_says_wins(tmp_path):
@@ -297,6 +310,10 @@ def test_time_that_runs_backwards_is_not_used(tmp_path):
         ("step;displacement_mm;force_N\n1;0,5;1.5\n2;1,5;2.5\n", "log/not-a-number"),
         ("step,displacement_mm,force_mm\n1,4.0,1\n", "log/unit"),
         ("Kraft;Kraft [N];Weg\n1;1;1\n", "log/ambiguous-column"),
+        ("Fx;Fz;Weg\n1;1;1\n", "log/ambiguous-column"),
+        ("Kraft [N];Weg\n1 mN;1\n2 mN;2\n", "log/unit"),
+        ("Kraft;Weg\n1 kip;1\n2 kip;2\n", "log/unit"),
+        ("Kraft;Weg\n1 mN;1\n2 N;2\n", "log/not-a-number"),
     ],
 )
 def test_refusals(text, code, tmp_path):

@@ -1,14 +1,17 @@
-"""Work on all photos together: which one is to blame where it breaks, and what is left where none is."""
+"""What breaks on one photo, or in the work on all together, costs that photo at most."""
 
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
-from pipeline.records import Centerline, Rejected
+from pipeline.records import Centerline, Rejected, RigSpec
 from pipeline.vision import series as series_module
+from pipeline.vision import shots as shots_module
 from pipeline.vision import trace_series
 from pipeline.vision.guard import jointly
-from tests.pipeline.vision.test_series import SETTINGS, codes, series
+from tests.pipeline.vision.test_series import FLAT, SETTINGS, lines, series
 
 
 def test_the_photo_whose_absence_heals_is_to_blame() -> None:
@@ -29,8 +32,87 @@ def test_work_on_all_photos_that_always_breaks_costs_none(tmp_path: Path, monkey
     def broken(*_: object, **__: object) -> object:
         raise TypeError
 
-    for stage in ("told_by_others", "without_lay", "on_one_side"):
+    told = ("told_by_others", "without_lay", "on_one_side")
+    for stage in (*told, "of_one_size", "with_fixed_cover", "wandering_px", "check_scale"):
         monkeypatch.setattr(series_module, stage, broken)
     traces = trace_series(series(tmp_path), SETTINGS)
     assert all(isinstance(photo, Centerline) for photo in traces.photos)
-    assert codes(traces) == {"photo/program-error"}
+    assert [finding.code for finding in traces.findings] == ["photo/program-error"]
+
+
+@pytest.mark.parametrize("stage", ["load_photo", "find_cable", "follow_cable", "with_strip", "with_doubt_of_plane"])
+def test_photo_that_breaks_the_program_costs_that_photo_alone(
+    stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = shots_module if stage in ("load_photo", "find_cable") else series_module
+    sound, calls = getattr(module, stage), []
+
+    def broken(*args: object, **named: object) -> object:
+        calls.append(args)
+        if len(calls) == 2:
+            raise np.linalg.LinAlgError("Singular matrix")
+        return sound(*args, **named)
+
+    monkeypatch.setattr(module, stage, broken)
+    first, second, third = trace_series(series(tmp_path), SETTINGS).photos
+    assert isinstance(first, Centerline) and isinstance(third, Centerline)
+    assert isinstance(second, Rejected) and second.code == "photo/program-error"
+    assert "LinAlgError: Singular matrix" in second.reason
+    assert (second.preview is None) == (stage == "load_photo")
+
+
+def test_a_picture_that_cannot_be_shown_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> object:
+        raise cv2.error
+
+    monkeypatch.setattr(shots_module, "reduce_photo", broken)
+    assert all(line.preview is None for line in lines(trace_series(series(tmp_path), SETTINGS)))
+
+
+@pytest.mark.parametrize(
+    ("stage", "error"),
+    [
+        ("told_by_others", TypeError()),
+        ("without_lay", AssertionError()),
+        ("on_one_side", np.linalg.LinAlgError()),
+        ("of_one_size", IndexError()),
+        ("from_found", ZeroDivisionError()),
+        ("with_fixed_cover", ValueError()),
+        ("wandering_px", np.linalg.LinAlgError()),
+        ("check_scale", ValueError()),
+    ],
+)
+def test_photo_that_breaks_the_work_on_all_costs_that_photo_at_most(
+    stage: str, error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second of three; an axis that the others cannot tell is measured by its own photo."""
+    sound, bad = getattr(series_module, stage), []
+
+    def broken(*given: object, **named: object) -> object:
+        photos = next(one for one in given if isinstance(one, (list, tuple)))
+        own = [getattr(one, "found", one) for one in photos]
+        own = [one for one in own if not isinstance(one, Rejected)]
+        bad.extend(own[1:2] if not bad else [])
+        if any(one is bad[0] or getattr(one, "image", None) == "step_01.png" for one in own):
+            raise error
+        return sound(*given, **named)
+
+    monkeypatch.setattr(series_module, stage, broken)
+    specimen = series(tmp_path, scale_error=None if stage == "from_found" else 0.0)
+    first, second, third = trace_series(specimen, FLAT).photos
+    assert isinstance(first, Centerline) and isinstance(third, Centerline)
+    assert isinstance(second, Centerline) == (stage == "told_by_others") and second.preview is not None
+    if isinstance(second, Rejected):
+        assert second.code == "photo/program-error" and type(error).__name__ in second.reason
+
+
+def test_a_search_for_covers_that_breaks_costs_no_specimen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def broken(*_: object) -> float:
+        asked.append(True)
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(shots_module, "cover_radius", broken)
+    traces = trace_series(series(tmp_path, given=RigSpec("left", None), cover_m=0.0098), FLAT)
+    assert asked and len(traces.photos) == 3

@@ -1,0 +1,87 @@
+"""Units written in the cells of a force log, as in ``1.2 N``: taken out of them, and into the columns.
+
+Only where every cell of a column has the same one, and the header no other: a single cell with a unit among bare
+numbers is a mistake, and refused as no number.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.errors import InputError
+from pipeline.intake.columns import Columns, factor_of
+from pipeline.intake.dialect import is_missing
+from pipeline.intake.specimenfile import MEASURED
+
+WITH_UNIT = re.compile(r"(?P<number>[-+−]?[\d.,\s'’]*\d(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]+)")
+
+
+def without_units(
+    table: dict[str, list[str]], columns: Columns, *, path: Path, line: int | None
+) -> tuple[dict[str, list[str]], Columns]:
+    """Cells without their units, and the columns with them.
+
+    Parameters
+    ----------
+    table : dict
+        Role -> cells.
+    columns : Columns
+    path : Path
+        Of the log.
+    line : int, optional
+        First line of the table.
+
+    Returns
+    -------
+    dict, Columns
+        As they came where no column has units in its cells.
+
+    Raises
+    ------
+    InputError
+        ``log/unit``: the unit is not known, or the header says another.
+    """
+    for role in MEASURED:
+        found = _split(table.get(role, ()))
+        if found is None:
+            continue
+        cells, unit = found
+        try:
+            factor = factor_of(role, unit, path, line)
+        except InputError:
+            if role == "time":  # ``8:00 AM``: such times are left out, the test is not
+                continue
+            raise
+        if role not in columns.assumed and factor != columns.factor[role]:
+            raise InputError(
+                f"the header says {columns.units[role]}, the cells below it say {unit}",
+                path=path,
+                line=line,
+                code="log/unit",
+                remedy="correct one of them",
+            )
+        table = {**table, role: cells}
+        columns = replace(
+            columns,
+            factor={**columns.factor, role: factor},
+            units={**columns.units, role: unit},
+            assumed=tuple(other for other in columns.assumed if other != role),
+        )
+    return table, columns
+
+
+def _split(cells: list[str] | tuple[()]) -> tuple[list[str], str] | None:
+    """Numbers of a column and the unit that stands in every cell that holds one; None if it does not."""
+    bare, units = [], set()
+    for cell in cells:
+        if is_missing(cell):
+            bare.append(cell)
+            continue
+        found = WITH_UNIT.fullmatch(cell)
+        if found is None:
+            return None
+        bare.append(found["number"])
+        units.add(found["unit"])
+    return (bare, units.pop()) if len(units) == 1 else None
