@@ -23,7 +23,7 @@ from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
 from pipeline.intake.signs import force_sign, from_mounted, inferred_branches, signed_displacements
 from pipeline.intake.specimenfile import LogSpec
-from pipeline.records import Array, Finding, LoadStep
+from pipeline.records import Array, Branch, Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
 from pipeline.units import quantity
 
@@ -88,7 +88,32 @@ def load_steps(
         branches, directed = inferred_branches(positions, fitted.force, same, name=name, settings=settings)
     else:
         branches, directed = [samples.branches[run.first] for run in runs], []
-    steps = tuple(
+    steps = _steps(samples, runs, branches, places, forces, fitted)
+    within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
+    order = order_findings(steps, same, name=name)
+    return steps, (
+        *moved,
+        *turned,
+        *grouped,
+        *signed,
+        *directed,
+        *_fit_findings(fitted, name, settings),
+        *_place_findings(places, tolerance, name),
+        *within,
+        *order,
+    )
+
+
+def _steps(
+    samples: Samples,
+    runs: Sequence[Run],
+    branches: Sequence[Branch],
+    places: HoldPlaces,
+    forces: Array,
+    fitted: HoldForces,
+) -> tuple[LoadStep, ...]:
+    """The record of each hold; ``forces`` (n,) N of all samples, positive in compression."""
+    return tuple(
         LoadStep(
             step=run.step,
             branch=branch,
@@ -103,21 +128,8 @@ def load_steps(
             displacement_std_m=scatter,
         )
         for run, branch, position, scatter, force, std in zip(
-            runs, branches, positions, places.std, fitted.force, fitted.std, strict=True
+            runs, branches, places.place, places.std, fitted.force, fitted.std, strict=True
         )
-    )
-    within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
-    order = order_findings(steps, same, name=name)
-    return steps, (
-        *moved,
-        *turned,
-        *grouped,
-        *signed,
-        *directed,
-        *_fit_findings(fitted, name, settings),
-        *_place_findings(places, tolerance, name),
-        *within,
-        *order,
     )
 
 

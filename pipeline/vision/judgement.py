@@ -304,14 +304,8 @@ def _assemble(
     unlike = unlike_from(path, kept, axes, cut.usual_width, stage)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)
-    path = path[kept]
-    if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
-        path, axes = path[::-1], axes[::-1]
     width = cut.usual_width * standout.reduction
-    closeup = take_closeup(photo, path, width, cut.weights, stage)
-    right, path = settle_end(axes[1], path, closeup, width, settings.bearings)
-    left, backward = settle_end(axes[0], path[::-1], closeup, width, settings.bearings)
-    axes, path = (left, right), backward[::-1]
+    closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width, settings)
     ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
     leaving = [place for place in ends if at_border(place, photo, width)]
     if leaving:
@@ -343,6 +337,18 @@ def _assemble(
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
+
+
+def _settled(
+    photo: Photo, path: Array, axes: tuple[Bearing, Bearing], weights: Array, width: float, settings: VisionSettings
+) -> tuple[Closeup, tuple[Bearing, Bearing], Array]:
+    """The strip from close by, its axes with the left one first, and its path (n, 2) px between them."""
+    if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
+        path, axes = path[::-1], axes[::-1]
+    closeup = take_closeup(photo, path, width, weights, settings.segmentation)
+    right, path = settle_end(axes[1], path, closeup, width, settings.bearings)
+    left, backward = settle_end(axes[0], path[::-1], closeup, width, settings.bearings)
+    return closeup, (left, right), backward[::-1]
 
 
 def _seen(standout: Standout, cut: CrossCut, stage: SegmentationSettings) -> NDArray[np.bool_]:

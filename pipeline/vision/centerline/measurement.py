@@ -234,34 +234,10 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
     fit, covariance = followed.tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
-    where, theta = fit.curve.at(s)
-    normal, turn, bend = fit.curve.bases(s)
-    length_std = _length_std(fit, s, normal, covariance)
-    # Errors of the axes shift and turn the chord frame against the curve: exactly q's first two directions.
-    covariance[0, 0] += chord.axis_std**2
-    covariance[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
+    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light)
+    length_std = _length_std(fit, s, shape.basis_normal, covariance)
+    uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
-    gap = median(np.diff(fit.s))
-    shape = MeasuredShape(
-        s=s - feet[0],
-        x=where[:, 0],
-        y=where[:, 1],
-        theta=theta,
-        kappa=-fit.curve.curvature(s),
-        seen=(s >= fit.s[0] - gap) & (s <= fit.s[-1] + gap),
-        basis_normal=normal,
-        basis_theta=turn,
-        basis_kappa=-bend,
-        covariance=covariance,
-        section_s=fit.s[used] - feet[0],
-        section_x=fit.points[used, 0],
-        section_y=fit.points[used, 1],
-        section_std=fit.smooth.sigma * (fit.std / np.sqrt(np.maximum(fit.weight, 1e-9)))[used],
-        correlation_length=fit.smooth.correlation_length,
-        systematic_std=followed.light[0],
-        systematic_length=followed.light[1],
-    )
-    uv = chord.to_pixels(where)
     quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
     if followed.diameter_m is not None:
         quality["width_over_diameter"] = middle / followed.diameter_m
@@ -270,8 +246,8 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
         shape=shape,
         u_px=uv[:, 0],
         v_px=uv[:, 1],
-        kappa_std=_std(bend, covariance),
-        position_std=_std(normal, covariance),
+        kappa_std=_std(shape.basis_kappa, shape.covariance),
+        position_std=_std(shape.basis_normal, shape.covariance),
         chord_m=chord.chord,
         chord_std_m=float(np.sqrt(2.0)) * chord.axis_std,
         traced_length_m=float(s[-1] - s[0]),
@@ -284,6 +260,44 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
         mirrored=chord.mirrored,
         quality=quality,
         findings=rough.findings + beside_axis(float(misses.max()), middle, options),
+    )
+
+
+def _with_axes(covariance: Array, chord: ChordFrame) -> Array:
+    """Covariance of q with the errors of the axes.
+
+    They shift and turn the chord frame against the curve: exactly q's first two directions.
+    """
+    whole = covariance.copy()
+    whole[0, 0] += chord.axis_std**2
+    whole[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
+    return whole
+
+
+def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float]) -> MeasuredShape:
+    """What is measured at arc lengths ``s`` (n,), from the first on; ``light`` its slow error and its length, m."""
+    where, theta = fit.curve.at(s)
+    normal, turn, bend = fit.curve.bases(s)
+    used = fit.weight > 0.0
+    gap = median(np.diff(fit.s))
+    return MeasuredShape(
+        s=s - s[0],
+        x=where[:, 0],
+        y=where[:, 1],
+        theta=theta,
+        kappa=-fit.curve.curvature(s),
+        seen=(s >= fit.s[0] - gap) & (s <= fit.s[-1] + gap),
+        basis_normal=normal,
+        basis_theta=turn,
+        basis_kappa=-bend,
+        covariance=covariance,
+        section_s=fit.s[used] - s[0],
+        section_x=fit.points[used, 0],
+        section_y=fit.points[used, 1],
+        section_std=fit.smooth.sigma * (fit.std / np.sqrt(np.maximum(fit.weight, 1e-9)))[used],
+        correlation_length=fit.smooth.correlation_length,
+        systematic_std=light[0],
+        systematic_length=light[1],
     )
 
 

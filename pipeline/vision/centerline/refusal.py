@@ -21,11 +21,9 @@ def refusal(
     rough: RoughCable, sections: Sections, width: Array, diameter: float | None, options: CurveSettings
 ) -> Rejected | None:
     """What the figures of the sections forbid; ``width`` (n,) m of the cable on them, ``diameter`` m if it is known."""
-    radius = 0.5 * median(sections.width)
     middle, scatter = middle_width(width)
-    ratio = sections.contrast / max(sections.noise, 1e-9)
     figure = {
-        "contrast_to_noise": ratio,
+        "contrast_to_noise": sections.contrast / max(sections.noise, 1e-9),
         "blur_px": sections.blur,
         "width_scatter": scatter,
         "measured_share": sections.share,
@@ -33,16 +31,25 @@ def refusal(
     if diameter is not None:
         figure["width_over_diameter"] = middle / diameter
 
-    def rejected(code: str, reason: str) -> Rejected:
-        return Rejected(rough.image, code, reason, figure=figure)
+    told = _unclear(rough, sections, scatter, options) or _unlike_a_cable(sections, middle, scatter, diameter, options)
+    return None if told is None else Rejected(rough.image, *told, figure=figure)
 
+
+Told = tuple[str, str]
+"""Code and reason of a refusal."""
+
+
+def _unclear(rough: RoughCable, sections: Sections, scatter: float, options: CurveSettings) -> Told | None:
+    """Edges that noise, a pattern or blur leave without a place; ``scatter`` is that of the width, relative."""
+    radius = 0.5 * median(sections.width)
+    ratio = sections.contrast / max(sections.noise, 1e-9)
     # chance gives no constant width: what then counts as noise is a pattern of the sheath or the ground
     quiet = rough.contrast >= options.min_contrast_to_noise * rough.noise
     constant = scatter < (options.quiet_width_scatter if quiet else options.sure_width_scatter)
     needed = options.patterned_contrast_to_noise if constant else options.min_contrast_to_noise
     if ratio < needed and quiet and scatter >= options.sure_width_scatter:
         # the pixels are quiet enough: what is between them and a clean pair of edges is no noise
-        return rejected(
+        return (
             "photo/outline",
             f"the cable's outline is no pair of smooth edges: the picture beside them is off by"
             f" {100.0 * sections.noise / sections.contrast:.0f} % of their contrast, though its pixels are quiet, and"
@@ -50,31 +57,39 @@ def refusal(
             " strong pattern do that",
         )
     if ratio < needed:
-        return rejected(
+        return (
             "photo/contrast",
             f"contrast of the cable's edges is {ratio:.1f} times the noise, too little to place"
             f" an edge (at least {needed:g})",
         )
     if sections.blur > options.max_blur_radii * radius:
-        return rejected(
+        return (
             "photo/blur",
             f"the edges are blurred over {sections.blur:.1f} px (standard deviation) on a cable"
             f" {2 * radius:.0f} px wide",
         )
+    return None
+
+
+def _unlike_a_cable(
+    sections: Sections, middle: float, scatter: float, diameter: float | None, options: CurveSettings
+) -> Told | None:
+    """A width (m) that is not the cable's or not constant, or edges on too little of it."""
     if diameter is not None and abs(middle / diameter - 1.0) > options.max_width_error:
-        return rejected(
+        return (
             "photo/width",
             f"what was traced is {100.0 * middle / diameter:.0f} % as wide as the cable: the cable is split"
             " along a highlight or shadow, or scale or diameter are wrong",
         )
     if scatter > options.max_width_scatter:
-        return rejected(
+        return (
             "photo/width",
             f"the width of what was traced varies by {100.0 * scatter:.0f} % along it; a cable's does not",
         )
     if sections.share < options.min_measured_share:
-        return rejected(
-            "photo/contrast", f"both edges of the cable were found on {100.0 * sections.share:.0f} % of its length only"
+        return (
+            "photo/contrast",
+            f"both edges of the cable were found on {100.0 * sections.share:.0f} % of its length only",
         )
     return None
 
