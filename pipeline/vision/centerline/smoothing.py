@@ -121,6 +121,8 @@ class _Diagonal:
         Number of data, dimension of what is not penalised.
     noise_log_det : float
         Of the correlation matrix.
+    frame_log_det : float
+        Of the normal matrix in the frame of q less that in these coordinates: it changes with the correlation length.
     least : float
         Squared length of the penalised quantity below which the penalty is not believed, in units of the data.
     """
@@ -134,6 +136,7 @@ class _Diagonal:
     count: int
     null: int
     noise_log_det: float
+    frame_log_det: float
     least: float
 
     @cached_property
@@ -162,7 +165,7 @@ class _Diagonal:
         # A weight that leaves less than ``least``: its prior, with rank terms of variance sigma^2 / weight each.
         believed = weights * self.least <= rank * sigma2
         believed[0] = True
-        return np.where(believed, value + self.noise_log_det, np.inf), sigma2
+        return np.where(believed, value + self.noise_log_det + self.frame_log_det, np.inf), sigma2
 
 
 def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, least: float) -> _Diagonal:
@@ -189,6 +192,8 @@ def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, 
         count=len(whitened),
         null=null,
         noise_log_det=noise_log_det,
+        # weights count from gain^2, so the penalty's own determinant is told in that unit
+        frame_log_det=float(2.0 * np.log(np.abs(np.diag(r0)) * length).sum() - 2.0 * (size - null) * np.log(gain)),
         least=float(gain**2 * least),
     )
 

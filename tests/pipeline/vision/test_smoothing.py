@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag, null_space
@@ -61,8 +64,11 @@ def test_estimate_is_the_minimum_at_the_likeliest_weight():
     assert np.max(np.abs(task.estimate(0.8) - exact) / error) < 0.15
 
 
-def test_correlation_length_has_the_likelihood_of_the_dense_form():
-    task = problem(3)
+@pytest.mark.parametrize("seed", [3, 5, 7])
+def test_correlation_length_has_the_likelihood_of_the_dense_form(seed):
+    task, rng = problem(seed), np.random.default_rng(seed)
+    data = task.design @ rng.standard_normal(P) + 0.1 * task.std * errors(rng, task.position, 0.6)
+    task = replace(task, data=data)
     lengths = np.geomspace(0.05, 5.0, 30)
     weights = np.geomspace(1e-5, 1e5, 30)
     value = [min(dense_criterion(task, length, w)[0] for w in weights) for length in lengths]
@@ -94,20 +100,30 @@ def test_witness_has_the_likelihood_of_the_dense_form():
     assert_allclose(np.diff(found), np.diff(exact), rtol=1e-8)
 
 
-def test_witness_tells_errors_that_pass_for_the_curve():
-    """Errors that last three spacings under a curve of half as many parameters as points: 20 trials."""
+def test_witness_keeps_errors_from_passing_for_the_curve():
+    """Errors that last three spacings under a curve of half as many parameters as points: 100 trials.
+
+    The points alone read their length right on the mean, but one in eight less than half as long: there the curve
+    follows the errors, and its bands are too narrow. That is what a witness is for. It may make the length longer only,
+    which costs part of what twice the data could give (0.71): over 1000 trials the error of log l goes from 0.59 to
+    0.46, that of lengths read too short from 0.47 to 0.18, those below half from 13 to 1 %.
+    """
     rng, s = np.random.default_rng(5), np.linspace(0.0, 10.0, N)
     design = BSpline.design_matrix(s, np.r_[[0.0] * 3, np.linspace(0.0, 10.0, N // 2 - 2), [10.0] * 3], 3).toarray()
-    alone, told = [], []
-    for _ in range(20):
+    off = []
+    for _ in range(100):
         data = errors(rng, s, 0.5)
         task = Problem(design, data, np.diff(np.eye(design.shape[1] - 2), 2, axis=0), 4, np.ones(N), s)
         witness = Witness(0.3 * errors(rng, s, 0.5), np.ones(N), s, np.vander(s / 10.0, 3))
-        alone.append(task.correlation_length(5.0))
-        told.append(task.correlation_length(5.0, witness))
-    off, by_witness = (np.sqrt(np.mean(np.log(np.array(found) / 0.5) ** 2)) for found in (alone, told))
-    assert by_witness < 0.5  # a correlation length is known to the root of 2 l / range, a third, at best
-    assert by_witness < 0.7 * off  # twice the data would give 0.71 if both told alike
+        off.append([np.log(task.correlation_length(5.0, told) / 0.5) for told in (None, witness)])
+    off = np.array(off)
+    assert abs(off[:, 0].mean()) < 3.0 * off[:, 0].std() / np.sqrt(len(off))
+    alone, told = np.sqrt(np.mean(off**2, axis=0))
+    assert told < 0.5  # a correlation length is known to the root of 2 l / range, a third, at best
+    assert told < 0.9 * alone
+    short_alone, short_told = np.sqrt(np.mean(np.minimum(off, 0.0) ** 2, axis=0))
+    assert short_told < 0.5 * short_alone
+    assert np.mean(off[:, 1] < -np.log(2.0)) < 0.05
 
 
 def test_covariance_is_that_of_all_weights():
