@@ -47,6 +47,12 @@ class CurveSettings(StageSettings):
     least_pixel_share: float = Field(
         0.5, gt=0, le=1, description="weight left on a section's pixels; with less there is something else than an edge"
     )
+    least_step_sigmas: float = Field(
+        3.0,
+        ge=0,
+        description="standard deviations of an edge's step; a lesser one is none: on paper that hid 12 diameters, edges"
+        " of noise along the search's straight bridge moved the midline by 30 px",
+    )
     width_departure: float = Field(
         0.08,
         gt=0,

@@ -325,6 +325,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
         # Newton squares what is left: 1e-4 px. The other two per cent are sections that will be outliers anyway.
         if quantile(np.abs(shift), 0.98) < 1e-2:
             break
-    std = noise * np.sqrt(np.linalg.inv(gram)[:, 2, 2])
-    lost = (weight.sum(axis=1) < settings.least_pixel_share * count) | (step <= 0.0)
-    return Edges(np.where(lost, np.nan, place).reshape(shape), std.reshape(shape), step.reshape(shape))
+    by_step, by_place = (noise * np.sqrt(np.linalg.inv(gram)[:, k, k]) for k in (1, 2))
+    # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward.
+    lost = (weight.sum(axis=1) < settings.least_pixel_share * count) | (step < settings.least_step_sigmas * by_step)
+    return Edges(np.where(lost, np.nan, place).reshape(shape), by_place.reshape(shape), step.reshape(shape))

@@ -103,6 +103,19 @@ def test_section_without_an_edge_is_reported_as_lost():
     assert np.all(np.isfinite(edges.place[1]))
 
 
+def test_noise_has_no_edge():
+    """Blank paper over a stretch: half of its sections have a step upward where an edge is sought."""
+    rng = np.random.default_rng(4)
+    pixels = pixels_of(np.zeros((2, 240)), rng, noise=0.01)
+    pixels.value[:, 80:160] = 0.95 + 0.01 * rng.standard_normal(pixels.value[:, 80:160].shape)
+    _, edges = fitted(pixels)
+    found = np.isfinite(edges.place)
+    # one in a thousand passes three standard deviations at a given place, a few more at the best of some
+    assert found[:, 82:158].mean() < 0.05
+    # profiles are told in windows of fifteen sections, and taken linearly between them
+    assert found[:, :65].all() and found[:, 175:].all()
+
+
 def straight(length=400.0, v=60.0) -> PlaneCurve:
     frame = make_frame(0.0, length, intervals=16, order=3)
     return PlaneCurve(frame, np.zeros(frame.size - 2), np.array([frame.grid[frame.anchor] + 20.0, v]), 0.0)
