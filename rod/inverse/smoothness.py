@@ -126,22 +126,22 @@ def average(value: Array, J: Array, unknowns: Array, along: tuple[Along, ...], t
     """
     k = along[0].places.size
     law, rest = slice(0, k + 1), slice(k + 1, unknowns.size)
-    A, pull, chi2 = J.T @ J, -J.T @ value, float(value @ value)
-    inner = np.asarray(np.linalg.inv(A[rest, rest]), dtype=np.float64)
-    back = -inner @ A[rest, law]
-    schur, force = A[law, law] + A[law, rest] @ back, pull[law] + back.T @ pull[rest]
-    chi2 -= float(pull[rest] @ inner @ pull[rest])
-    log_det_rest = float(np.linalg.slogdet(A[rest, rest])[1])
+    # by orthogonal factors: in the difference of the squares what data that agree with each other tell would be lost
+    Q, R = np.linalg.qr(J[:, rest])
+    solved = np.linalg.inv(R)
+    inner, back, offset = solved @ solved.T, -solved @ (Q.T @ J[:, law]), -solved @ (Q.T @ value)
+    beside, left = J[:, law] - Q @ (Q.T @ J[:, law]), value - Q @ (Q.T @ value)
+    schur, force, chi2 = beside.T @ beside, -beside.T @ left, float(left @ left)
+    log_det_rest = 2.0 * float(np.sum(np.log(np.abs(np.diag(R)))))
 
     priors, precisions, norms = _priors(along, taus)
     z = unknowns[law]
-    # Unknowns of very different size; what the data do not see at all is zero but for rounding, of either sign.
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(schur), np.finfo(float).eps * np.diag(A).max()))
-    scaled = unit[:, None] * (schur + precisions) * unit
-    inverses = unit[:, None] * np.linalg.inv(scaled) * unit
+    # Unknowns of very different size; what the data do not see at all is zero but for rounding.
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(schur), np.finfo(float).eps * np.sum(J**2, axis=0).max()))
+    inverses, log_det = _inverted(unit[:, None] * (schur + precisions) * unit)
+    inverses, log_det = unit[:, None] * inverses * unit, log_det - 2.0 * float(np.sum(np.log(unit)))
     toward = force - precisions @ z
     moves = np.einsum("nij,nj->ni", inverses, toward)
-    log_det = np.linalg.slogdet(scaled)[1] - 2.0 * float(np.sum(np.log(unit)))
     misfit = chi2 + (precisions @ z) @ z - np.sum(toward * moves, axis=1)
     evidence = norms - 0.5 * (misfit + log_det + log_det_rest)
 
@@ -153,7 +153,7 @@ def average(value: Array, J: Array, unknowns: Array, along: tuple[Along, ...], t
     spread = moves - move
     covariance = np.tensordot(share, inverses, 1) + (share[:, None] * spread).T @ spread
     shrinkage = np.eye(k + 1) - covariance @ schur
-    whole = np.concatenate([move, inner @ pull[rest] + back @ move])
+    whole = np.concatenate([move, offset + back @ move])
     return Averaged(
         unknowns + whole,
         _extended(covariance, inner, back),
@@ -162,6 +162,19 @@ def average(value: Array, J: Array, unknowns: Array, along: tuple[Along, ...], t
         _typical_covariance(priors, share, along),
         log_evidence,
     )
+
+
+def _inverted(precisions: Array) -> tuple[Array, Array]:
+    """Inverses (n, m, m) of precisions, and logs (n,) of their determinants; none of rounding becomes negative.
+
+    A direction that neither data nor prior know has a precision of zero, and rounding may put it on either side of
+    that: the variance then came out negative, and its root was no number. It is huge.
+    """
+    values, vectors = np.linalg.eigh(precisions)
+    least = values.shape[-1] * np.finfo(float).eps * values[:, -1:]
+    values = np.maximum(values, least)
+    inverses = (vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1)
+    return np.asarray(inverses), np.asarray(np.sum(np.log(values), axis=1))
 
 
 def _typical_covariance(priors: list[LawPrior], share: Array, along: tuple[Along, ...]) -> Array:

@@ -12,7 +12,8 @@ from rod.inverse.control_points import fit
 from rod.inverse.evaluation import evaluate
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
 from rod.inverse.knots import first_slope, place_knots, roughness
-from rod.inverse.smoothness import averaged, evidence_of_knots
+from rod.inverse.law_prior import Along
+from rod.inverse.smoothness import average, averaged, evidence_of_knots
 from rod.inverse.whitening import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
@@ -170,3 +171,19 @@ def test_zero_of_displacement_is_that_of_the_photos():
     value, std = zero_of_displacement(step_data(test))
     assert value == pytest.approx(force_free(LAW, LENGTH).chord, abs=4 * std)
     assert zero_of_displacement(()) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_variance_is_negative_where_the_other_unknowns_imitate_the_law(seed):
+    # What the law does to the data is `strength` times what one of four others does, but for 1e-3. Then the level is as
+    # well known as that one's prior, and its variance falls with the square of `strength`.
+    rng, strength, k = np.random.default_rng(seed), np.array([1e3, 1e6, 1e8]), 8
+    others, law = rng.normal(size=(60, 4)), 1e-3 * rng.normal(size=(60, k + 1))
+    value = np.r_[rng.normal(size=60), np.zeros(4)]
+    along = (Along(np.linspace(0.0, 1.0, k)),)
+    least = []
+    for times in strength:
+        alike = law + times * others[:, :1] * np.r_[np.ones(k), 0.0]
+        J = np.block([[alike, times * others], [np.zeros((4, k + 1)), np.eye(4)]])
+        least.append(np.diag(average(value, J, np.zeros(k + 5), along, (0.05, 60.0)).covariance).min())
+    assert np.allclose(strength**2 * least, strength[0] ** 2 * least[0], rtol=1e-6)
