@@ -40,7 +40,7 @@ def find_cables(
     specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
-    shots = _find_all(specimen, calibration, settings)
+    shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
     if calibration is None and specimen.rig.marker_diameter_m is not None:
         return _with_covers_by_length(specimen, specimen.rig.marker_diameter_m, shots, settings), ()
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
@@ -80,6 +80,54 @@ def _count_of_length(shots: list[Shot], length_px: float, most: float) -> int:
     """Number of photos whose cable has a length (px) to a relative deviation."""
     lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
     return sum(abs(length / length_px - 1.0) <= most for length in lengths)
+
+
+def _once_more(
+    specimen: Specimen, calibration: Calibration | None, shots: list[Shot], settings: VisionSettings
+) -> list[Shot]:
+    """Photos on which no cable was found: searched again with what the others tell that they were not told.
+
+    Those before the first cable had no neighbour. Without a scale the covers are expected in widths of the cable, and
+    any width passes for the cable's; where its shaded side is as dark as the ground it seems narrower on some photos
+    than on others. Its covers do not.
+    """
+    there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
+    if not there:
+        return shots
+    known = _scale_of_covers(specimen, shots, settings) if calibration is None else calibration
+    last = there[0] if known is calibration else len(shots)  # none before it had a neighbour, all after it had one
+    return [
+        replace(shot, found=_find_as_on(specimen, shot, shots[min(there, key=lambda i: abs(i - k))], known, settings))
+        if isinstance(shot.found, Rejected) and shot.preview is not None and k < last
+        else shot
+        for k, shot in enumerate(shots)
+    ]
+
+
+def _scale_of_covers(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Calibration | None:
+    """The scale by covers that are seen all round and alike on all photos; None if there are none, or of no size."""
+    sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
+    radii = [axis.radius_px for cable in sure for axis in (cable.left, cable.right) if axis.radius_px is not None]
+    diameter = specimen.rig.marker_diameter_m
+    if diameter is None or not radii or np.ptp(radii) > 2.0 * settings.bearings.same_radius * np.median(radii):
+        return None
+    return from_number(2.0 * float(np.median(radii)) / diameter, settings.calibration)
+
+
+def _find_as_on(
+    specimen: Specimen, shot: Shot, near: Shot, calibration: Calibration | None, settings: VisionSettings
+) -> RoughCable | Rejected:
+    """The cable on a photo once more, with a neighbour photo known; else why it was refused before."""
+    photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+    if isinstance(photo, Rejected) or isinstance(near.found, Rejected) or isinstance(shot.found, RoughCable):
+        return shot.found
+    scale = np.nan if calibration is None else calibration.scale.px_per_m
+    travel = (shot.step.displacement_m - near.step.displacement_m) * scale
+    cable = _expected(specimen, calibration, shot.step.displacement_m - specimen.steps[0].displacement_m)
+    seen = expected_covers(near.found, specimen.rig.moving_bearing, travel)
+    cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
+    again = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near.found))
+    return again if isinstance(again, RoughCable) else shot.found
 
 
 def _with_covers_by_length(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pipeline.records import Array, Rejected
@@ -95,8 +97,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
     if along[last] - along[first] < settings.least_seen_radii * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
-    thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
-    points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
+    points, s = _guides(rough, along, half_width)
     intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order, iterations=1)
@@ -134,6 +135,41 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
         settings=settings,
     )
     return _lost(rough, 0.0) if sections is None else sections
+
+
+def _guides(rough: RoughCable, along: Array, half_width: float) -> tuple[Array, Array]:
+    """Points ``(n, 2)`` of the rough path from which the search starts, half a half width apart, and their ``s``.
+
+    The shadow of a cover lies beside the cable just where that begins, and the mask takes both for one. So the last two
+    diameters before a cover, a quarter of what is seen at most, are laid on the curve that leads from the mask farther
+    in to the axis, through which the cable passes: a cubic, straight at the axis, where the cable bears no moment.
+    """
+    first, last = rough.visible
+    thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
+    chosen = np.arange(first, last + 1, thin)
+    points, s = rough.path_px[chosen].astype(float), along[chosen]
+    led = min(4.0 * half_width, 0.25 * float(s[-1] - s[0]))
+    for axis, bearing, end in ((0, rough.left, s[0]), (len(along) - 1, rough.right, s[-1])):
+        beside = np.abs(s - end) < led
+        near = ~beside & (np.abs(s - end) < 2.0 * led)
+        if bearing.radius_px is None or np.count_nonzero(near) < 4:
+            continue
+        seam = end + (led if axis == 0 else -led)
+        points[beside] = _lead(float(along[axis]), rough.path_px[axis], seam, s[near], points[near])(s[beside])
+    return points, s
+
+
+def _lead(start: float, axis: Array, seam: float, s: Array, points: Array) -> Callable[[Array], Array]:
+    """Cubic from an axis at ``start``, where it is straight, that goes on like a parabola through points ``s``."""
+    there, slope = np.polynomial.polynomial.polyfit(s - seam, points, 2)[:2]
+    reach, chord = seam - start, (there - axis) / (seam - start)
+    third = 0.5 * (slope - chord) / reach**2
+
+    def at(s: Array) -> Array:
+        x = (s - start)[:, None]
+        return np.asarray(axis + (chord - third * reach**2) * x + third * x**3)
+
+    return at
 
 
 def _cover(bearing: Bearing, blur: float) -> Cover:

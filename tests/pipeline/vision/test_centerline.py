@@ -228,6 +228,26 @@ def test_path_on_one_strip_beside_the_highlight_is_caught():
     assert isinstance(found, Rejected) or errors(picture, found, scene.camera.px_per_m).position() < 0.02  # even light
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_mask_that_swerves_into_the_shadow_of_a_cover_leads_nowhere_else(side):
+    """As on a photo whose mask took the cover's shadow for cable: by 0.9 of the radius, from 2.5 diameters on."""
+    rng = np.random.default_rng(10)
+    scene = even(rng)
+    picture = render(scene)
+    rough = rough_cable(scene, picture, rng)
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
+    first, last = rough.visible
+    path = rough.path_px.copy()
+    for end in (first, last):
+        off = np.maximum(1.0 - np.abs(along - along[end]) / (5.0 * rough.half_width_px), 0.0)
+        path[:, 1] += side * 0.9 * rough.half_width_px * off
+    path[:first] = np.linspace(rough.path_px[0], path[first], first + 1)[:-1]
+    path[last + 1 :] = np.linspace(path[last], rough.path_px[-1], len(path) - last)[1:]
+    found = refused(replace(rough, path_px=path), scene)
+    assert isinstance(found, Centerline), found.reason
+    assert errors(picture, found, scene.camera.px_per_m).position() < 0.02  # even light
+
+
 @pytest.mark.parametrize("wrong", [0.7, 1.4])
 def test_wrong_diameter_is_refused_with_the_figure(wrong):
     rng = np.random.default_rng(9)

@@ -340,3 +340,26 @@ def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data
     assert outcome.code == code
     assert outcome.figure
     assert outcome.preview is not None
+
+
+@pytest.mark.parametrize(("scale_error", "lost"), [(0.0, (0, 1)), (None, (0, 2)), (0.0, (2,))])
+def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
+    scale_error: float | None, lost: tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Told of a neighbour, or without a scale of the covers' size; one that was told all this is not searched twice."""
+    sound, asked = shots_module.find_cable, []
+
+    def strict(
+        photo: Photo, settings: VisionSettings, *, cable: Cable, near: RoughCable | None
+    ) -> RoughCable | Rejected:
+        asked.append(photo.name)
+        told = near is not None and cable.diameter_px is not None and lost != (2,)
+        if told or int(photo.name[5:7]) not in lost:
+            return sound(photo, settings, cable=cable, near=near)
+        return Rejected(photo.name, "photo/crossing", "the cable crosses itself")
+
+    monkeypatch.setattr(shots_module, "find_cable", strict)
+    photos = trace_series(series(tmp_path, scale_error=scale_error), FLAT).photos
+    again = () if lost == (2,) else lost
+    assert [isinstance(photo, Centerline) for photo in photos] == [k in again or k not in lost for k in range(3)]
+    assert asked == [f"step_{k:02d}.png" for k in (0, 1, 2, *again)]
