@@ -155,7 +155,8 @@ def _guides(rough: RoughCable, along: Array, half_width: float) -> tuple[Array, 
         if bearing.radius_px is None or np.count_nonzero(near) < 4:
             continue
         seam = end + (led if axis == 0 else -led)
-        points[beside] = _lead(float(along[axis]), rough.path_px[axis], seam, s[near], points[near])(s[beside])
+        lead = _lead(float(along[axis]), rough.path_px[axis], seam, s[near], points[near])
+        points[beside] = lead(s[beside])
     return points, s
 
 
