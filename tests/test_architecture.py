@@ -69,6 +69,7 @@ INSIDE = {
         ("exchange", "pair_set"),
         ("two_causes",),
         ("conclusion",),
+        ("finer_law",),
     ],
     "pipeline.diagnosis.presentation": [("leftover", "named", "table"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],

@@ -19,6 +19,7 @@ from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.explanation import Explanation
+from pipeline.diagnosis.explanations.finer_law import cost, points_instead
 from pipeline.diagnosis.explanations.friction_in_law import shared
 from pipeline.diagnosis.explanations.pair_set import TwoCauses
 from pipeline.diagnosis.explanations.single_cause import refit_one
@@ -29,7 +30,7 @@ from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_in
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
-from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law
+from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law, with_points
 from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.leftover import Leftover, leftover_of
@@ -87,7 +88,7 @@ def diagnose(
             faults, bench = joined, again
     known = None if identification is None else curve_of(identification.inverse)
     begun = newton_steps()
-    conclusion = conclude(bench, settings)
+    bench, conclusion = settled(bench, settings)
     part = present(bench, conclusion, settings, identified=known)
     left = max(settings.search_newton_steps - (newton_steps() - begun), 1)  # a second search ends with the first's time
     shorter = settings.model_copy(update={"search_newton_steps": left})
@@ -110,28 +111,27 @@ def _allowing_for_scatter(
     Better is what is likelier, each number fitted paid with two of chi-square; nothing else where only that explains
     the data at all.
     """
-    exact, cost = (faults, bench, conclusion, part), _cost(bench, conclusion)
+    exact, paid = (faults, bench, conclusion, part), _cost(bench, conclusion)
     fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
     scattered = scatter_beside(faults, bench, fitted, settings)
     if scattered is not None:
-        concluded = conclude(scattered.bench, settings)
-        presented = present(scattered.bench, concluded, settings, identified=known)
-        likelier = _cost(scattered.bench, concluded) + scattered.price < cost
+        again, concluded = settled(scattered.bench, settings)
+        presented = present(again, concluded, settings, identified=known)
+        likelier = _cost(again, concluded) + scattered.price < paid
         if presented.verdict != "unexplained" and (likelier or part.verdict == "unexplained"):
-            return scattered.faults, scattered.bench, concluded, presented
+            return scattered.faults, again, concluded, presented
     left_open = with_scatter(faults, bench, settings) if part.verdict == "unexplained" else None
     if left_open is not None:
-        concluded = conclude(left_open[1], settings)
-        presented = present(left_open[1], concluded, settings, identified=known)
+        again, concluded = settled(left_open[1], settings)
+        presented = present(again, concluded, settings, identified=known)
         if presented.verdict != "unexplained":
-            return *left_open, concluded, presented
+            return left_open[0], again, concluded, presented
     return exact
 
 
 def _cost(bench: Workbench, conclusion: Conclusion) -> float:
     """Chi-square of what was concluded, plus two for every parameter."""
-    fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
-    return fitted.chi2 + 2.0 * fitted.extension.size
+    return cost(bench.base if conclusion.accepted is None else conclusion.accepted.fitted)
 
 
 def with_corrected_forces(test: MeasuredTest, corrections: Sequence[ForceCorrectionPart]) -> MeasuredTest:
@@ -161,6 +161,22 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
     """Number of control points: that of the identification, within what leaves causes visible, or the default."""
     law = None if identification is None else identification.inverse.characteristic
     return settings.knots if law is None else int(np.clip(len(law.knots), 3, settings.knots + 1))
+
+
+def settled(bench: Workbench, settings: DiagnosisSettings) -> tuple[Workbench, Conclusion]:
+    """What is concluded beside a law so fine that no cause stands for control points it lacks, and its workbench."""
+    begun = newton_steps()
+    concluded = conclude(bench, settings)
+    while (points := points_instead(bench, concluded, settings)) is not None:
+        left = max(settings.search_newton_steps - (newton_steps() - begun), 1)
+        finer = with_points(bench, points, settings)
+        if finer is None:
+            break
+        again = conclude(finer, settings.model_copy(update={"search_newton_steps": left}))
+        if _cost(finer, again) > _cost(bench, concluded) + bench.limit**2:
+            break  # what stands beside the law was not found again
+        bench, concluded = finer, again
+    return bench, concluded
 
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:

@@ -170,14 +170,19 @@ class DiagnosisSettings(BaseModel):
 
     # base model
     knots: int = Field(5, description="control points of the base characteristic where no identification chose them")
-    knots_most: int = Field(7, description="control points of the base characteristic at most; more would eat causes")
+    knots_most: int = Field(
+        7,
+        description="control points of the base characteristic that causes are first looked for with; more would eat "
+        "causes, and come only where the law does as well as what was named",
+    )
     knots_extended: int = Field(
         9, description="control points of the extended model at most; what is named is in it and can be eaten no more"
     )
     knots_identified: int = Field(
         12,
         description="control points of the law that is identified again with the causes in the model, smoothness "
-        "averaged over; on fourfold falls in a seventh of the range the band covered 74 to 90 % with 9, 98 % with 12",
+        "averaged over, and the most that may stand for a cause; on fourfold falls in a seventh of the range the band "
+        "covered 74 to 90 % with 9, 98 % with 12",
     )
     knot_gain: float = Field(
         16.0,

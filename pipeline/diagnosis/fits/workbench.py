@@ -152,6 +152,17 @@ def scored(
     return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
 
 
+def with_points(bench: Workbench, points: Array, settings: DiagnosisSettings) -> Workbench | None:
+    """The workbench with other control points (k,) 1/m in the base model; None where that has no equilibrium."""
+    extension, vector = _on(bench.base, points)
+    fitted = fit_from(bench.observation, extension, vector, bench.base, settings)
+    if fitted.run.prediction is None:
+        return None
+    causes = bench.suspicion.causes
+    suspicion = suspect(bench.observation, fitted, causes, visible=settings.visible, trace=settings.trace)
+    return scored(bench.test, bench.observation, fitted, suspicion, settings)
+
+
 def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
     """The best of several starts: a wrong base model has false minima, and a start may lack equilibrium."""
     best: Fit | None = None
@@ -184,9 +195,13 @@ def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> boo
 
 def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
     """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
+    return _on(fitted, place_knots(0.0, float(fitted.excess.max()), count))
+
+
+def _on(fitted: Fit, knots: Array) -> tuple[Extension, Array]:
+    """The model with control points (k,) 1/m, and its vector along the spline so far."""
     base = fitted.extension.base
     law = base.characteristic(fitted.vector)
-    knots = place_knots(0.0, float(fitted.excess.max()), count)
     ordinates = np.log(np.maximum(law.f(knots), 0.02 * float(np.max(law.ordinates))) / base.stiffness)
     extension = replace(fitted.extension, base=replace(base, knots=knots))
     return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]
