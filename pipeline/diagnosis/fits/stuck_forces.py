@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
+from pipeline.diagnosis.observations.force_noise import last_digit
 from pipeline.records import Array
 from rod.measurement import MeasuredStep
 
@@ -31,9 +32,6 @@ AT_TOP = 5.0
 FINE = 2e-4
 """Last digit over the largest force: in a coarser log two steps may read the same force by chance."""
 
-ROUNDING = 1e-9
-"""Of the largest force: numbers that close are the same number."""
-
 
 class _Hold(NamedTuple):
     mean: float
@@ -50,7 +48,7 @@ def stuck_forces(steps: tuple[MeasuredStep, ...]) -> list[int]:
         return []
     every = np.abs(np.concatenate(samples))
     top = float(every.max())
-    digit = _last_digit(every, top)
+    digit = last_digit(every)
     if all(values.size < LEAST_SAMPLES for values in samples):
         return _repeated(steps, samples, loaded, top) if digit < FINE * top else []
     holds = {i: _hold(values, digit) for i, values in enumerate(samples) if values.size >= LEAST_SAMPLES}
@@ -62,14 +60,6 @@ def stuck_forces(steps: tuple[MeasuredStep, ...]) -> list[int]:
         and (holds[i].repeats or high[i])
         and _is_quiet(holds[i], [h.variance for j, h in holds.items() if j != i and not h.repeats and not high[j]])
     ]
-
-
-def _last_digit(forces: Array, top: float) -> float:
-    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
-    for places in range(-3, 13):
-        if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):
-            return 10.0**-places
-    return 0.0
 
 
 def _hold(values: Array, digit: float) -> _Hold:

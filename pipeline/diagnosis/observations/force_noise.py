@@ -116,6 +116,46 @@ def _drawn_together(found: _Scatter, floor: float) -> tuple[Array, Array]:
     return variance, 1.0 / behind
 
 
+ROUNDING = 1e-9
+"""Of the largest force: numbers that close are the same number."""
+
+HARMONICS = np.arange(1, 30)
+"""Of the sawtooth of a rounding error over the force; the variance of the others is 2 % of the whole."""
+
+
+def last_digit(forces: Array) -> float:
+    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
+    top = float(np.max(np.abs(forces), initial=0.0))
+    for places in range(-3, 13):
+        if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):
+            return 10.0**-places
+    return 0.0
+
+
+def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:
+    """Standard deviation (n,) N of what rounding does to all samples of a hold alike.
+
+    Samples that scatter over several digits average their rounding out; those that repeat one number all have the same
+    error, of variance digit^2 / 12. Between, the mean error over a scatter sigma of the force f is the sawtooth
+    ``sum_k (-1)^k d / (pi k) sin(2 pi k f / d) exp(-2 (pi k sigma / d)^2)`` (Widrow and Kollar, Quantization Noise,
+    2008), of which f may be anywhere. With a digit of a hundredth of the largest force, holds of 60 equal samples were
+    taken for known to a hundredth of their error.
+
+    Parameters
+    ----------
+    steps : tuple of MeasuredStep
+    std : (n,) N
+        Of one sample, its rounding included.
+    """
+    samples = [np.array([step.force]) if step.hold_forces is None else step.hold_forces for step in steps]
+    digit = last_digit(np.concatenate(samples))
+    if not digit > 0.0:
+        return np.zeros(len(steps))
+    scatter = np.maximum((std / digit) ** 2 - 1.0 / 12.0, 0.0)
+    variance = np.exp(-4.0 * np.pi**2 * np.outer(scatter, HARMONICS**2)) / (2.0 * np.pi**2 * HARMONICS**2)
+    return np.asarray(digit * np.sqrt(variance.sum(axis=1)))
+
+
 class _Scatter(NamedTuple):
     """Sums of squares (n,) N^2 of the samples of every hold about their smooth course, and their freedom (n,)."""
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.observations.force_noise import force_noise
+from pipeline.diagnosis.observations.force_noise import common_rounding, force_noise
 from pipeline.diagnosis.observations.noise import (
     PhotoNoise,
     Sections,
@@ -104,6 +104,8 @@ class Observation:
         Samples behind ``force_std``; 0 if stated.
     force_own : tuple of float
         Freedom of each step's ``force_std``, where each has a level of its own; else empty.
+    force_common : tuple of float
+        Error (N) of each step that all its samples have alike (rounding, see `force_noise`); empty where there is none.
     photos : tuple of PhotoData
     photo_noise : PhotoNoise
     rows : Row
@@ -120,6 +122,7 @@ class Observation:
     rows: Row
     added: Array | float = 0.0
     force_own: tuple[float, ...] = ()
+    force_common: tuple[float, ...] = ()
 
     def estimated(self, count: int) -> list[tuple[NDArray[np.bool_], float]]:
         """Rows (count,) whose noise is one level estimated from samples, with its freedom; empty where it is stated."""
@@ -184,7 +187,10 @@ def observe(
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
     rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
-    return Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, force_own=level.own)
+    common = tuple(common_rounding(test.steps, level.std).tolist())
+    return Observation(
+        tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, force_own=level.own, force_common=common
+    )
 
 
 def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:
@@ -226,15 +232,28 @@ def _whitening(
 
 def residual(observation: Observation, prediction: Prediction) -> Array:
     """Whitened residual (N,) without priors, rows as in ``observation.rows``."""
+    common = observation.force_common or (0.0,) * len(observation.forces)
     parts = [
-        (data - model[: len(data)]) / std
-        for data, model, std in zip(observation.forces, prediction.samples, observation.force_std, strict=True)
+        _of_hold((data - model[: len(data)]) / std, alike / std)
+        for data, model, std, alike in zip(
+            observation.forces, prediction.samples, observation.force_std, common, strict=True
+        )
     ]
     sections = observation.all_sections
     across = _distance(sections, prediction)
     for photo, own in zip(observation.photos, sections.of_photo, strict=True):
         parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across[own]])
     return np.asarray(np.concatenate(parts) + observation.added)
+
+
+def _of_hold(off: Array, common: float) -> Array:
+    """Whitened residuals (h,) of a hold whose samples, of unit scatter each, share an error of ``common``.
+
+    The covariance is 1 + common^2 11^T, and the inverse of its root takes something off their mean.
+    """
+    if not common > 0.0 or not off.size:
+        return off
+    return np.asarray(off - (1.0 - 1.0 / np.sqrt(1.0 + off.size * common**2)) * off.mean())
 
 
 def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:

@@ -14,6 +14,8 @@ from pipeline.diagnosis.observations.noise import (
     section_covariance,
     smooth_basis,
 )
+from pipeline.diagnosis.observations.observation import observe, residual
+from pipeline.diagnosis.observations.prediction import Prediction
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredStep
 
@@ -162,3 +164,24 @@ def test_stated_level_where_there_are_no_samples():
     bare = tuple(replace(step, hold_forces=None, hold_times=None) for step in test.steps)
     level = force_noise(bare, floor=0.0, distinct=1e-3)
     assert level.freedom == 0 and level.std[0] == test.steps[0].force_std
+
+
+@pytest.mark.parametrize("scatter", [0.02, 0.2, 0.4, 1.0])
+def test_forces_in_coarse_digits_are_as_uncertain_as_they_are(scatter):
+    """The mean of a hold, whitened, has unit variance, whether its samples repeat one number or scatter."""
+    rng, digit, settings, found = np.random.default_rng(11), 0.01, DiagnosisSettings(), []
+    test = hidden_test(Cable(), THREE, largest=0.0138, seed=1)
+    for _ in range(150):
+        true = rng.uniform(0.4, 1.0, 6)
+        holds = true[:, None] + scatter * digit * rng.standard_normal((6, 30))
+        steps = tuple(
+            replace(test.steps[0], force=float(hold[-1]), hold_forces=hold, hold_times=np.arange(30.0), shape=None)
+            for hold in np.round(holds, 2)
+        )
+        observation = observe(replace(test, steps=steps), settings)
+        none = np.zeros((6, 2))
+        shown = Prediction(true, tuple(np.full(30, f) for f in true), none[:, 0], np.arange(2.0), none, none, none)
+        off = residual(observation, shown).reshape(6, 30)
+        found.extend(np.sqrt(30.0) * off.mean(axis=1))
+    # a level that six holds share is known to 5 %; where rounding takes all, its own bounded distribution is narrower
+    assert np.std(found) == pytest.approx(1.0, abs=0.12)
