@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit, evaluated
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
-from pipeline.diagnosis.statistics.variance_component import component
+from pipeline.diagnosis.observations.prediction import Facts
+from pipeline.diagnosis.statistics.variance_component import Component, component
 from pipeline.records import Finding
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
@@ -80,13 +81,12 @@ def scatter_beside(faults: Faults, bench: Workbench, fitted: Fit, settings: Diag
     if columns is None:
         return None
     most = settings.displacement_scatter
-    lines = np.column_stack([np.ones(len(at)), bench.facts.displacement[at]])
-    found = component(fitted.residual, fitted.jacobian, columns, lines=lines, most=most)
+    found = component(fitted.residual, fitted.jacobian, columns, lines=_lines(bench.facts, at), most=most)
     if found is None or found.p_value > RARE or not LEAST_RATIO * settings.displacement_std < found.std < most:
         return None
     if found.share < LEAST_SHARE:
         return None
-    again = _told(faults, bench, at, found.std, settings)
+    again = _told(faults, bench, at, found, settings)
     return None if again is None else Scattered(*again, found.price + 2.0 * (1 - len(at)))
 
 
@@ -126,18 +126,13 @@ def with_scatter(faults: Faults, bench: Workbench, settings: DiagnosisSettings) 
     left_open = prepare(replace(faults, test=_known_to(faults.test, at, most)), settings, knots=knots)
     if isinstance(left_open, str):
         return None
-    base, vector = left_open.base.extension.base, left_open.base.vector
-    errors = base.shift(vector, len(faults.test.steps))
-    travel = bench.facts.displacement[at]
-    line = np.column_stack([np.ones(len(at)), travel])
-    off = np.asarray(errors)[at] - line @ np.linalg.lstsq(line, np.asarray(errors)[at], rcond=None)[0]
-    scatter = float(np.sqrt(np.sum(off**2) / (len(at) - line.shape[1])))
-    if not LEAST_RATIO * settings.displacement_std < scatter < most:
+    found = scatter_of_errors(left_open.base, bench.facts, most)
+    if found is None or not LEAST_RATIO * settings.displacement_std < found.std < most:
         return None
     misfit = bench.base.chi2 - (len(bench.base.residual) - bench.base.extension.size)
     if bench.base.chi2 - left_open.base.chi2 < LEAST_SHARE * misfit:
         return None
-    return _told(faults, bench, at, scatter, settings)
+    return _told(faults, bench, at, found, settings)
 
 
 def _logged(test: MeasuredTest) -> list[int]:
@@ -146,20 +141,47 @@ def _logged(test: MeasuredTest) -> list[int]:
 
 
 def _told(
-    faults: Faults, bench: Workbench, at: list[int], scatter: float, settings: DiagnosisSettings
+    faults: Faults, bench: Workbench, at: list[int], scatter: Component, settings: DiagnosisSettings
 ) -> tuple[Faults, Workbench] | None:
-    """The test with displacements known to their scatter (m), told as a finding, and its base model."""
-    message = (
-        f"the displacements of the log scatter by {1e6 * scatter:.2g} um about what photos and forces say of each "
-        "step, more than the log tells; the diagnosis allowed for that"
-    )
+    """The test with displacements known to their scatter, told as a finding, and its base model."""
     found = replace(
         faults,
-        test=_known_to(faults.test, at, scatter),
-        findings=(*faults.findings, Finding("log/displacement-scatter", "warning", message)),
+        test=_known_to(faults.test, at, scatter.std),
+        findings=(*faults.findings, told(scatter)),
     )
     again = prepare(found, settings, knots=len(bench.base.extension.base.knots))
     return None if isinstance(again, str) else (found, again)
+
+
+def told(scatter: Component) -> Finding:
+    """The finding ``log/displacement-scatter``."""
+    size, least, most = (f"{1e6 * value:.2g}" for value in (scatter.std, *scatter.between))
+    message = (
+        f"the displacements of the log scatter by {size} um (95 %: {least} to {most} um) about what photos and forces "
+        "say of each step, more than the log tells; the diagnosis allowed for that"
+    )
+    return Finding("log/displacement-scatter", "warning", message)
+
+
+def scatter_of_errors(fitted: Fit, facts: Facts, most: float) -> Component | None:
+    """Scatter of the displacements beside a model that has their errors among its parameters; see `component`.
+
+    The errors are put back into what the model leaves, so what was supposed of their scatter plays no part; their own
+    squares would count as free what the law and the causes have taken of them.
+    """
+    base, at = fitted.extension.base, list(fitted.extension.base.moved)
+    own = slice(len(base.names) - 2 - len(at), len(base.names) - 2)
+    errors = fitted.jacobian[:, own]
+    columns = errors.copy()
+    columns[len(columns) - len(fitted.extension.prior) :] = 0.0
+    left = fitted.residual + errors @ fitted.vector[own]
+    rest = np.delete(fitted.jacobian, own, axis=1)
+    return component(left, rest, columns, lines=_lines(facts, at), most=most)
+
+
+def _lines(facts: Facts, at: list[int]) -> Array:
+    """Courses (k, 2) of errors that are no scatter: a constant, and what grows with the displacement."""
+    return np.column_stack([np.ones(len(at)), facts.displacement[at]])
 
 
 def _known_to(test: MeasuredTest, steps: list[int], std: float) -> MeasuredTest:

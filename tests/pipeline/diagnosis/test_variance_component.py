@@ -41,3 +41,12 @@ def test_scatter_is_found_as_large_as_it_is():
 def test_what_is_fitted_already_has_no_scatter():
     residual, jacobian, columns = problem(np.random.default_rng(3), 1.0)
     assert component(residual, np.hstack([jacobian, columns]), columns, lines=LINES, most=50.0) is None
+
+
+def test_interval_of_the_scatter_holds_it_as_often_as_stated():
+    ones = found(10.0, 400, 100.0)
+    held = np.mean([one.between[0] <= 10.0 <= one.between[1] for one in ones])
+    # 95 %, of which five free numbers cost 1 %, and three standard errors of 400 draws
+    assert held == pytest.approx(0.945, abs=0.034)
+    assert all(one.between[0] <= one.std <= one.between[1] for one in ones)
+    assert np.median([one.between[1] / one.between[0] for one in ones]) < 5.0  # that of chi-square itself: 4.3
