@@ -19,6 +19,10 @@ from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.settings.diagnosis import DiagnosisSettings
 
+LEAST_SHARE = 0.02
+"""Of what a model leaves: far above the noise any form removes a little, and models that none of them brings to it were
+given one after the other, each with all refits that tell which of them are needless."""
+
 
 def with_more_forms(
     observation: Observation,
@@ -29,7 +33,9 @@ def with_more_forms(
     *,
     hopeless: float,
 ) -> Fit:
-    """The model with as many further forms of a cause as remove ``shape_gain`` each, and as may get below ``hopeless``.
+    """The model with as many further forms of a cause as pay for themselves, and as may get below ``hopeless``.
+
+    Each must remove ``shape_gain``, or `LEAST_SHARE` of the misfit where that is more.
 
     Parameters
     ----------
@@ -45,6 +51,7 @@ def with_more_forms(
         Chi-square above which the result is of no use.
     """
     while len(fitted.extension.terms_of(cause)) < settings.shapes_most:
+        least = max(settings.shape_gain, LEAST_SHARE * fitted.chi2)
         more = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
         fitting = np.array([may_join(term, fitted, setting) for term in more.terms], dtype=bool)
         fresh = fitting & np.array([term not in fitted.extension.terms for term in more.terms], dtype=bool)
@@ -53,12 +60,12 @@ def with_more_forms(
         added: Fit | None = None
         # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
         for eligible in (fresh, fitting):
-            if _loudest(more.statistic, eligible) ** 2 >= settings.shape_gain:
+            if _loudest(more.statistic, eligible) ** 2 >= least:
                 loudest = int(np.argmax(more.statistic * eligible))
                 added = fit_terms(observation, fitted, more, (loudest,), settings)
-            if added is not None and fitted.chi2 - added.chi2 >= settings.shape_gain:
+            if added is not None and fitted.chi2 - added.chi2 >= least:
                 break
-        if added is None or fitted.chi2 - added.chi2 < settings.shape_gain:
+        if added is None or fitted.chi2 - added.chi2 < least:
             break
         fitted = without_needless_forms(observation, added, cause, settings)
     return fitted

@@ -49,7 +49,7 @@ def with_free_profile(
     """
     if not is_profile(cause) or not _may_pay(observation, fitted, cause, settings, hopeless):
         return fitted
-    best = fitted
+    best, most = fitted, fitted.chi2 - (1.0 - SHARED) * _excess(fitted)
     for count in BLOCKS:
         extension, start = in_waves(best, cause, count)
         found = fit_from(observation, extension, start, best, settings)
@@ -57,6 +57,8 @@ def with_free_profile(
             best = found
         elif best is not fitted:
             break  # what replaces spots may need more waves than the first block has
+        if best is not fitted and best.converged and _left_by_all(observation, best, cause, settings) > most:
+            return fitted
     return best if _excess(best) < SHARED * _excess(fitted) else fitted
 
 
@@ -104,12 +106,17 @@ def _may_pay(observation: Observation, fitted: Fit, cause: Cause, settings: Diag
     further = BLOCKS[0] - sum(fitted.extension.terms[k].size for k in fitted.extension.terms_of(cause))
     if _excess(fitted) < _price(further, settings):
         return False
+    removed = fitted.chi2 - _left_by_all(observation, fitted, cause, settings)
+    if not fitted.converged:  # what is left then says little of what waves would leave
+        return fitted.chi2 - removed < max(hopeless, 0.5 * fitted.chi2) or not np.isfinite(hopeless)
+    return removed > _price(further, settings) and fitted.chi2 - removed < hopeless
+
+
+def _left_by_all(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings) -> float:
+    """Chi-square that all waves beside what is fitted would leave, by the linear model."""
     terms = [Term(cause, wave(k)) for k in range(1, BLOCKS[-1] + 1)]
     columns = profile_columns(observation, fitted.extension, fitted.vector, fitted.run, terms)
     known = span(fitted.jacobian)
     beside = columns - known @ (known.T @ columns)
     seen = np.linalg.norm(beside, axis=0) > settings.visible * np.linalg.norm(columns, axis=0)
-    removed = float(np.sum((span(beside[:, seen]).T @ fitted.residual) ** 2))
-    if not fitted.converged:  # what is left then says little of what waves would leave
-        return fitted.chi2 - removed < max(hopeless, 0.5 * fitted.chi2) or not np.isfinite(hopeless)
-    return removed > _price(further, settings) and fitted.chi2 - removed < hopeless
+    return fitted.chi2 - float(np.sum((span(beside[:, seen]).T @ fitted.residual) ** 2))

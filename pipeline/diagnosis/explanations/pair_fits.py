@@ -108,7 +108,12 @@ def with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSetti
 
 
 def in_any_form(
-    bench: Workbench, found: Sequence[Explanation], settings: DiagnosisSettings, *, rivals: Sequence[Explanation] = ()
+    bench: Workbench,
+    found: Sequence[Explanation],
+    settings: DiagnosisSettings,
+    *,
+    rivals: Sequence[Explanation] = (),
+    effort: Effort = TO_THE_END,
 ) -> list[Explanation]:
     """What the best pairs become with further forms of their own place, and with profiles of any form.
 
@@ -116,6 +121,8 @@ def in_any_form(
     """
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -worth(e))[:IN_ANY_FORM]:
+        if effort.spent:
+            break
         rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
         fitted, hopeless = pair.fitted, rival + settings.refit_least
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):

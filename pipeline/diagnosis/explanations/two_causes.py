@@ -68,7 +68,7 @@ def second_cause(
     found = refitted_pairs(bench, linear, settings, hopeless=best.fitted.chi2, effort=effort)
     found += beside_best(bench, best, second, settings)
     found = with_all_forms(bench, found, settings)
-    found += in_any_form(bench, found, settings)
+    found += in_any_form(bench, found, settings, effort=effort)
 
     def acceptable(pair: Explanation) -> bool:
         beside_law = [c for c in pair.causes if suspicion.causes[c].name != LAW]
@@ -84,7 +84,8 @@ def second_cause(
     # beside a single cause that leaves the noise, only pairs that come near it are worth a search
     near = best.fitted.chi2 + settings.refit_least + settings.hopeless * bench.base.chi2 if settled else np.inf
     new = exchanged(bench, [pair for pair in accepted if pair.fitted.chi2 < near], settings, effort)
-    accepted += [pair for pair in (*new, *in_any_form(bench, new, settings, rivals=accepted)) if acceptable(pair)]
+    new += in_any_form(bench, new, settings, rivals=accepted, effort=effort)
+    accepted += [pair for pair in new if acceptable(pair)]
     two, instead = weighed_pairs(bench, accepted, settings, [e for e in singles if _composed(e)])
     return two, instead, suspected and effort.spent
 

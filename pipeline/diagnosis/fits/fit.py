@@ -29,6 +29,10 @@ Array = NDArray[np.float64]
 CRAWL, PATIENCE = 2e-3, 4
 """Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
 
+FAR, CRAWL_FAR = 16.0, 1e-2
+"""Reduced chi-square (4 sigma rms) beyond which a fit is none that anything is read from, and that share there: data
+that no model explains else kept every one of hundreds of fits at work on a hundredth of its misfit."""
+
 PART = 0.4
 """Share of a step that leads too far; where amount and stiffness act as a product, halves of a step did."""
 
@@ -123,7 +127,7 @@ def fit(
     iterations : int
         At most.
     tolerance : float
-        Fall of chi-square at which the fit is done.
+        Fall of chi-square, over the reduced chi-square where that is above 1, at which the fit is done.
     near : Run or None
         Run of a similar model, for warm starts.
     cutoff : float
@@ -152,7 +156,8 @@ def fit(
     for left in range(iterations, 0, -1):
         cost = state.cost(rows)
         linear = _Linearised(jacobian[rows], state.residual[rows], cutoff)
-        if linear.expected_fall < tolerance:
+        left_over = max(cost / max(int(rows.sum()), 1), 1.0)  # a sigma of what a misfit leaves is no sigma of the noise
+        if linear.expected_fall < tolerance * left_over:
             converged = True
             break
         if cost - left * max(falls[-2:]) > hopeless:
@@ -162,17 +167,18 @@ def fit(
         if lower is None:
             converged = linear.expected_fall < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
             break
-        state, damping = lower
+        raised, (state, damping) = lower[1] > damping > 0.0, lower
         jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.run)
         fall = cost - state.cost(rows)
         falls.append(fall)
-        if fall < tolerance and damping == 0.0:
+        if fall < tolerance * left_over and damping == 0.0:
             converged = True
             break
-        crawled = crawled + 1 if damping > 0.0 and fall < CRAWL * cost else 0
+        crawled = crawled + 1 if damping > 0.0 and fall < (CRAWL if left_over < FAR else CRAWL_FAR) * cost else 0
         if crawled == PATIENCE:
             break
-        damping = 0.1 * damping if damping > 1e-4 else 0.0
+        if not raised:  # what was too little a step ago is not tried again at once
+            damping = 0.1 * damping if damping > 1e-4 else 0.0
     advice = "" if converged else "the fit did not settle"
     return Fit(extension, state.vector, state.run, state.residual, jacobian, converged, advice)
 

@@ -2,8 +2,8 @@
 
 Rows: the whitened data in the order of `observation.Row`, then one row per piece of prior knowledge. Columns: control
 points of the law, K0 and length by the implicit function theorem (`rod.sensitivity`), what only the camera changes by
-the observers alone; amounts of a profile along the cable by that theorem too, amounts of other causes and what is tuned
-of a form by difference quotients with warm starts.
+the observers alone; amount, place and width of a profile along the cable and amounts of further control points by that
+theorem too, all other numbers of causes by difference quotients with warm starts.
 
 Sign: residual = data - model, so the Jacobian here is that of the model, ``d residual = - jacobian d vector``.
 """
@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.causes.profile import along_cable, is_profile
 from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extension import STEP, Extension, Term
@@ -57,11 +58,11 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     at_here = whole_residual(observation, here.prediction, vector, prior)
     assert at_here is not None and here.bare is not None
     columns = _base_columns(observation, extension, vector, here, at_here)
-    profiles = _profiles(observation, extension, vector, here)
+    bent = _bent(observation, extension, vector, base_model, here)
     first = len(columns)
     for j, step in enumerate(extension.steps[first:], start=first):
-        if j in profiles:
-            columns.append(profiles[j])
+        if j in bent:
+            columns.append(bent[j])
             continue
         column = np.zeros_like(at_here)
         for signed in (step, -step):
@@ -78,13 +79,70 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     return np.column_stack(columns)
 
 
-def _profiles(observation: Observation, extension: Extension, vector: Array, here: Run) -> dict[int, Array]:
-    """Columns of the amounts of profiles along the cable by their position in the vector."""
-    own = [k for k, term in enumerate(extension.terms) if is_profile(term.cause)]
-    table = profile_columns(observation, extension, vector, here, [extension.formed(vector, k) for k in own])
-    prior = extension.prior
-    table[len(table) - len(prior) :] = prior[:, [extension.amounts_at[k] for k in own]]
-    return {extension.amounts_at[k]: column for k, column in zip(own, table.T, strict=True)}
+def _bent(
+    observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run
+) -> dict[int, Array]:
+    """Columns of all numbers of terms that have a closed derivative, by their position in the vector."""
+    known = _ways(extension, vector, base_model, here.model)
+    if not known:
+        return {}
+    law = here.model.bending.characteristic
+    ordinates = len(law.knots) if isinstance(law, Characteristic) else 0
+    own = [j for j, (name, _) in known.items() if name == "ordinates"]
+    bases = [way for way in known.values() if way[0] != "ordinates"]
+    change = np.zeros((ordinates * bool(own) + len(bases), len(known)))
+    row = len(change) - len(bases)
+    for column, (name, along) in enumerate(known.values()):
+        if name == "ordinates":
+            change[:ordinates, column] = along
+        else:
+            change[row, column], row = 1.0, row + 1
+    every = base_derivatives(here, extension.facts, [*(("ordinates",) if own else ()), *bases])
+    by = tuple(_combined(d, change) for d in every)
+    table = _shown(observation, extension, vector, here, by, extension.steps[list(known)])
+    table[observation.rows.count :] = extension.prior[:, list(known)]
+    return dict(zip(known, table.T, strict=True))
+
+
+def _ways(extension: Extension, vector: Array, base_model: Model, here: Model) -> dict[int, tuple[str, Array]]:
+    """What numbers of terms move, by their position, where that is known in closed form; all others are left out.
+
+    A parameter of `rod.parameters`, and the change of its basis per unit of the number.
+    """
+    cable = end_for_end(here) if extension.turned else here
+    ways: dict[int, tuple[str, Array]] = {}
+    for k, at in enumerate(extension.amounts_at):
+        term = extension.formed(vector, k)
+        if is_profile(term.cause):
+            name, phi = along_cable(term.cause, term.variant, cable)
+            moves = [phi]
+            for tuned in term.variant.tuned:
+                step = SHORT * term.variant.scale(tuned)
+                beside = term.variant.moved({tuned: getattr(term.variant, tuned) + step})
+                moves.append(float(vector[at]) * (along_cable(term.cause, beside, cable)[1] - phi) / step)
+            ways |= {at + i: (name, move[::-1] if extension.turned else move) for i, move in enumerate(moves)}
+        elif term.cause.name == LAW and (moved_law := _ordinates(extension, vector, base_model, here, at)) is not None:
+            ways[at] = "ordinates", moved_law
+    return ways
+
+
+SHORT = 1e-6
+"""Of the range of a place or width: forms are closed, and a quotient of two is right to as much."""
+
+
+def _ordinates(extension: Extension, vector: Array, base_model: Model, here: Model, at: int) -> Array | None:
+    """Change of all control points (p,) of the law with the amount of one that a term has put into it, N m^2 per unit.
+
+    They are linear in it; None where other control points are used at another amount.
+    """
+    trial = vector.copy()
+    trial[at] += extension.steps[at]
+    old, new = here.bending.characteristic, extension.model(trial, of=base_model).bending.characteristic
+    if not isinstance(old, Characteristic) or not isinstance(new, Characteristic):
+        return None
+    if not np.array_equal(old.knots, new.knots):
+        return None
+    return np.asarray((new.ordinates - old.ordinates) / extension.steps[at])
 
 
 def profile_columns(
@@ -104,18 +162,29 @@ def profile_columns(
     terms : sequence of Term
         Of causes of `causes.profile`.
     """
-    at_here = whole_residual(observation, here.prediction, vector, extension.prior)
-    assert at_here is not None and here.bare is not None
-    table = np.zeros((len(at_here), len(terms)))
     if not terms:
-        return table
+        return np.zeros((len(extension.prior) + observation.rows.count, 0))
     facts = extension.facts
     cable = end_for_end(here.model) if extension.turned else here.model
     given = [along_cable(term.cause, term.variant, cable) for term in terms]
     by = base_derivatives(here, facts, [(name, phi[::-1] if extension.turned else phi) for name, phi in given])
-    for k, term in enumerate(terms):
-        step = STEP * term.cause.plausible(facts)
-        shown = observed(moved(here.bare, by, k, step), here.model, facts)
+    return _shown(observation, extension, vector, here, by, [STEP * term.cause.plausible(facts) for term in terms])
+
+
+def _shown(
+    observation: Observation,
+    extension: Extension,
+    vector: Array,
+    here: Run,
+    by: tuple[Derivatives, ...],
+    steps: Sequence[float] | Array,
+) -> Array:
+    """Columns (N, k) of derivatives of the rod as load cell and camera show them, by short steps (k,) along each."""
+    at_here = whole_residual(observation, here.prediction, vector, extension.prior)
+    assert at_here is not None and here.bare is not None
+    table = np.zeros((len(at_here), len(steps)))
+    for k, step in enumerate(steps):
+        shown = observed(moved(here.bare, by, k, float(step)), here.model, extension.facts)
         there = whole_residual(observation, shown, vector, extension.prior)
         assert there is not None
         table[:, k] = (at_here - there) / step
