@@ -56,6 +56,14 @@ def _unclear(rough: RoughCable, sections: Sections, scatter: float, options: Cur
             f" the width varies by {100.0 * scatter:.0f} %; twisted pairs, bare strands and a sheath or ground of"
             " strong pattern do that",
         )
+    if ratio < needed and quiet and sections.share < options.min_measured_share:
+        # the few edges that are left agree in width by chance, or because they were left for that
+        return (
+            "photo/outline",
+            f"the cable's outline is no pair of smooth edges: they were found on {100.0 * sections.share:.0f} % of its"
+            " length only, though its pixels are quiet; twisted pairs, bare strands and a sheath or ground of strong"
+            " pattern do that",
+        )
     if ratio < needed:
         return (
             "photo/contrast",
