@@ -96,8 +96,11 @@ def _once_more(
         return shots
     known = _scale_of_covers(specimen, shots, settings) if calibration is None else calibration
     last = there[0] if known is calibration else len(shots)  # none before it had a neighbour, all after it had one
+    first = shots[0].step.displacement_m  # axes that are given hold for the first photo
     return [
-        replace(shot, found=_find_as_on(specimen, shot, shots[min(there, key=lambda i: abs(i - k))], known, settings))
+        replace(
+            shot, found=_find_as_on(specimen, shot, shots[min(there, key=lambda i: abs(i - k))], known, settings, first)
+        )
         if isinstance(shot.found, Rejected) and shot.preview is not None and k < last
         else shot
         for k, shot in enumerate(shots)
@@ -115,15 +118,24 @@ def _scale_of_covers(specimen: Specimen, shots: list[Shot], settings: VisionSett
 
 
 def _find_as_on(
-    specimen: Specimen, shot: Shot, near: Shot, calibration: Calibration | None, settings: VisionSettings
+    specimen: Specimen,
+    shot: Shot,
+    near: Shot,
+    calibration: Calibration | None,
+    settings: VisionSettings,
+    first: float,
 ) -> RoughCable | Rejected:
-    """The cable on a photo once more, with a neighbour photo known; else why it was refused before."""
-    photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+    """The cable on a photo once more, with a neighbour photo known; else why it was refused before.
+
+    ``first`` (m) is the displacement of the first photo.
+    """
+    name = str(shot.step.image)
+    photo = guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
     if isinstance(photo, Rejected) or isinstance(near.found, Rejected) or isinstance(shot.found, RoughCable):
         return shot.found
     scale = np.nan if calibration is None else calibration.scale.px_per_m
     travel = (shot.step.displacement_m - near.step.displacement_m) * scale
-    cable = _expected(specimen, calibration, shot.step.displacement_m - specimen.steps[0].displacement_m)
+    cable = _expected(specimen, calibration, shot.step.displacement_m - first)
     seen = expected_covers(near.found, specimen.rig.moving_bearing, travel)
     cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
     again = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near.found))
