@@ -123,10 +123,7 @@ def refit(
     """The same data with other control points and another blur, started from a fit that is known."""
     model = replace(known.model, knots=knots, prior=prior, blur=blur)
     u = known.evaluation.unknowns
-    law = known.model.characteristic(u)
-    # Outside its knots the old law is a straight line, which must not start a control point below zero.
-    ordinates = np.maximum(law.f(knots), 0.05 * law.ordinates.min())
-    start = np.concatenate([np.log(ordinates / model.unit), u[known.model.knots.size :]])
+    start = np.concatenate([known.model.carried(u, knots), u[known.model.knots.size :]])
     return fit(model, start, starts=known.evaluation.equilibria, evaluations=evaluations, precision=precision)
 
 

@@ -164,6 +164,12 @@ class FitModel:
         u[self.knots.size] = pre_curvature * self.length
         return u
 
+    def carried(self, u: Array, knots: Array) -> Array:
+        """Logarithms of the same law's f_EI at other knots (k,), the unknowns of a model that has those."""
+        # Outside its knots the law is a straight line, which must not start a control point below zero.
+        ordinates = np.maximum(self.characteristic(u).f(knots), 0.05 * self.ordinates(u).min())
+        return np.asarray(np.log(ordinates / self.unit))
+
 
 def step_data(test: MeasuredTest, *, blocks: int = 160) -> tuple[StepData, ...]:
     """Data of every step that says something about the cable: photos, and forces of loaded steps.

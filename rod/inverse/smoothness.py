@@ -27,6 +27,10 @@ TAU_STEPS = 15
 SLOPES, SLOPE_STEPS = (0.03, 3.0), 5
 """Sizes of the prior of the slope d log f / dt at K0: from none that could be seen to a factor e^3 over the range."""
 
+TOLD = 0.1
+"""Least singular value, relative to the largest, of the interpolation between two sets of knots by which one tells of
+the other: 0.5 or more between sets over the same range, nothing like it where they hardly overlap."""
+
 
 @dataclass(frozen=True)
 class Averaged:
@@ -69,7 +73,9 @@ def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus:
     J, value = _data_rows(found, ())
     k = model.knots.size
     onto = np.asarray(CubicSpline(knots, np.eye(knots.size), bc_type="natural")(model.knots))
-    z, *_ = np.linalg.lstsq(onto, found.unknowns[:k], rcond=None)
+    # what the fit's knots do not tell of a control point, where they lie elsewhere, stays as the fit's law has it
+    z = model.carried(found.unknowns, knots)
+    z += np.linalg.lstsq(onto, found.unknowns[:k] - onto @ z, rcond=TOLD)[0]
     moved = value + J[:, :k] @ (onto @ z - found.unknowns[:k])
     projected = np.hstack([J[:, :k] @ onto, J[:, k:]])
     unknowns = np.concatenate([z, found.unknowns[k:]])

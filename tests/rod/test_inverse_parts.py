@@ -141,6 +141,15 @@ def test_evidence_by_projection_is_that_of_a_fit():
     assert told == pytest.approx(exact, abs=1.0)  # of logarithms: less than one decides between no two numbers
 
 
+@pytest.mark.parametrize("low", [-3.0, 0.0])
+def test_evidence_where_the_knots_of_the_fit_lie_elsewhere(low):
+    # A fit that has not settled: some of its knots lie where no step is, so fewer than are asked for tell of the law.
+    model = replace(model_of(measured(), count=12), knots=place_knots(low, 9.2, 12))
+    rich = evaluate(model, model.start(LAW.tangent(np.maximum(model.knots, LAW.K0)), LAW.K0))
+    told = [evidence_of_knots(model, rich, place_knots(2.0, 9.2, n), taus=(0.05, 60.0)) for n in range(5, 13)]
+    assert np.ptp(told) < 1.0  # of logarithms, as of the fits themselves: each of these numbers follows the law
+
+
 def test_posterior_is_the_normal_equations_where_the_priors_are_weak():
     model = model_of(measured(), count=4)
     found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
