@@ -15,6 +15,18 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
+SlowErrors = tuple[tuple[float, float], ...]
+"""Standard deviation and correlation length of errors that no averaging of neighbours reduces."""
+
+
+def slow_covariance(s: Array, errors: SlowErrors) -> Array:
+    """Covariance (k, k) at arc lengths (k,) of errors with correlation ``exp(-ds^2 / (2 length^2))``."""
+    apart = s[:, None] - s[None, :]
+    total = np.zeros_like(apart)
+    for std, length in errors:
+        if std > 0.0:
+            total += std**2 * np.exp(-0.5 * (apart / max(length, 1e-12)) ** 2)
+    return np.asarray(total)
 
 
 @dataclass(frozen=True)
@@ -48,6 +60,9 @@ class MeasuredShape:
         Slowly varying sideways error common to neighbouring sections (light), not reduced by averaging.
     systematic_length : m
         Its correlation length along s.
+    wave_std, wave_length : m
+        The same of waves that a textured ground makes along the edges: longer than `correlation_length`, shorter than
+        a bend of the cable; 0 where there are none.
     """
 
     s: Array
@@ -67,6 +82,13 @@ class MeasuredShape:
     correlation_length: float
     systematic_std: float
     systematic_length: float
+    wave_std: float = 0.0
+    wave_length: float = 0.0
+
+    @property
+    def slow(self) -> SlowErrors:
+        """Standard deviation and correlation length (m) of the light's error and of the waves."""
+        return (self.systematic_std, self.systematic_length), (self.wave_std, self.wave_length)
 
     def section_offsets(self) -> Array:
         """Distance of the sections from the smooth curve along its normal, (k,) m; cubic Hermite between its points."""

@@ -94,7 +94,7 @@ INSIDE = {
     ],
     "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes", "steady")],
     "pipeline.vision.centerline": [
-        ("curvature", "smoothing", "edge_profile"),
+        ("curvature", "smoothing", "edge_profile", "ground_waves"),
         ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),
         ("path", "refusal"),

@@ -22,7 +22,7 @@ from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
 from pipeline.vision.centerline.lay import without_lay
-from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable
+from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.guard import guarded, jointly
 from pipeline.vision.judgement import Cable
@@ -256,8 +256,9 @@ def _tied(
     images = [shot.found.image for shot in shots]
     # a photo on which that breaks is measured by itself
     _, told = jointly(images, sights, _told)
+    _, waves = jointly(images, cables, partial(waves_of, settings=settings))
     return tuple(
-        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes))
+        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes, waves or (0.0, 0.0)))
         for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
     )
 
@@ -269,12 +270,16 @@ def _told(sights: Sequence[AxisSight | Rejected | None]) -> list[AxesTold | None
 
 
 def _shown(
-    cable: Followed | Rejected, preview: Preview | None, settings: VisionSettings, told: AxesTold | None = None
+    cable: Followed | Rejected,
+    preview: Preview | None,
+    settings: VisionSettings,
+    told: AxesTold | None = None,
+    waves: tuple[float, float] = (0.0, 0.0),
 ) -> Centerline | Rejected:
     """Centerline of a cable, with its picture."""
     if isinstance(cable, Rejected):
         return cable if preview is None else replace(cable, preview=preview)
-    line = centerline_of(cable, settings, told)
+    line = centerline_of(cable, settings, told, waves)
     return line if preview is None else replace(line, preview=with_strip(preview, line, cable.rough, settings.preview))
 
 

@@ -9,7 +9,7 @@ A block mean is taken of the distance of the sections from the smooth curve of t
 curve at the centre of the block: the mean of positions on an arc would lie inside it.
 
 Noise model (see `rod.measurement.MeasuredShape`): section errors ``std_i std_j exp(-|ds| / correlation_length)`` plus
-the slow part ``systematic_std^2 exp(-ds^2 / (2 systematic_length^2))``.
+the slow parts ``std^2 exp(-ds^2 / (2 length^2))`` of light and ground.
 
 Axes: chord frame; "normal" is the displacement along ``(-sin theta, cos theta)``; SI units.
 """
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.measurement import MeasuredShape
+from rod.measurement import MeasuredShape, slow_covariance
 
 Array = NDArray[np.float64]
 
@@ -83,9 +83,8 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     x, y, theta = (np.interp(mean, shape.s, v) for v in (shape.x, shape.y, shape.theta))
     x, y = _on_curve(shape, mean, x, y)
     covariance = block_covariance(s, std, first, sections, shape.correlation_length)
-    slow = (mean[:, None] - mean[None, :]) / max(shape.systematic_length, 1e-12)
     # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
-    covariance += min(shape.systematic_std, reach) ** 2 * np.exp(-0.5 * slow**2)
+    covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     return Midline(

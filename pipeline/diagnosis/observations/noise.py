@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.interpolate import CubicHermiteSpline
 
-from rod.measurement import MeasuredShape
+from rod.measurement import MeasuredShape, SlowErrors, slow_covariance
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,9 @@ class Sections:
         Sections in a block.
     pitch : m
         Distance of neighbouring sections.
-    correlation_length, systematic_std, systematic_length : m
+    correlation_length : m
+    slow : tuple of (std m, length m)
+        Slow sideways errors: of the light, of waves that a textured ground makes.
     """
 
     s: Array
@@ -51,8 +53,7 @@ class Sections:
     members: int
     pitch: float
     correlation_length: float
-    systematic_std: float
-    systematic_length: float
+    slow: SlowErrors
 
 
 def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
@@ -84,8 +85,7 @@ def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
         members=members,
         pitch=float(np.median(np.diff(s))),
         correlation_length=shape.correlation_length,
-        systematic_std=shape.systematic_std,
-        systematic_length=shape.systematic_length,
+        slow=shape.slow,
     )
 
 
@@ -105,7 +105,7 @@ def block_correlation(count: int, *, members: int, pitch: float, length: float) 
 
 
 def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: float = 1.0) -> Array:
-    """Covariance (k, k) of the block means: random part times ``factor``^2, stretched along s, plus the slow part."""
+    """Covariance (k, k) of the block means: random part times ``factor``^2, stretched along s, plus the slow parts."""
     random = block_correlation(
         len(sections.s),
         members=sections.members,
@@ -113,10 +113,7 @@ def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: floa
         length=sections.correlation_length * stretch,
     )
     random *= factor**2 * np.outer(sections.std, sections.std)
-    if sections.systematic_std > 0.0:
-        apart = np.abs(np.subtract.outer(sections.s, sections.s))
-        random += sections.systematic_std**2 * np.exp(-0.5 * (apart / max(sections.systematic_length, 1e-12)) ** 2)
-    return random
+    return random + slow_covariance(sections.s, sections.slow)
 
 
 def by_axes(sections: Sections, chord: float) -> Array:

@@ -188,6 +188,12 @@ class CurveSettings(StageSettings):
         description="ratio of the errors by the width's variation to those that scatter and light tell, above which"
         " the former count: over ten effective parameters chance passes it once in a hundred",
     )
+    least_wave_gain: float = Field(
+        6.0,
+        ge=0,
+        description="-2 log likelihood that waves in the widths must gain: two parameters gain as much by chance once"
+        " in twenty series at most",
+    )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
     max_blur_radii: float = Field(
         0.4, gt=0, description="of the radius; with more blur the two edges run into each other and move inward"

@@ -55,6 +55,11 @@ class CurveFit:
     residual: Array
     weight: Array
 
+    @property
+    def point_std(self) -> Array:
+        """Standard deviation of every point (n,), larger where it counts less."""
+        return np.asarray(self.smooth.sigma * self.std / np.sqrt(np.maximum(self.weight, 1e-9)))
+
 
 def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
     """Curve whose angle follows that of a polyline ``points`` ``(n, 2)`` at ``s``, smoothed firmly; a start only."""

@@ -15,6 +15,7 @@ the curve of the seen part alone misses the axes is a figure of quality.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
+from pipeline.vision.centerline.ground_waves import HalfWidths, ground_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.centerline.refusal import (
@@ -139,6 +141,12 @@ class Followed:
             told=told,
         )
 
+    def half_widths(self, options: CurveSettings) -> HalfWidths:
+        """Half the width along the sections that live on both edges: errors of the midline without its bend."""
+        used = (self.fit.weight > 0.0) & (self.sections.balance > options.least_balance)
+        half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
+        return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
+
     @property
     def _kinds(self) -> tuple[AxisKind, AxisKind]:
         return self.rough.left.kind, self.rough.right.kind
@@ -217,7 +225,18 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
-def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold | None = None) -> Centerline:
+def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) -> tuple[float, float]:
+    """Size and length (m) of the waves that the ground makes in the midlines of all photos of a series."""
+    halves = [cable.half_widths(settings.curve) for cable in cables if isinstance(cable, Followed)]
+    return ground_waves(halves, settings.curve)
+
+
+def centerline_of(
+    followed: Followed,
+    settings: VisionSettings,
+    told: AxesTold | None = None,
+    waves: tuple[float, float] = (0.0, 0.0),
+) -> Centerline:
     """Record of a followed cable, from foot to foot of the bearing axes.
 
     Parameters
@@ -226,6 +245,9 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
     settings : VisionSettings
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
+    waves : (std m, length m)
+        Of the waves that the ground makes in its midline, see `pipeline.vision.centerline.ground_waves`. They are noise
+        of the sections; what they do to the curvature the width of each photo tells (`_width_excess`).
     """
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
     options, (middle, scatter) = settings.curve, middle_width(width)
@@ -234,7 +256,7 @@ def centerline_of(followed: Followed, settings: VisionSettings, told: AxesTold |
     fit, covariance = followed.tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
-    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light)
+    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves)
     length_std = _length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
@@ -274,8 +296,10 @@ def _with_axes(covariance: Array, chord: ChordFrame) -> Array:
     return whole
 
 
-def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float]) -> MeasuredShape:
-    """What is measured at arc lengths ``s`` (n,), from the first on; ``light`` its slow error and its length, m."""
+def _shape(
+    fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: tuple[float, float]
+) -> MeasuredShape:
+    """What is measured at arc lengths ``s`` (n,), from the first on; slow errors of light and ground, m."""
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
@@ -294,10 +318,12 @@ def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float
         section_s=fit.s[used] - s[0],
         section_x=fit.points[used, 0],
         section_y=fit.points[used, 1],
-        section_std=fit.smooth.sigma * (fit.std / np.sqrt(np.maximum(fit.weight, 1e-9)))[used],
+        section_std=fit.point_std[used],
         correlation_length=fit.smooth.correlation_length,
         systematic_std=light[0],
         systematic_length=light[1],
+        wave_std=waves[0],
+        wave_length=waves[1],
     )
 
 

@@ -1,0 +1,96 @@
+"""Waves that the ground makes in a midline: told from the widths, and true of rendered photos on a wooden table."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from fixtures.photographed.specimen import Order, make, write
+from pipeline.intake.folder import read_specimen
+from pipeline.settings import Settings
+from pipeline.settings.vision.centerline import CurveSettings
+from pipeline.vision.centerline.ground_waves import HalfWidths, ground_waves
+from pipeline.vision.series import trace_series
+from rod.inverse.whitening import block_covariance
+from rod.measurement import slow_covariance
+
+SCATTER, BRIEF = 5e-6, 5e-4
+OPTIONS = CurveSettings()
+
+
+def photo(rng, std, length, n=300):
+    s = np.linspace(0.01, 0.19, n)
+    apart = np.abs(np.subtract.outer(s, s))
+    covariance = SCATTER**2 * np.exp(-apart / BRIEF) + std**2 * np.exp(-0.5 * (apart / length) ** 2)
+    return HalfWidths(s, np.linalg.cholesky(covariance) @ rng.standard_normal(n), np.full(n, SCATTER), BRIEF)
+
+
+def test_scatter_alone_makes_no_waves():
+    rng = np.random.default_rng(1)
+    found = [ground_waves([photo(rng, 0.0, 1.0) for _ in range(4)], OPTIONS)[0] > 0.0 for _ in range(60)]
+    # once in twenty at most as said: of 60 more than seven by chance once in a hundred
+    assert sum(found) <= 7
+
+
+@pytest.mark.parametrize(("std", "length", "factor"), [(2e-6, 4e-3, 3.0), (4e-6, 8e-3, 2.0)])
+def test_size_and_length_of_waves(std, length, factor):
+    rng = np.random.default_rng(2)
+    found = np.array([ground_waves([photo(rng, std, length) for _ in range(7)], OPTIONS) for _ in range(20)])
+    # seven photos of some twelve waves each tell a variance to a sixth; the length of waves that hardly rise above the
+    # scatter (the first: three times its variance in the coarsest components) is told to a factor
+    assert np.median(found[:, 0]) == pytest.approx(std, rel=0.1)
+    assert np.all(np.abs(np.log(found[:, 1] / length)) < np.log(factor))
+
+
+def test_few_sections_tell_nothing():
+    short = photo(np.random.default_rng(3), 2e-5, 8e-3, n=80)
+    assert ground_waves([short] * 7, OPTIONS) == (0.0, 0.0)
+    assert ground_waves([], OPTIONS) == (0.0, 0.0)
+
+
+def test_a_speck_on_one_edge_is_no_wave():
+    rng = np.random.default_rng(4)
+    photos = [photo(rng, 0.0, 1.0) for _ in range(7)]
+    specks = [replace(one, half=one.half + 1e-3 * (np.abs(one.s - 0.1) < 1e-3)) for one in photos]
+    assert ground_waves(specks, OPTIONS)[0] < 0.5 * SCATTER
+
+
+def off_the_truth(shape, bow, mirrored):
+    """Distances of the sections from the cable as it was bent, along its normal, both in their chord frames."""
+    x, y, s = (bow.x, bow.y, bow.s) if not mirrored else (bow.chord - bow.x[::-1], bow.y[::-1], bow.s[-1] - bow.s[::-1])
+    stretch = shape.s[-1] / s[-1]
+    curve = CubicSpline(s * stretch, np.column_stack([x, y]) * stretch)
+    at = shape.section_s
+    for _ in range(3):
+        tangent = curve(at, 1)
+        gap = np.column_stack([shape.section_x, shape.section_y]) - curve(at)
+        at = at + (tangent * gap).sum(axis=1)
+    return gap[:, 1] * tangent[:, 0] - gap[:, 0] * tangent[:, 1]
+
+
+def test_wooden_ground(tmp_path):
+    specimen = make(Order("null", "loop", 78005))
+    assert specimen.bench.ground == "wooden"
+    write(specimen, tmp_path)
+    settings = Settings()
+    traces = trace_series(read_specimen(tmp_path, settings.intake), settings.vision)
+    told, plain = [], []
+    for line, bow in zip(traces.photos, specimen.steps, strict=True):
+        shape = line.shape
+        assert shape.wave_std > 0.0
+        order = np.argsort(shape.section_s)
+        offsets = [off_the_truth(shape, bow, mirrored)[order] for mirrored in (False, True)]
+        off = min(offsets, key=lambda one: float(np.std(one)))
+        s, std, ones = shape.section_s[order], shape.section_std[order], np.ones(len(order), dtype=np.intp)
+        # degrees that no error of axes or scale reaches, and that last longer than the scatter of the sections
+        t = 2.0 * (s - s[0]) / np.ptp(s) - 1.0
+        waves = np.linalg.qr(np.polynomial.legendre.legvander(t, 18))[0][:, 6:]
+        scatter = block_covariance(s, std, np.arange(len(s)), ones, shape.correlation_length)
+        square = (waves.T @ off) ** 2
+        plain += list(square / np.sum(waves * (scatter @ waves), axis=0))
+        scatter += slow_covariance(s, ((shape.wave_std, shape.wave_length),))
+        told += list(square / np.sum(waves * (scatter @ waves), axis=0))
+    # 91 nearly independent components: their mean scatters by 0.15 about 1
+    assert np.mean(plain) > 1.6
+    assert 0.6 < np.mean(told) < 1.4
