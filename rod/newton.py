@@ -150,8 +150,8 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
     if not trial.found:
         return trial
     outcome = Outcome.CONVERGED
-    K, memory = trial.balance.K, system.memory
-    between = system.rod.section.response(memory)(np.r_[K[:1], 0.5 * (K[1:] + K[:-1])])[1]
+    K = trial.balance.K
+    between = system.section(np.concatenate((K[:1], 0.5 * (K[1:] + K[:-1]))))[1]
     if min(float(trial.balance.tangent.min()), float(between.min())) <= 0.0:
         outcome = Outcome.LIMIT_POINT
     elif system.excess_negatives(trial.balance) != 0:

@@ -31,6 +31,10 @@ name                     what changes                                           
 A basis is (elements + 1,) or (elements + 1, q) values at the joints, a function of the relative position 0..1, or a
 sequence of functions; it gives q columns. Derivatives at the value zero of a cause are meaningful: friction needs a
 test with ``InternalFriction(0.0, stick_curvature)``, everything else is there by default.
+
+What is none of these is told by example: `Toward` takes a test to another that differs a little, in as many of these
+ways at once as it likes, in single elements of the friction, the angle over which a bearing sticks, or the form of the
+law.
 """
 
 from __future__ import annotations
@@ -43,15 +47,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, Characteristic
+from rod.characteristic import Array, Characteristic, MomentCurve
 
 Basis = ArrayLike | Callable[[Array], ArrayLike] | Sequence[Callable[[Array], ArrayLike]]
-Parameter = str | tuple[str, Basis]
+
+
+@dataclass(frozen=True, eq=False)
+class Toward:
+    """The parameter that changes whatever differs between two tests, when it grows by ``step``, which is short.
+
+    The first is the test that is moved, or one like it in all that differs.
+    """
+
+    test: BendingTest
+    other: BendingTest
+    step: float
+
+
+Parameter = str | tuple[str, Basis] | Toward
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Change of the ingredients per unit of each of q parameters; n joints, n + 1 edges, p control points.
+    """Change of the ingredients per unit of each of q parameters; n joints, n + 1 edges, p control points, e elements.
 
     Attributes
     ----------
@@ -60,8 +78,12 @@ class Directions:
     ordinates : (q, p)
     edges : (q, n + 1)
         Edge lengths, rigid pieces first and last.
+    slip, stick : (q, e)
+        Moments of the friction elements, N m, and their curvature changes to slip, 1/m.
     scalars : dict of (q,)
-        Everything that is one number, under the names of the table.
+        Everything that is one number, under the names of the table; ``stick_angle_left`` and ``.._right`` beside.
+    laws : list of (column, MomentCurve, MomentCurve, step)
+        From which law to which the characteristic goes when that parameter grows by the step.
     """
 
     names: tuple[str, ...]
@@ -69,7 +91,10 @@ class Directions:
     profile: Array
     ordinates: Array
     edges: Array
+    slip: Array
+    stick: Array
     scalars: dict[str, Array] = field(default_factory=dict)
+    laws: list[tuple[int, MomentCurve, MomentCurve, float]] = field(default_factory=list)
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
@@ -98,6 +123,10 @@ class Directions:
     def has(self, *names: str) -> bool:
         """Whether one of these numbers is a parameter."""
         return any(name in self.scalars for name in names)
+
+    def moved(self, name: str, columns: slice | int, by: float) -> None:
+        """Put the change of one number into columns."""
+        self.scalars.setdefault(name, np.zeros(len(self.names)))[columns] = by
 
 
 #: Names that stand for the same change at both ends, and names of one number.
@@ -132,20 +161,31 @@ def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions
     Raises
     ------
     ValueError
-        For an unknown name, a basis of the wrong shape or where none belongs, ordinates of a law that has none, or
-        friction parameters of a test without friction.
+        For an unknown name, a basis of the wrong shape or where none belongs, ordinates of a law that has none,
+        friction parameters of a test without friction, or a test to go toward that is of another kind.
     """
     blocks = [_block(test, parameter) for parameter in parameters]
     names = tuple(name for block in blocks for name in block[0])
     q, joints = len(names), test.rod.section.pre_curvature.size
-    law = test.characteristic
+    law, friction = test.characteristic, test.friction
     p = law.knots.size if isinstance(law, Characteristic) else 0
-    made = Directions(names, np.zeros((q, joints)), np.zeros((q, joints)), np.zeros((q, p)), np.zeros((q, joints + 1)))
+    e = 0 if friction is None else friction.stick.size
+    pre_curvature, profile, ordinates, edges, slip, stick = (
+        np.zeros((q, size)) for size in (joints, joints, p, joints + 1, e, e)
+    )
+    made = Directions(names, pre_curvature, profile, ordinates, edges, slip, stick)
     fields = {"pre_curvature": made.pre_curvature, "stiffness_profile": made.profile, "ordinates": made.ordinates}
     column = 0
-    for labels, name, basis in blocks:
+    for parameter, (labels, name, basis) in zip(parameters, blocks, strict=True):
         columns = slice(column, column + len(labels))
         column += len(labels)
+        if isinstance(parameter, Toward):
+            _go_toward(parameter, made, columns.start)
+            continue
+        if friction is not None and name == "hysteresis":
+            made.slip[columns] = friction.own[:, 0] / friction.elements
+        if friction is not None and name == "stick_curvature":
+            made.stick[columns] = (friction.own * friction.stick)[:, 0] / friction.stick_curvature
         if basis is not None:
             fields[name][columns] = basis.T
             continue
@@ -155,12 +195,64 @@ def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions
             made.edges[columns, 1:-1] = test.rod.elements * (length - left - right)
         for scalar in (f"{name}_left", f"{name}_right") if name in _BOTH_ENDS else (name,):
             if scalar in _SCALARS:
-                made.scalars.setdefault(scalar, np.zeros(q))[columns] = 1.0
+                made.moved(scalar, columns, 1.0)
     return made
+
+
+def comparable(test: BendingTest, other: BendingTest) -> bool:
+    """Whether a test can go `Toward` another: the same elements, supports and zero, friction of as many elements."""
+    elements = [0 if t.friction is None else t.friction.stick.size for t in (test, other)]
+    same = [(t.left.kind, t.right.kind, t.zero, t.law_stays, t.rod.elements.size) for t in (test, other)]
+    stiffness = [(t.axial_stiffness, t.shear_stiffness, t.left.angle, t.right.angle) for t in (test, other)]
+    return elements[0] == elements[1] and same[0] == same[1] and stiffness[0] == stiffness[1]
+
+
+def _go_toward(toward: Toward, made: Directions, column: int) -> None:
+    """The changes of everything from one test to another, put into a column."""
+    step, test, other = toward.step, toward.test, toward.other
+    here, there = test.rod, other.rod
+    if here is not there:
+        made.pre_curvature[column] = (there.section.pre_curvature - here.section.pre_curvature) / step
+        made.edges[column] = (there.edges - here.edges) / step
+        profiles = [1.0 if p is None else p for p in (here.section.profile, there.section.profile)]
+        made.profile[column] = (profiles[1] - profiles[0]) / step
+    if other.characteristic is not test.characteristic:
+        made.laws.append((column, test.characteristic, other.characteristic, step))
+    if test.friction is not None and other.friction is not None:
+        made.slip[column] = (other.friction.slip - test.friction.slip)[:, 0] / step
+        made.stick[column] = (other.friction.stick - test.friction.stick)[:, 0] / step
+    before, after = _numbers(test), _numbers(other)
+    for name, value in before.items():
+        if after[name] != value:
+            made.moved(name, column, (after[name] - value) / step)
+
+
+def _numbers(test: BendingTest) -> dict[str, float]:
+    """Everything that is one number of a test and not in its rod's geometry."""
+    numbers = {
+        "displacement_offset": test.displacement_offset,
+        "rig_compliance": test.compliance,
+        "length": test.length,
+        "load_x": test.load[0],
+        "load_y": test.load[1],
+        "plastic_set": test.plastic_rate,
+    }
+    for side, support in (("left", test.left), ("right", test.right)):
+        numbers |= {
+            f"end_moment_{side}": support.moment,
+            f"bearing_stiffness_{side}": support.stiffness,
+            f"bearing_friction_{side}": support.friction_moment,
+            f"stick_angle_{side}": support.stick_angle,
+        }
+    return numbers
 
 
 def _block(test: BendingTest, parameter: Parameter) -> tuple[tuple[str, ...], str, Array | None]:
     """Column names, name and basis (rows, columns) of one parameter; None for a plain number."""
+    if isinstance(parameter, Toward):
+        if not (comparable(test, parameter.test) and comparable(test, parameter.other)):
+            raise ValueError("the test to go toward has other elements, supports, friction or zero")
+        return ("toward",), "toward", None
     name, given = (parameter, None) if isinstance(parameter, str) else parameter
     if name not in NAMES:
         raise ValueError(f"unknown parameter {name!r}; known are {', '.join(NAMES)}")

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dgtsv
+from scipy.linalg.lapack import dgesv, dgtsv, dpttrf
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -118,6 +118,10 @@ class System:
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
+
+    def section(self, K: Array) -> tuple[Array, Array]:
+        """Moment and tangent (n,) of the cross-section at curvatures (n,), with the memory at the start of the step."""
+        return self._response(K)
 
     def edge_state(self, angles: Array, R: Array) -> EdgeState:
         """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
@@ -254,6 +258,8 @@ class System:
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
     """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
+    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist, as on nearly every state a fit meets
+        return 0
     count, pivot = 0, 1.0
     squares = np.concatenate(([0.0], off**2)).tolist()
     smallest = float(np.finfo(float).tiny) * max(1.0, *squares)  # a pivot of 0 is moved so far that nothing overflows

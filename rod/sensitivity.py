@@ -99,7 +99,7 @@ def derivatives(
     steps : (k,) of Equilibrium
         As `simulate` returned them for this test, from the first step on.
     parameters : sequence of names, or (name, basis)
-        See `rod.parameters`.
+        See `rod.parameters`; or ``Toward`` another test.
 
     Returns
     -------
@@ -237,6 +237,8 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
             by_read = by_read + law.tangent(read.at, K0) * (read.by_set * set_move + read.by_rest * move)
         if isinstance(law, Characteristic) and moves.lawful:
             by_read = by_read + moves.ordinates @ law.moment_by_ordinates(read.at, K0).T
+        for column, before, after, by in moves.laws:
+            by_read[column] += (after.moment(read.at, K0) - before.moment(read.at, K0)) / by
         if section.profile is not None:
             by_read = section.profile * by_read
         if moves.profiled:
@@ -248,13 +250,9 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
 def _friction_moment(friction: InternalFriction, K: Array, step: Equilibrium, moves: Directions, past: _Past) -> Array:
     """Change of the moment of the friction elements at fixed curvature, (q, n)."""
     u = (K - step.before.relaxed) / friction.stick
-    slow = past.relaxed / friction.stick[:, :, None]
-    growth = moves.scalar("stick_curvature")[:, None] / friction.stick_curvature
-    slow = slow + (friction.own * u)[:, None, :] * growth
-    sticking = (np.abs(u) < 1.0)[:, None, :]
-    built = (friction.own * np.clip(u, -1.0, 1.0)).sum(axis=0) / friction.elements
-    stuck = (friction.slip[:, :, None] * np.where(sticking, slow, 0.0)).sum(axis=0)
-    return np.asarray(moves.scalar("hysteresis")[:, None] * built - stuck)
+    slow = past.relaxed + u[:, None, :] * moves.stick.T[:, :, None]
+    sticking = (friction.slip / friction.stick * (np.abs(u) < 1.0))[:, None, :]
+    return np.asarray(moves.slip @ np.clip(u, -1.0, 1.0) - (sticking * slow).sum(axis=0))
 
 
 def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, *, side: str) -> Array:
@@ -271,7 +269,8 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
         moment = moment - support.stiffness * rest
     if -1.0 < u < 1.0:
-        moment = moment - support.friction_moment / support.stick_angle * slip
+        slow = slip + u * moves.scalar(f"stick_angle_{side}")
+        moment = moment - support.friction_moment / support.stick_angle * slow
     return np.asarray(moment)
 
 
@@ -352,9 +351,13 @@ def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Pas
     relaxed = past.relaxed
     if (friction := section.friction) is not None:
         u = ((K - memory.relaxed) / friction.stick)[:, None, :]
-        growth = (friction.own * friction.stick / friction.stick_curvature)[:, :, None]
-        slid = growth * moves.scalar("stick_curvature")[:, None]
-        relaxed = np.where(np.abs(u) < 1.0, past.relaxed, dK - np.sign(u) * slid)
-    left = abs(float(step.angles[0]) - memory.left_angle) < step.rod.left.stick_angle
-    right = abs(float(step.angles[-1]) - memory.right_angle) < step.rod.right.stick_angle
-    return _Past(relaxed, reached, past.left if left else dangles[:, 0], past.right if right else dangles[:, -1])
+        relaxed = np.where(np.abs(u) < 1.0, past.relaxed, dK - np.sign(u) * moves.stick.T[:, :, None])
+    slips = []
+    for end, support, slip, before, side in (
+        (0, step.rod.left, memory.left_angle, past.left, "left"),
+        (-1, step.rod.right, memory.right_angle, past.right, "right"),
+    ):
+        turned = float(step.angles[end]) - slip
+        slid = dangles[:, end] - np.sign(turned) * moves.scalar(f"stick_angle_{side}")
+        slips.append(before if abs(turned) < support.stick_angle else slid)
+    return _Past(relaxed, reached, *slips)

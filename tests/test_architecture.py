@@ -46,7 +46,11 @@ INSIDE = {
         ("presentation",),
         ("diagnose",),
     ],
-    "pipeline.diagnosis.observations": [("prediction", "noise", "force_noise", "work"), ("simulation", "observation")],
+    "pipeline.diagnosis.observations": [
+        ("prediction", "noise", "force_noise", "work"),
+        ("simulation", "observation"),
+        ("linearised",),
+    ],
     "pipeline.diagnosis.statistics": [
         ("score", "twins", "verdict", "pairs", "gain"),
         ("smooth_fields", "photo_table", "variance_component"),
@@ -55,6 +59,7 @@ INSIDE = {
     "pipeline.diagnosis.fits": [
         ("base",),
         ("extension",),
+        ("bending",),
         ("sensitivities",),
         ("fit",),
         ("search", "extended", "stuck_forces", "maps"),

@@ -10,7 +10,7 @@ from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
 from rod.equilibrium import Equilibrium
 from rod.laws import StickSlip
-from rod.parameters import NAMES
+from rod.parameters import NAMES, Toward
 from rod.section import InternalFriction
 from rod.sensitivity import derivatives
 from rod.support import Support
@@ -217,6 +217,57 @@ def test_score_at_zero_is_the_one_sided_derivative(name: str) -> None:
         assert forward == pytest.approx(d.force[0], rel=2e-4)  # error of order h^2
 
 
+@pytest.mark.parametrize("name", [name for name in VARIATIONS if "flexibility" not in name])
+def test_toward_a_test_that_differs_is_the_parameter_that_differs(name: str) -> None:
+    vary, step = VARIATIONS[name][0], 1e-2 * VARIATIONS[name][1]
+    named, column = name.partition("[")[0], int(name[-2]) if name.startswith("ordinates") else 0
+    parameter = (named, BASIS) if name.endswith("[0]") and named != "ordinates" else named
+    steps = displaced(EVERYTHING, None)
+    toward = Toward(EVERYTHING, vary(EVERYTHING, step), step)
+    for by, going in zip(
+        derivatives(EVERYTHING, steps, [parameter]), derivatives(EVERYTHING, steps, [toward]), strict=True
+    ):
+        for what in ("s", "x", "theta", "kappa", "force"):
+            expected = np.asarray(getattr(by, what))[..., column]
+            assert np.asarray(getattr(going, what))[..., 0] == pytest.approx(
+                expected, rel=1e-4, abs=1e-5 * float(np.abs(expected).max(initial=0.0)) + 1e-12
+            )
+
+
+BESIDE = replace(EVERYTHING, friction=replace(EVERYTHING.friction, beside=InternalFriction(7e-4, 0.4, 1)))
+
+
+def beside(name: str) -> Vary:
+    def vary(test: BendingTest, h: float) -> BendingTest:
+        other = replace(test.friction.beside, **{name: getattr(test.friction.beside, name) + h})
+        return replace(test, friction=replace(test.friction, beside=other))
+
+    return vary
+
+
+def stick_angles(test: BendingTest, h: float) -> BendingTest:
+    ends = [replace(s, stick_angle=s.stick_angle + h) for s in (test.left, test.right)]
+    return replace(test, left=ends[0], right=ends[1])
+
+
+def inner_knot(test: BendingTest, h: float) -> BendingTest:
+    knots = test.characteristic.knots + np.array([0.0, h, 0.0])
+    return replace(test, characteristic=replace(test.characteristic, knots=knots))
+
+
+@pytest.mark.parametrize(
+    ("test", "vary", "h"),
+    [
+        (BESIDE, beside("half_width"), 3e-6),
+        (BESIDE, beside("stick_curvature"), 3e-4),
+        (stick_angles(EVERYTHING, 0.03), stick_angles, 3e-5),
+        (EVERYTHING, inner_knot, 1e-3),
+    ],
+)
+def test_toward_what_has_no_name(test: BendingTest, vary: Vary, h: float) -> None:
+    assert worst_error(test, Toward(test, vary(test, 1e-4 * h), 1e-4 * h), vary, h, displaced) < 1e-5
+
+
 def test_all_parameters_in_one_call_are_the_single_ones() -> None:
     steps = displaced(EVERYTHING, None)
     together = derivatives(EVERYTHING, steps, ["ordinates", *PARAMETERS])[-1]
@@ -252,6 +303,7 @@ def test_force_gain_and_stiffness_scale_cannot_be_told_apart() -> None:
         ("stiffness", "unknown parameter"),
         (("length", BASIS), "no basis"),
         (("pre_curvature", BASIS[:-1]), "one per joint"),
+        (Toward(EVERYTHING, replace(EVERYTHING, friction=None), 1.0), "other elements"),
     ],
 )
 def test_nonsense_is_refused(parameter: object, message: str) -> None:

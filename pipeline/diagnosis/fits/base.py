@@ -16,6 +16,7 @@ K0 and the stiffness near K0 are else free to run away together.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,7 @@ class Base:
     moved_std: Array = field(default_factory=lambda: np.zeros(0))
     moved_first: Array = field(default_factory=lambda: np.zeros(0))
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         bend = () if self.straight else ("pre_curvature",)

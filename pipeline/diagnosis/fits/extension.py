@@ -50,12 +50,12 @@ class Extension:
     terms: tuple[Term, ...] = ()
     turned: bool = False
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of parameters."""
         return len(self.base.names) + sum(term.size for term in self.terms)
 
-    @property
+    @cached_property
     def amounts_at(self) -> tuple[int, ...]:
         """Position in the vector of each term's amount; the numbers of its form follow."""
         sizes = [term.size for term in self.terms]
@@ -75,7 +75,7 @@ class Extension:
                 own.append(np.eye(1, self.size, at) / (term.variant.known * term.cause.plausible(self.facts)))
         return np.vstack(own)
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """Steps (p,) of difference quotients."""
         added: list[float] = []

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,12 +136,12 @@ class Observation:
         return [(np.r_[self.rows.force & (self.rows.step == i), rest], self.force_own[i]) for i in steps]
 
     @cached_property
-    def all_sections(self) -> _Places:
+    def all_sections(self) -> Places:
         """Sections of all photos, one after the other."""
         parts = [photo.sections for photo in self.photos]
         ends = np.cumsum([0, *(len(part.s) for part in parts)])
         none = np.zeros(0)  # without photos
-        return _Places(
+        return Places(
             step=np.repeat([photo.step for photo in self.photos], np.diff(ends)).astype(int),
             s=np.concatenate([none, *(part.s for part in parts)]),
             x=np.concatenate([none, *(part.x for part in parts)]),
@@ -234,7 +235,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     """Whitened residual (N,) without priors, rows as in ``observation.rows``."""
     common = observation.force_common or (0.0,) * len(observation.forces)
     parts = [
-        _of_hold((data - model[: len(data)]) / std, alike / std)
+        of_hold((data - model[: len(data)]) / std, alike / std)
         for data, model, std, alike in zip(
             observation.forces, prediction.samples, observation.force_std, common, strict=True
         )
@@ -246,7 +247,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     return np.asarray(np.concatenate(parts) + observation.added)
 
 
-def _of_hold(off: Array, common: float) -> Array:
+def of_hold(off: Array, common: float) -> Array:
     """Whitened residuals (h,) of a hold whose samples, of unit scatter each, share an error of ``common``.
 
     The covariance is 1 + common^2 11^T, and the inverse of its root takes something off their mean.
@@ -259,11 +260,11 @@ def _of_hold(off: Array, common: float) -> Array:
 def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:
     """Distance (k,) m of the sections from the predicted curve, positive along its normal."""
     steps = np.full(len(sections.s), step)
-    return _distance(_Places(steps, sections.s, sections.x, sections.y, ()), prediction)
+    return _distance(Places(steps, sections.s, sections.x, sections.y, ()), prediction)
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
+class Places:
     """Where sections of several photos lie, one after the other; all arrays (k,); ``of_photo``: which are whose."""
 
     step: NDArray[np.int_]
@@ -273,31 +274,44 @@ class _Places:
     of_photo: tuple[slice, ...]
 
 
-def _distance(places: _Places, prediction: Prediction) -> Array:
-    """Distance (k,) m from the predicted curves, of all photos at once.
+def _distance(places: Places, prediction: Prediction) -> Array:
+    """Distance (k,) m from the predicted curves, of all photos at once."""
+    foot = foot_points(places, prediction)
+    return np.asarray(np.cos(foot.direction) * foot.gap_y - np.sin(foot.direction) * foot.gap_x)
 
-    The foot point is found by two Newton steps on the curve (cubic Hermite between its points) from the section's own
-    arc length; what is left along the curve enters the distance by its square only.
+
+class Foot(NamedTuple):
+    """Foot points (k,) of sections on the predicted curves.
+
+    Node to the ``left``, ``width`` (m) from there to the next, share ``t`` of that; ``direction`` (rad) of the curve,
+    and the way (m) from it to the section, whose part along the curve is zero but for rounding.
     """
-    at = places.s
+
+    left: NDArray[np.int_]
+    width: Array
+    t: Array
+    direction: Array
+    gap_x: Array
+    gap_y: Array
+
+
+def foot_points(places: Places, prediction: Prediction) -> Foot:
+    """Foot points on curves that are cubic (Hermite, from positions and directions) between their nodes.
+
+    They are found by two Newton steps from the section's own arc length; what is left along the curve enters the
+    distance by its square only.
+    """
+    at, step, s = places.s, places.step, prediction.s
     for _ in range(3):
-        foot_x, foot_y, direction = _hermite(at, places.step, prediction)
-        tangent_x, tangent_y = np.cos(direction), np.sin(direction)
-        gap_x, gap_y = places.x - foot_x, places.y - foot_y
-        at = at + tangent_x * gap_x + tangent_y * gap_y
-    return np.asarray(-tangent_y * gap_x + tangent_x * gap_y)
-
-
-def _hermite(at: Array, step: NDArray[np.int_], prediction: Prediction) -> tuple[Array, Array, Array]:
-    """Point and direction of the curves at arc length ``at``: Hermite cubic from positions and directions."""
-    s, x, y, theta = prediction.s, prediction.x, prediction.y, prediction.theta
-    left = np.minimum(np.maximum(np.searchsorted(s, at, side="right") - 1, 0), len(s) - 2)
-    right = left + 1
-    width = s[right] - s[left]
-    t = (at - s[left]) / width
-    rest = 1.0 - t
-    a, b, x0, y0 = theta[step, left], theta[step, right], x[step, left], y[step, left]
-    h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * rest * rest * width, -t * t * rest * width
-    px = x0 + (x[step, right] - x0) * h1 + np.cos(a) * h2 + np.cos(b) * h3
-    py = y0 + (y[step, right] - y0) * h1 + np.sin(a) * h2 + np.sin(b) * h3
-    return px, py, a + (b - a) * t
+        left = np.minimum(np.maximum(np.searchsorted(s, at, side="right") - 1, 0), len(s) - 2)
+        start, node = s[left], (step, left)
+        width = s[left + 1] - start
+        t = (at - start) / width
+        rest = 1.0 - t
+        a, b, x0, y0 = prediction.theta[node], prediction.theta[step, left + 1], prediction.x[node], prediction.y[node]
+        h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * rest * rest * width, -t * t * rest * width
+        gap_x = places.x - (x0 + (prediction.x[step, left + 1] - x0) * h1 + np.cos(a) * h2 + np.cos(b) * h3)
+        gap_y = places.y - (y0 + (prediction.y[step, left + 1] - y0) * h1 + np.sin(a) * h2 + np.sin(b) * h3)
+        direction = a + (b - a) * t
+        at = at + np.cos(direction) * gap_x + np.sin(direction) * gap_y
+    return Foot(left, width, t, direction, gap_x, gap_y)

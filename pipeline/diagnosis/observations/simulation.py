@@ -106,6 +106,11 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
     return [group for group in (*groups, (pushed, "up", False)) if group[0]]
 
 
+def freedom(model: Model, facts: Facts) -> list[tuple[list[int], bool]]:
+    """Which steps are simulated together, and whether they are free of force."""
+    return [(index, free) for index, _, free in _groups(model, facts)]
+
+
 def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -> tuple[Equilibrium, ...]:
     """Equilibria of all steps in their order; those up to the first failure where a step has none.
 

@@ -14,6 +14,10 @@ from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.observations.simulation import run
+from pipeline.diagnosis.observations.work import newton_steps
+
+TEST = hidden_test(Cable(), PROTOCOLS["loop"], largest=LARGEST, seed=1)
+FACTS = facts_of(TEST)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -29,14 +33,39 @@ def test_place_and_width_of_a_spot_move_the_data_as_whole_simulations_say(turned
     base_model = extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), facts)
     jacobian = sensitivities(observation, extension, vector, base_model, here)
-    closed = [0, 1, 2, 3, 5, 6, 7]  # all but the place of the control point, whose spline has kinks
-    for j in (len(base.names) + k for k in closed):
-        ends = []
-        for step in (extension.steps[j], -extension.steps[j]):
-            trial = vector.copy()
-            trial[j] += step
-            there = run(extension.model(trial), facts, near=here).prediction
-            ends.append(whole_residual(observation, there, trial, extension.prior))
-        quotient = (ends[1] - ends[0]) / (2.0 * extension.steps[j])
+    for j in range(len(base.names), extension.size):
+        quotient = central(observation, extension, vector, here, j)
         # the quotient is right to the square of its step; a one-sided one was off by 1 %
         assert np.abs(jacobian[:, j] - quotient).max() < 1e-3 * np.abs(quotient).max(), j
+
+
+def central(observation, extension, vector, here, j):
+    ends = []
+    for step in (extension.steps[j], -extension.steps[j]):
+        trial = vector.copy()
+        trial[j] += step
+        there = run(extension.model(trial), extension.facts, near=here).prediction
+        ends.append(whole_residual(observation, there, trial, extension.prior))
+    return (ends[1] - ends[0]) / (2.0 * extension.steps[j])
+
+
+FORMS = [(cause.name, form) for cause in CATALOGUE for form in range(len(cause.variants(FACTS)))]
+
+
+@pytest.mark.parametrize(("name", "form"), FORMS)
+def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name, form):
+    (cause,) = (cause for cause in CATALOGUE if cause.name == name)
+    beside = next(one for one in CATALOGUE if one.name == ("in_plane_load" if name == "hysteresis" else "hysteresis"))
+    terms = (Term(cause, cause.variants(FACTS)[form]), Term(beside, beside.variants(FACTS)[0]))
+    extension = Extension(start(TEST, FACTS, knots=5, elements=120, smoothness=SETTINGS.roughness), FACTS, terms)
+    vector = extension.start(extension.base.neutral(), (cause.plausible(FACTS), 0.2 * beside.plausible(FACTS)))
+    observation, base_model = observe(TEST, SETTINGS), extension.base_model(vector)
+    here = run(extension.model(vector, of=base_model), FACTS)
+    counted = newton_steps()
+    jacobian = sensitivities(observation, extension, vector, base_model, here)
+    assert newton_steps() == counted  # nothing is simulated for it
+    for j in range(len(extension.base.names) + terms[0].size):
+        quotient = central(observation, extension, vector, here, j)
+        error = jacobian[:, j] - quotient
+        # elements of friction begin to slip one after the other: a quotient over that is off where they do
+        assert np.linalg.norm(error) < 0.02 * np.linalg.norm(quotient), j

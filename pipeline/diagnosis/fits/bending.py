@@ -1,0 +1,169 @@
+"""What bends the cable, in closed form: from the numbers of a model's vector to directions of cable and rig.
+
+Control points of the law, K0, length and the displacements are parameters of `rod.parameters`, profiles along the cable
+bases of them. Every other number of a cause (friction between the wires and its slip, friction and springs of the
+bearings, stiff ends, loads, a yielding frame, a set, the place of a control point) is told by what it changes in the
+test when it moves by a millionth of its range (`rod.parameters.Toward`): a cause says in `apply` what it does, and
+nowhere how fast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.causes.profile import along_cable, is_profile
+from pipeline.diagnosis.fits.extension import Extension
+from pipeline.diagnosis.observations.prediction import Facts, Model, end_for_end
+from pipeline.diagnosis.observations.simulation import Run, base_derivatives, freedom
+from rod.characteristic import Characteristic
+from rod.parameters import Parameter, Toward, comparable
+from rod.sensitivity import Derivatives
+
+Array = NDArray[np.float64]
+
+SHORT = 1e-3
+"""Of the step of a difference quotient: what is compared is what goes into a simulation, which is right to rounding."""
+
+
+@dataclass(eq=False)
+class Bends:
+    """Numbers that bend the cable, and what each of them does.
+
+    Attributes
+    ----------
+    size : int
+        Of the vector.
+    travel : (steps, size) m
+        Change of the displacement of every step per unit of each number.
+    at : list of int
+        Positions in the vector, one for each column of what `combined` gives.
+    names : list of Parameter
+    rows : list of (size,)
+        How much of each column of these parameters a unit of every number is.
+    """
+
+    size: int
+    travel: Array
+    at: list[int] = field(default_factory=list)
+    names: list[Parameter] = field(default_factory=list)
+    rows: list[Array] = field(default_factory=list)
+
+    def by(self, name: Parameter, j: int, share: float = 1.0) -> None:
+        """Number ``j`` is ``share`` of a parameter of its own."""
+        row = np.zeros(self.size)
+        row[j] = share
+        self.names.append(name)
+        self.rows.append(row)
+        self.at.append(j)
+
+
+def plainly(extension: Extension, vector: Array, base_model: Model) -> Model:
+    """The model at a vector (p,) without profiles along the cable, which no other cause touches."""
+    model = base_model
+    for k, at in enumerate(extension.amounts_at):
+        if not is_profile(extension.terms[k].cause):
+            term = extension.formed(vector, k)
+            model = term.cause.apply(model, float(vector[at]), term.variant, extension.facts)
+    return model
+
+
+def bending_numbers(extension: Extension, vector: Array, base_model: Model, here: Model) -> tuple[Bends, list[int]]:
+    """All numbers that bend the cable, and positions of those among them that have no closed form here.
+
+    Parameters
+    ----------
+    extension : Extension
+    vector : (p,)
+    base_model, here : Model
+        Of the extension at the vector, without and with its terms.
+    """
+    bends = Bends(len(vector), np.zeros((len(extension.facts.branch), len(vector))))
+    _of_base(bends, extension, vector, here)
+    plain, simulated = plainly(extension, vector, base_model), []
+    for k, at in enumerate(extension.amounts_at):
+        term = extension.formed(vector, k)
+        numbers = range(at, at + term.size)
+        if is_profile(term.cause):
+            _of_profile(bends, extension, vector, k, here)
+            continue
+        alone = term.cause.apply(base_model, float(vector[at]), term.variant, extension.facts)
+        if alone.bending is base_model.bending and alone.shift is base_model.shift:
+            continue
+        for j in numbers:
+            if not _of_number(bends, extension, vector, base_model, plain, j):
+                simulated.append(j)
+    return bends, simulated
+
+
+def combined(here: Run, facts: Facts, bends: Bends) -> tuple[Derivatives, ...]:
+    """Derivatives of every step of a run with respect to the numbers ``bends.at``, in their order."""
+    change = np.array(bends.rows)[:, bends.at]
+    every = base_derivatives(here, facts, [*bends.names, "displacement_offset"])
+    travel = bends.travel[:, bends.at]
+    return tuple(_combined(d, np.vstack([change, travel[step]])) for step, d in enumerate(every))
+
+
+def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> None:
+    """Control points, K0, errors of displacements and length.
+
+    The rod knows ordinates of its law in N m^2, K0 and the length; the vector has logarithms of ordinates and a
+    relative error of the length. The error of a step's displacement moves that step alone.
+    """
+    base, bending = extension.base, here.bending
+    law = bending.characteristic
+    # where a cause has put further control points into the law, a base ordinate moves them along the base spline
+    share = base.law_directions(vector, law.knots if isinstance(law, Characteristic) else base.knots)
+    bends.names.append("ordinates")
+    bends.rows.extend(np.hstack([share, np.zeros((len(share), bends.size - share.shape[1]))]))
+    bends.at.extend(range(share.shape[1]))
+    if (bend := base.pre_curvature_index) is not None:
+        bends.by("pre_curvature", bend)
+    for k, step in enumerate(base.moved):
+        j = len(base.names) - 2 - len(base.moved) + k
+        bends.travel[step, j] = 1.0
+        bends.at.append(j)
+    last = len(base.names) - 1
+    bends.by("length", last, -bending.length / (1.0 + float(vector[last])))
+
+
+def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, here: Model) -> None:
+    """Amount, place and width of a form along the cable."""
+    term, at = extension.formed(vector, k), extension.amounts_at[k]
+    cable = end_for_end(here) if extension.turned else here
+    name, phi = along_cable(term.cause, term.variant, cable)
+    moves = [phi]
+    for tuned in term.variant.tuned:
+        step = 1e-3 * SHORT * term.variant.scale(tuned)
+        beside = term.variant.moved({tuned: getattr(term.variant, tuned) + step})
+        moves.append(float(vector[at]) * (along_cable(term.cause, beside, cable)[1] - phi) / step)
+    for i, move in enumerate(moves):
+        bends.by((name, move[::-1] if extension.turned else move), at + i)
+
+
+def _of_number(bends: Bends, extension: Extension, vector: Array, base_model: Model, plain: Model, j: int) -> bool:
+    """What any other number changes; False where it changes the kind of the model."""
+    trial, step = vector.copy(), SHORT * float(extension.steps[j])
+    trial[j] += step
+    there = plainly(extension, trial, base_model)
+    laws = [model.bending.characteristic for model in (plain, there)]
+    points = [law.knots.size if isinstance(law, Characteristic) else 0 for law in laws]
+    known = points[0] == points[1] and comparable(plain.bending, there.bending)
+    if not known or freedom(plain, extension.facts) != freedom(there, extension.facts):
+        return False
+    bends.travel[:, j] = (there.shift - plain.shift) / step
+    if there.bending is plain.bending:
+        bends.at.append(j)
+    else:
+        bends.by(Toward(plain.bending, there.bending, step), j)
+    return True
+
+
+def _combined(d: Derivatives, change: Array) -> Derivatives:
+    """Derivatives with respect to combinations (columns of ``change``) of the parameters."""
+    return Derivatives(
+        tuple(str(i) for i in range(change.shape[1])),
+        *(getattr(d, name) @ change for name in ("s", "x", "y", "theta", "kappa", "moment", "force", "chord")),
+    )
