@@ -286,6 +286,9 @@ class ForceCorrectionPart(Part):
     steps: list[int]
     factor: float
     offset_N: float
+    errors_N: list[list[float]] = Field(
+        [], description="what the correction may be off by at each of the steps; a row is one standard deviation"
+    )
 
 
 class DiagnosisPart(Part):

@@ -38,7 +38,8 @@ class MeasuredLaw:
         Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
         same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
         ``("force", step)`` (n, 1) per N; then, per standard deviation of what is wrong on all photos alike (step -1),
-        the (n, 1) of `rod.balance.moment_points.CommonErrors` by name, ``("scale", -1)``; and what a way alone knows:
+        the (n, 1) of `rod.balance.moment_points.CommonErrors` by name, ``("scale", -1)``; per standard deviation of
+        the errors that several forces have in common ``("common_force", -1)`` (n, e); and what a way alone knows:
         ``("floor", step)`` of the balance equations, per standard deviation of the curvature that no photo
         resolves, at each point; ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` of the inverse problem.
     shortfall : (n, n)

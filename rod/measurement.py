@@ -8,6 +8,7 @@ Both ways to the bending stiffness characteristic read these records and nothing
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -171,6 +172,9 @@ class MeasuredTest:
         ``left`` or ``right``: the bearing that is pushed.
     picture_half_diagonal : m or None
         Half the diagonal of the picture on the plane of the cable.
+    common_force_errors : tuple of mappings of step number -> N
+        Errors that forces of several steps have in common, beside ``force_std``: each one standard deviation, and
+        independent of the others. What is left of a fault that was corrected.
     """
 
     length: float
@@ -182,3 +186,4 @@ class MeasuredTest:
     axis_std: float = 0.0
     axis_parallax_std: float = 0.0
     camera_foot_std: float = 0.0
+    common_force_errors: tuple[Mapping[int, float], ...] = ()

@@ -137,12 +137,18 @@ def _cost(bench: Workbench, conclusion: Conclusion) -> float:
 def with_corrected_forces(test: MeasuredTest, corrections: Sequence[ForceCorrectionPart]) -> MeasuredTest:
     """The test with its forces as the diagnosis took them."""
     for part in corrections:
-        test = ForceCorrection(tuple(part.steps), part.factor, part.offset_N).applied(test)
+        errors = tuple(tuple(row) for row in part.errors_N)
+        test = ForceCorrection(tuple(part.steps), part.factor, part.offset_N, errors).applied(test)
     return test
 
 
 def _told(correction: ForceCorrection) -> ForceCorrectionPart:
-    return ForceCorrectionPart(steps=list(correction.steps), factor=correction.factor, offset_N=correction.offset)
+    return ForceCorrectionPart(
+        steps=list(correction.steps),
+        factor=correction.factor,
+        offset_N=correction.offset,
+        errors_N=[list(row) for row in correction.errors],
+    )
 
 
 def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:

@@ -146,7 +146,7 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     floor = options.floor * slope * (basis.high - basis.low)
     beside = test.axis_parallax_std * test.camera_foot_std
     common = CommonErrors(test.scale_std, test.axis_std, test.axis_std, beside, test.axis_parallax_std)
-    model = MomentModel(data, basis, common, floor, options.roughness)
+    model = MomentModel(data, basis, common, floor, options.roughness, force_errors=test.common_force_errors)
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa.mean())
     at_rest = 1.0 if rest is None else uniform_at_rest(rest, floor)
@@ -198,6 +198,7 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     by_moment[:, p] = -f
     by_log = -curve.log_slope(m)[:, None] * by_moment
     by_log[:, :p] -= curve.basis.at(m)
+    by_forces = _moved_by_forces(model, found)
     law = propagated(
         kappa,
         K0,
@@ -206,14 +207,14 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
         by_moment=by_moment,
         by_log=by_log,
         by_pre_curvature=np.eye(found.unknowns.size)[p],
-        covariance=found.posterior.covariance,
+        covariance=found.posterior.covariance + by_forces @ by_forces.T,
     )
     loaded, loaded_std = _loaded_pre_curvature(model, found)
     return BalanceGraph(
         outcome=BalanceOutcome.MEASURED,
         law=replace(
             law,
-            gains=_gains(model, found, by_log),
+            gains=_gains(model, found, by_log) | {("common_force", -1): by_log @ by_forces},
             # Coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis.
             shortfall=by_log @ found.posterior.shrinkage @ np.linalg.pinv(curve.basis.at(m)),
             loaded_pre_curvature=loaded,
@@ -236,6 +237,16 @@ def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source,
             gains[name, data.step.step] = response @ row.whitener @ columns
         gains["floor", data.step.step] = model.floor * response @ row.whitener
     return gains
+
+
+def _moved_by_forces(model: MomentModel, found: Regression) -> Array:
+    """Moves (q, e) of the unknowns by errors that several forces have in common."""
+    moved = np.zeros((found.unknowns.size, len(model.force_errors)))
+    for data, row in zip(model.data, found.rows, strict=True):
+        by_force = row.whitener @ row.by_source["force"][:, 0]
+        newtons = [errors.get(data.step.step, 0.0) for errors in model.force_errors]
+        moved -= np.outer(found.posterior.covariance @ (model.columns(data, row).T @ by_force), newtons)
+    return moved
 
 
 def _loaded_pre_curvature(model: MomentModel, found: Regression) -> tuple[float, float]:

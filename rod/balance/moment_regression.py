@@ -11,6 +11,7 @@ about the form of the law.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,8 @@ class MomentModel:
         Range of the prior standard deviation of d^2 log c / dt^2.
     varying : bool
         Whether K0(s) is free to vary.
+    force_errors : tuple of mappings of step number -> N
+        See `rod.measurement.MeasuredTest`; they are in the bands and not in the fit.
     """
 
     data: tuple[MomentPoints, ...]
@@ -99,6 +102,7 @@ class MomentModel:
     floor: float
     roughness: tuple[float, float]
     varying: bool = False
+    force_errors: tuple[Mapping[int, float], ...] = ()
 
     def rows(self, unknowns: Array) -> tuple[ComplianceCurve, tuple[Residual, ...]]:
         """Compliance curve and whitened residuals at the given unknowns."""

@@ -101,7 +101,9 @@ def read_off(
     model: FitModel, found: Evaluation, posterior: Averaged, *, options: InverseOptions, outcome: InverseOutcome
 ) -> Estimate:
     """Estimate from a settled fit: curves on the visited range with bands by propagation."""
-    k, u, covariance = model.knots.size, found.unknowns, posterior.covariance
+    k, u = model.knots.size, found.unknowns
+    by_forces = _moved_by_forces(model, found, posterior.covariance)
+    covariance = posterior.covariance + by_forces @ by_forces.T
     spline, K0 = model.characteristic(u), model.pre_curvature(u)
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
     kappa = np.linspace(min(visited), max(visited), options.grid)
@@ -129,7 +131,7 @@ def read_off(
         characteristic=spline,
         law=replace(
             law,
-            gains=_gains(model, found, by_log @ covariance),
+            gains=_gains(model, found, by_log @ posterior.covariance) | {("common_force", -1): by_log @ by_forces},
             shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
             loaded_pre_curvature=float(loaded.mean[k]) / model.length,
             loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[k, k])) / model.length,
@@ -166,6 +168,18 @@ def _is_rest(model: FitModel, block: str) -> bool:
 def _at_knots(kappa: Array, knots: Array) -> Array:
     """Values at the knots of a curve given on a grid, (k, n), by linear interpolation."""
     return np.stack([np.interp(knots, kappa, column) for column in np.eye(kappa.size)], axis=1)
+
+
+def _moved_by_forces(model: FitModel, found: Evaluation, response: Array) -> Array:
+    """Moves (q, e) of the unknowns by errors that several forces have in common."""
+    moved = np.zeros((response.shape[0], len(model.force_errors)))
+    for fit in found.steps:
+        step = fit.data.step
+        if fit.force is not None:
+            J = found.jacobian[found.blocks[f"force/{step.step}"]]
+            newtons = [errors.get(step.step, 0.0) for errors in model.force_errors]
+            moved -= np.outer(response @ J[0], newtons) / (step.force_std * model.blur[1])
+    return moved
 
 
 def _source(name: str) -> Source | None:

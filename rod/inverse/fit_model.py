@@ -14,6 +14,7 @@ Signs and units: `rod.measurement`; SI.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,8 @@ class FitModel:
     blur : (shapes, forces)
         Factors on the noise of the data, above 1 where the simulation cannot follow them within their noise: what it
         gets wrong then counts as noise, and neither the law nor the nuisances are bent to hide it.
+    force_errors : tuple of mappings of step number -> N
+        See `rod.measurement.MeasuredTest`; they are in the bands and not in the fit.
     """
 
     data: tuple[StepData, ...]
@@ -102,6 +105,7 @@ class FitModel:
     zero: float | None
     nuisances: dict[str, float]
     blur: tuple[float, float] = (1.0, 1.0)
+    force_errors: tuple[Mapping[int, float], ...] = ()
 
     @property
     def size(self) -> int:
@@ -237,4 +241,14 @@ def fit_model(
         elif d.step.displacement_std:
             nuisances[f"moved/{d.step.step}"] = d.step.displacement_std
     prior = prior or first_prior(knots)
-    return FitModel(data, test.length, knots, prior, unit, elements, None if zero is None else zero[0], nuisances)
+    return FitModel(
+        data,
+        test.length,
+        knots,
+        prior,
+        unit,
+        elements,
+        None if zero is None else zero[0],
+        nuisances,
+        force_errors=test.common_force_errors,
+    )

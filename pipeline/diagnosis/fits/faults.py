@@ -39,15 +39,21 @@ ALONE = 4.0
 
 @dataclass(frozen=True)
 class ForceCorrection:
-    """What was wrong with the forces of some steps: shown = factor * force + offset (N); steps by their numbers."""
+    """What was wrong with the forces of some steps: shown = factor * force + offset (N); steps by their numbers.
+
+    ``errors``: what the correction may be off by, N for each of the steps, rows of one standard deviation each.
+    """
 
     steps: tuple[int, ...]
     factor: float
     offset: float
+    errors: tuple[tuple[float, ...], ...] = ()
 
     def applied(self, test: MeasuredTest) -> MeasuredTest:
-        """The test with these forces as they should have been."""
-        return replace(test, steps=tuple(self._corrected(s) if s.step in self.steps else s for s in test.steps))
+        """The test with these forces as they should have been, and with what they may be off by together."""
+        steps = tuple(self._corrected(s) if s.step in self.steps else s for s in test.steps)
+        errors = tuple(dict(zip(self.steps, row, strict=True)) for row in self.errors)
+        return replace(test, steps=steps, common_force_errors=(*test.common_force_errors, *errors))
 
     def _corrected(self, step: MeasuredStep) -> MeasuredStep:
         return replace(

@@ -281,7 +281,8 @@ class _Told:
 def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
     """The test with its forces corrected, and the sentence that says so; ``other``: what it may be as well."""
     factor, offset = (1.0, found.amount) if found.kind == "zero" else (found.amount, 0.0)
-    correction = ForceCorrection(tuple(test.steps[i].step for i in found.steps), factor, offset)
+    steps = tuple(test.steps[i].step for i in found.steps)
+    correction = ForceCorrection(steps, factor, offset, _errors(test, found, other))
     if found.kind == "sign":
         names = ", ".join(map(str, correction.steps))
         message = (
@@ -300,6 +301,26 @@ def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
     code = "force/factor" if found.kind == "factor" else "force/zero-moved"
     level: Level = "error" if found.kind == "factor" or other or not _zeroed(test, found) else "warning"
     return Faults(correction.applied(test), (Finding(code, level, message),), corrections=(correction,))
+
+
+def _errors(test: MeasuredTest, found: Break, other: Break | None) -> tuple[tuple[float, ...], ...]:
+    """What corrected forces may be off by, N: size of the break, and that it may be the other kind as well."""
+    if found.kind == "sign":
+        return ()
+    shown = np.array([test.steps[i].force for i in found.steps])
+    rows = [_corrected(shown, found) / found.amount if found.kind == "factor" else np.ones(len(shown))]
+    rows[0] *= found.std
+    if other is not None:
+        rows.append(np.sqrt(EITHER) * (_corrected(shown, other) - _corrected(shown, found)))
+    return tuple(tuple(row.tolist()) for row in rows)
+
+
+EITHER = 0.5
+"""Probability of each of two kinds of a break that the data do not tell apart."""
+
+
+def _corrected(shown: Array, found: Break) -> Array:
+    return shown / found.amount if found.kind == "factor" else shown - found.amount
 
 
 def _without_dead(test: MeasuredTest, found: Break) -> Faults:

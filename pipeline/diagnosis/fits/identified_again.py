@@ -25,7 +25,7 @@ from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import with_knots
-from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.observation import Observation, of_hold
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.law_prior import FIRST_SIZES, places_of
 from rod.inverse.options import InverseOptions
@@ -67,7 +67,12 @@ class Identified:
 
 
 def identified_again(
-    observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, in_law: Sequence[Cause] = ()
+    observation: Observation,
+    fitted: Fit,
+    settings: DiagnosisSettings,
+    *,
+    in_law: Sequence[Cause] = (),
+    force_errors: Sequence[Array] = (),
 ) -> Identified:
     """The law of a fitted model identified again, or the fit as it is where a finer law has no equilibrium.
 
@@ -75,6 +80,7 @@ def identified_again(
     likeliest prior, from whose linearisation mean and covariance over all priors follow.
 
     ``in_law`` are causes that these data cannot tell from the law: its band leaves room for them at plausible size.
+    ``force_errors`` (n,) N each are errors of one standard deviation that the forces of all steps share.
     """
     if fitted.extension.base.straight or len(fitted.extension.base.knots) < 3:
         return Identified(fitted, fitted.covariance)
@@ -91,7 +97,23 @@ def identified_again(
     mean = _at(observation, settled, posterior.mean)
     found = settled if mean is None else mean
     covariance = _with_room_for(observation, found, in_law, settings) if in_law else posterior.covariance
+    for errors in force_errors:
+        moved = _moved_by_forces(observation, found, covariance, errors)
+        covariance = covariance + np.outer(moved, moved)
     return _with_other_forms(observation, Identified(found, covariance), settings)
+
+
+def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, errors: Array) -> Array:
+    """Move (p,) of the vector by an error (n,) N of the forces of all steps."""
+    common = observation.force_common or (0.0,) * len(observation.forces)
+    rows = [
+        of_hold(np.full(len(data), off / std), alike / std)
+        for data, off, std, alike in zip(observation.forces, errors, observation.force_std, common, strict=True)
+    ]
+    count = observation.rows.count
+    shift = np.zeros(count)
+    shift[observation.rows.force] = np.concatenate(rows)
+    return np.asarray(response @ (fitted.jacobian[:count].T @ (_weights(observation, fitted) ** 2 * shift)))
 
 
 def _with_room_for(
@@ -186,11 +208,7 @@ def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = N
 def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:
     """Residual and its derivative: data, each kind as heavy as it fits, and all prior knowledge but that on the law."""
     base, facts = fitted.extension.base, fitted.extension.facts
-    count = observation.rows.count
-    weight = np.ones(count)
-    for kind in (observation.rows.force, ~observation.rows.force):
-        if np.any(kind):
-            weight[kind] = 1.0 / np.sqrt(max(1.0, float(np.mean(fitted.residual[:count][kind] ** 2))))
+    count, weight = observation.rows.count, _weights(observation, fitted)
     known = count + base.known
     value = np.r_[weight * fitted.residual[:count], fitted.residual[count:known]]
     columns = np.hstack([fitted.jacobian, beside])
@@ -203,6 +221,16 @@ def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
     weak = np.diag(1.0 / np.array(sizes))
     rest = np.hstack([np.zeros((len(sizes), len(base.names))), weak])
     return np.r_[value, np.zeros(len(sizes))], np.vstack([J, rest])
+
+
+def _weights(observation: Observation, fitted: Fit) -> Array:
+    """Of the data (N,): each kind as heavy as it fits."""
+    count = observation.rows.count
+    weight = np.ones(count)
+    for kind in (observation.rows.force, ~observation.rows.force):
+        if np.any(kind):
+            weight[kind] = 1.0 / np.sqrt(max(1.0, float(np.mean(fitted.residual[:count][kind] ** 2))))
+    return weight
 
 
 def _at(observation: Observation, fitted: Fit, vector: Array) -> Fit | None:

@@ -6,6 +6,8 @@ the sentence on top -> the part of the result.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.explanations.friction_in_law import hidden_in_law
 from pipeline.diagnosis.fits.heldout import answers, measured_gain, unproven
@@ -33,7 +35,11 @@ def present(
     in_law = hidden_in_law(bench, conclusion.names) if conclusion.two is None else []
     again = None
     if accepted is not None:
-        again = identified_again(bench.observation, accepted.fitted, settings, in_law=in_law)
+        errors = [
+            np.array([error.get(step.step, 0.0) for step in bench.test.steps])
+            for error in bench.test.common_force_errors
+        ]
+        again = identified_again(bench.observation, accepted.fitted, settings, in_law=in_law, force_errors=errors)
     extended = None if again is None else extended_curve(again, conclusion, settings)
     causes = named_causes(bench, conclusion, again, extended)
     verdict = decide(

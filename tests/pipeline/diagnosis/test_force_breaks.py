@@ -112,3 +112,39 @@ def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces(honest):
     assert (part.left_out_forces, part.left_out_photos) == ([], [])
     right = with_corrected_forces(test, part.corrected_forces)
     assert np.array([s.force for s in right.steps]) == pytest.approx([s.force for s in honest["six"].steps], rel=5e-3)
+
+
+@pytest.mark.parametrize("kind", ["factor", "zero"])
+def test_what_a_correction_may_be_off_by_is_what_it_is_off_by(kind):
+    cable, reading = HIDE["force_gain"](0.0, Form())
+    z = []
+    for seed in range(8):
+        test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=seed, reading=reading)
+        top = max(step.force for step in test.steps)
+        slope, jump = (0.5, 0.0) if kind == "factor" else (1.0, 0.4 * top)
+        found = fault(spoiled(test, lambda i, force, a=slope, b=jump: a * force + b if i >= 4 else force))
+        (correction,), (errors,) = found.corrections, found.test.common_force_errors
+        assert tuple(errors) == correction.steps == (4, 5, 6)
+        off = [found.test.steps[i].force - test.steps[i].force for i in errors]
+        assert off == pytest.approx(np.array(list(errors.values())) * off[0] / errors[4], rel=1e-6)
+        z.append(off[0] / errors[4])
+    # eight errors of a standard deviation of one: their rms is outside once in a thousand
+    assert 0.3 < np.sqrt(np.mean(np.square(z))) < 1.9
+
+
+def test_two_kinds_that_are_not_told_apart_are_an_error_too(honest):
+    found = fault(spoiled(honest["six"], lambda i, force: force + 0.3 * (i >= 3)))
+    own, other = (np.array(list(error.values())) for error in found.test.common_force_errors)
+    corrected = np.array([step.force for step in found.test.steps[3:]])
+    truth = np.array([step.force for step in honest["six"].steps[3:]])
+    assert np.all(np.abs(corrected - truth) < 3.0 * np.hypot(own, other))
+    # had it been a factor: each of two that are as likely is off by its share of their distance
+    by_factor = corrected + np.sqrt(2.0) * other
+    assert (truth + 0.3) / by_factor == pytest.approx(np.full(4, 1.09), abs=0.01)
+    assert np.ptp((truth + 0.3) / by_factor) < 1e-6
+
+
+def test_errors_of_a_correction_go_with_the_result(honest):
+    part, _ = diagnose(spoiled(honest["loop"], lambda i, force: force * (0.5 if i >= 4 else 1.0)), None, SETTINGS)
+    (error,) = with_corrected_forces(honest["loop"], part.corrected_forces).common_force_errors
+    assert set(error) == {4, 5, 6} and 1e-4 < abs(error[4]) / honest["loop"].steps[4].force < 0.02

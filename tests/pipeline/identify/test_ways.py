@@ -220,3 +220,21 @@ def test_photo_residuals_stand_at_the_points_of_the_centerline(found, measured):
         assert np.abs(z).max() < 4  # of 200 points, alike over a few millimetres
         fitted = np.array(photos[step.step].kappa_fit_per_m)
         assert np.abs(fitted - step.shape.kappa)[step.shape.s.size // 2] < 0.1  # 1 % of the largest
+
+
+def test_an_error_that_forces_have_in_common_is_in_both_bands(found, measured, settings):
+    errors = {s.step: 0.004 * s.force for s in measured.steps if s.step >= 3}
+    doubted = identify_test(replace(measured, common_force_errors=(errors,)), settings)
+    off = with_steps(measured, lambda s: replace(s, force=s.force + errors.get(s.step, 0.0)))
+    moved = identify_test(off, settings)
+    for way in ("inverse", "balance"):
+        before, after, there = (getattr(one, way).law for one in (found, doubted, moved))
+        assert after.tangent == pytest.approx(before.tangent, rel=1e-9)
+        # truth: what both ways make of forces that are off by just that
+        shift = np.log(np.interp(before.kappa, there.kappa, there.tangent) / before.tangent)
+        added = (after.tangent_std / after.tangent) ** 2 - (before.tangent_std / before.tangent) ** 2
+        assert np.abs(np.sqrt(added) - np.abs(shift)).max() < 0.15 * np.abs(shift).max()
+        assert after.gains["common_force", -1][:, 0] == pytest.approx(shift, abs=0.15 * np.abs(shift).max())
+        assert np.all(after.moment_std[5:] > before.moment_std[5:])
+    curve = identification_parts(doubted).inverse.curve
+    assert np.linalg.norm(curve.tangent_factor_Nm2, axis=1) == pytest.approx(curve.tangent_std_Nm2, rel=1e-6)
