@@ -26,7 +26,7 @@ from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
-from pipeline.vision.search.candidates import Reading, Wanted, read_photo
+from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
 
 Window = tuple[int, int, int, int]
 
@@ -112,6 +112,10 @@ def _widths(photo: Photo, slenderness: float, settings: VisionSettings) -> list[
 def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Window | None) -> RoughCable | Rejected:
     stage = settings.segmentation
     reduction = choose_reduction(photo.size, cable.diameter_px, stage)
+    if cable.diameter_px is None:
+        alone = _find_alone(photo, settings, cable, reduction, window)
+        if alone is not None:
+            return alone
     standout = stand_out(photo, reduction, stage, window=window)
     wanted = _wanted(standout, cable, stage)
     first: Rejected | None = None
@@ -140,6 +144,26 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
     if first is None:
         raise ValueError("read_photo always gives a reading")
     return first
+
+
+def _find_alone(
+    photo: Photo, settings: VisionSettings, cable: Cable, reduction: int, window: Window | None
+) -> RoughCable | None:
+    """A cable of unknown width on fewer cells, if it is all there is to see; what is refused needs a closer look."""
+    stage = settings.segmentation
+    coarser = stage.first_coarser
+    standout = stand_out(photo, coarser * reduction, stage, window=window)
+    enough = int(coarser * narrowest(standout, stage) / stage.cells_across)
+    if enough < 2:
+        return None
+    if enough < coarser:
+        standout = stand_out(photo, enough * reduction, stage, window=window)
+    wanted = _wanted(standout, cable, stage)
+    reading = read_alone(standout, wanted, stage)
+    if reading is None:
+        return None
+    found, _ = _weigh(photo, standout, (reading,), wanted, cable, settings)
+    return found if isinstance(found, RoughCable) else None
 
 
 def _weigh(

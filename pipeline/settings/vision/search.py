@@ -30,6 +30,21 @@ class SegmentationSettings(StageSettings):
         ge=200,
         description="cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms",
     )
+    first_coarser: int = Field(
+        3,
+        ge=2,
+        description="cells; so many times fewer along a side are tried first where the diameter is unknown: they are"
+        " enough for the cable of most photos, and take a third of the time",
+    )
+    trace_share: float = Field(
+        0.03,
+        gt=0,
+        lt=1,
+        description="of the area of the strips that cover most; narrower ones that cover less are specks and writing",
+    )
+    alone_clear_widths: float = Field(
+        3.0, gt=1, description="widths; a strip that comes back to itself as near as that is looked at more closely"
+    )
     cells_across: float = Field(
         8.0, ge=4, description="cells across the cable in the reduced photo: a highlight of a fifth is still one cell"
     )

@@ -91,23 +91,25 @@ def stand_out(
     small = reduce_area(part, (columns, rows)).astype(np.float32)
     small = small[..., None] if small.ndim == 2 else small
     small *= np.float32(1.0 / photo.full_scale)
-    residual = small - _ground(small)
+    residual = _above_ground(small)
     return Standout(reduction, (u0, v0), residual, _covariance(residual, settings), small)
 
 
-def _ground(small: Image) -> Image:
-    """Robust second-order surface of each channel."""
+def _above_ground(small: Image) -> Image:
+    """The picture without a robust second-order surface of each channel."""
     height, width, channels = small.shape
     coarse_size = (min(width, 48), min(height, 48))
     coarse = cv2.resize(small, coarse_size, interpolation=cv2.INTER_AREA).reshape(-1, channels)
     x, y = np.meshgrid(_centred(coarse_size[0]), _centred(coarse_size[1]))
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
-    u, v = _centred(width).astype(np.float32)[None, :], _centred(height).astype(np.float32)[:, None]
-    surface = np.empty_like(small)
+    u, v = np.vander(_centred(width), 3, increasing=True), np.vander(_centred(height), 3, increasing=True)
+    by_row = np.empty((3, width, channels), np.float32)  # of each power of v
     for channel in range(channels):
-        c = _robust_fit(terms, coarse[:, channel].astype(np.float64)).astype(np.float32)
-        # products of a row and a column: three passes over the picture, not six
-        surface[..., channel] = (c[0] + c[1] * u + c[3] * u * u) + (c[2] + c[4] * u + c[5] * v) * v
+        c = _robust_fit(terms, coarse[:, channel].astype(np.float64))
+        by_row[..., channel] = np.array([[c[0], c[1], c[3]], [c[2], c[4], 0.0], [c[5], 0.0, 0.0]]) @ u.T
+    # one matrix product for all channels: the surface in one pass over the picture, not six
+    surface: Image = (v.astype(np.float32) @ by_row.reshape(3, -1)).reshape(small.shape)
+    np.subtract(small, surface, out=surface)
     return surface
 
 
@@ -132,10 +134,10 @@ def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     """Covariance of the ground's colours, without cable and objects."""
     # some ten thousand cells tell a standard deviation to one percent
     stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
-    sample = residual[::stride, ::stride].reshape(-1, residual.shape[2])
+    sample = residual[::stride, ::stride].reshape(-1, residual.shape[2]).T.copy()  # each channel in one piece
     off = np.abs(sample)
-    spread = _MAD_TO_STD * medians(off, axis=0) + settings.min_ground_std
-    calm = sample[np.all(off < 3.0 * spread, axis=1)]
-    enough = len(calm) > sample.shape[1] + 1
-    covariance = np.atleast_2d(np.cov(calm, rowvar=False, dtype=np.float64)) if enough else 0.0
-    return covariance + settings.min_ground_std**2 * np.eye(sample.shape[1])
+    spread = _MAD_TO_STD * medians(off, axis=1) + settings.min_ground_std
+    calm = sample[:, (off < 3.0 * spread[:, None]).all(axis=0)]
+    enough = calm.shape[1] > len(calm) + 1
+    covariance = np.atleast_2d(np.cov(calm, dtype=np.float64)) if enough else 0.0
+    return covariance + settings.min_ground_std**2 * np.eye(len(sample))

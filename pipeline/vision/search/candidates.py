@@ -76,6 +76,28 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
         yield (best,)
 
 
+def narrowest(standout: Standout, settings: SegmentationSettings) -> float:
+    """Width of the narrowest strips on the likeliest picture that take up more than a trace of it; 0 without any."""
+    picture, level = next(_pictures(standout, settings))
+    widths = ridge_widths((picture > level).astype(np.uint8), settings)
+    most = max((width * length for width, length in widths), default=0.0)
+    return min((width for width, length in widths if width * length > settings.trace_share * most), default=0.0)
+
+
+def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading | None:
+    """The likeliest reading of a cable of unknown width, if it shows one strip, long enough, and nothing else.
+
+    That is no second strip, no branch and no return of the strip to its own neighbourhood: few cells blur a crossing.
+    """
+    picture, level = next(_pictures(standout, settings))
+    readings = list(_readings(picture, level, wanted, settings))
+    strips = [strip for reading in readings for strip in reading.strips[:2]]
+    if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
+        return None
+    clear = settings.alone_clear_widths * strips[0].width
+    return None if strips[0].branch or approaches_itself(strips[0].path, clear) else readings[0]
+
+
 def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> bool:
     """True if something of the cable's width leaves, crosses or meets the strip, so that its course is ambiguous."""
     width = reading.width

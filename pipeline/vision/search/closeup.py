@@ -64,7 +64,7 @@ def take_closeup(
         if part.ndim == 2:
             np.multiply(part, scaled[0], out=grey[rows, columns])
         else:
-            grey[rows, columns] = part.astype(np.float32) @ scaled
+            cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
     local = path_px - low
     spreads, angles = _edge_spreads(grey, local, width_px)
     seen = spreads[np.isfinite(spreads)]

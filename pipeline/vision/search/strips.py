@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
@@ -24,6 +25,7 @@ from pipeline.vision.median import median
 Mask = NDArray[np.uint8]
 
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
+_ROUGH_DISTANCE = 0.95  # rough distances over masks of 5 cells are 2 % off at most
 
 
 @dataclass(frozen=True)
@@ -94,13 +96,20 @@ def thick_part(mask: Mask, least: float) -> Mask:
     disc = _disc(least)
     if len(disc) <= _LARGE_DISC:
         return _morphology(mask, cv2.MORPH_OPEN, disc)
-    # The same by distances, whose time does not grow with the disc.
-    radius = len(disc) // 2
-    core = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius
-    if not core.any():
-        return np.zeros_like(mask)
-    outside = np.logical_not(core).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius).astype(np.uint8)
+    # The same by distances, whose time does not grow with the disc. Rough ones, a third of the time of exact ones, show
+    # where anything is that wide; only there and around are they exact.
+    radius, opened = len(disc) // 2, np.zeros_like(mask)
+    likely = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5) > _ROUGH_DISTANCE * radius
+    u, v, width, height = cv2.boundingRect(likely.astype(np.uint8))
+    if not width:
+        return opened
+    around = np.s_[max(v - radius - 2, 0) : v + height + radius + 2, max(u - radius - 2, 0) : u + width + radius + 2]
+    exact = cv2.distanceTransform(mask[around].copy(), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    core = (exact > radius) & likely[around]
+    if core.any():
+        outside = np.logical_not(core).astype(np.uint8)
+        opened[around] = cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius
+    return opened
 
 
 def find_strips(
@@ -246,7 +255,7 @@ def _farthest(reach: Array) -> int:
 
 
 def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_matrix[np.float64]:
-    index = np.full(skeleton.shape, -1)
+    index = np.full(skeleton.shape, -1, np.int32)
     index[tuple(vu.T)] = np.arange(len(vu))
     rows, columns, weights = [], [], []
     for dv, du in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -265,12 +274,16 @@ def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_ma
 
 def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], width: float) -> float:
     """Number of skeleton cells in the longest piece farther than a width from the path."""
-    path = np.zeros(skeleton.shape, np.uint8)
-    path[tuple(path_vu.T)] = 1
-    near = _morphology(path, cv2.MORPH_DILATE, _disc(2.0 * width))
-    rest = (skeleton & (near == 0)).astype(np.uint8)
-    count, _, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
-    return float(stats[1:, cv2.CC_STAT_AREA].max()) if count > 1 else 0.0
+    aside = skeleton.copy()
+    aside[tuple(path_vu.T)] = False
+    vu = np.argwhere(aside)  # mostly none, or a spur or two
+    vu = vu[cKDTree(path_vu).query(vu)[0] > width] if len(vu) else vu
+    if not len(vu):
+        return 0.0
+    rest = np.zeros(np.ptp(vu, axis=0) + 1, np.uint8)
+    rest[tuple((vu - vu.min(axis=0)).T)] = 1
+    _, _, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    return float(stats[1:, cv2.CC_STAT_AREA].max())
 
 
 def _disc(diameter: float) -> Mask:

@@ -1,0 +1,46 @@
+"""Masks and skeletons: what is thick, by exact distances; how long what leaves a path is, on drawn pictures."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_edt
+
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.search.strips import find_strips, thick_part
+
+SETTINGS = VisionSettings().segmentation
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_thick_is_what_lies_in_a_disc_that_fits_into_the_mask(seed):
+    rng = np.random.default_rng(seed)
+    mask = np.zeros((300, 400), np.uint8)
+    for _ in range(4):
+        (a, b), r = rng.integers(0, 300, (2, 2)), int(rng.integers(8, 50))
+        cv2.circle(mask, a.tolist(), r, 1, cv2.FILLED)
+        cv2.line(mask, a.tolist(), b.tolist(), 1, r)
+    least = float(rng.uniform(33.0, 60.0))
+    radius = round(least) // 2
+    core = distance_transform_edt(mask) > radius
+    near = distance_transform_edt(~core) if core.any() else np.full(mask.shape, np.inf)
+    found = thick_part(mask, least).astype(bool)
+    sure = np.abs(near - radius) > 0.01  # distances equal to the radius are decided by a rounding
+    np.testing.assert_array_equal(found[sure], (near <= radius)[sure])
+
+
+def test_nothing_is_thick_where_all_is_thin_and_all_is_where_nothing_is_left_out():
+    mask = np.zeros((200, 300), np.uint8)
+    cv2.line(mask, (10, 100), (290, 120), 1, 21)
+    assert not thick_part(mask, 40.0).any()
+    assert thick_part(np.ones((200, 300), np.uint8), 40.0).all()
+
+
+@pytest.mark.parametrize("branch", [0, 60, 140])
+def test_branch_is_what_leaves_the_longest_path_by_more_than_a_width(branch):
+    mask, width = np.zeros((300, 500), np.uint8), 11
+    cv2.line(mask, (20, 60), (480, 60), 1, width)
+    if branch:
+        cv2.line(mask, (250, 60), (250, 60 + branch), 1, width)
+    (strip,) = find_strips(mask, np.zeros_like(mask), width, SETTINGS)
+    assert strip.length == pytest.approx(460, abs=2 * width)
+    assert strip.branch == pytest.approx(max(branch - width, 0), abs=width)
