@@ -162,7 +162,7 @@ def headline(
     answer = f"By the {name}, f_EI (tangent) goes from {low} to {high}; pre-curvature {start} 1/m"
     agrees = parts.agreement.compatible
     if agrees is not None and parts.agreement.rms_relative is not None:
-        share = f"{100 * parts.agreement.rms_relative:.2g} % rms"
+        share = f"{plain(100 * parts.agreement.rms_relative, 2)} % rms"
         answer += f"; both ways {'agree' if agrees else 'disagree beyond their bands'} ({share})"
     if diagnosis is not None:
         answer += f". {diagnosis.headline}"

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.statistics.verdict import Verdict
 from pipeline.result import CausePart, CauseRow
+from pipeline.rounding import plain
 from pipeline.units import amount_unit
 
 # Names that English says in another order or with a hyphen; the others as they are, with blanks.
@@ -76,7 +77,7 @@ def headline(
         if explained is None
         else f"; on steps it had not seen it removes {100.0 * min(explained, 1.0):.0f} % of the misfit"
     )
-    shift = "" if change is None else f", and f_EI changes by {100.0 * change:.2g} % rms"
+    shift = "" if change is None else f", and f_EI changes by {plain(100.0 * change, 2)} % rms"
     if verdict == "two_causes":
         both = " and ".join(f"{listed(group)} ({size})" for group, size in zip(names, sizes, strict=True))
         return f"Two causes act together: {both}{gain}{shift}."

@@ -36,18 +36,19 @@ class Explanation:
     def amount(self, cause: Cause) -> tuple[float, float]:
         """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest.
 
-        That of a profile along the cable is its largest deviation, of all forms together.
+        That of a profile along the cable is its largest deviation beyond doubt, of all forms together.
         """
         extension, own = self.fitted.extension, self.fitted.extension.terms_of(cause)
+        at = [extension.amounts_at[i] for i in own]
+        covariance = self.fitted.covariance[np.ix_(at, at)]
         if is_profile(cause) and len(own) > 1:
             forms = [extension.formed(self.fitted.vector, i).variant for i in own]
-            weight = largest_of(forms, self.fitted.vector[[extension.amounts_at[i] for i in own]], cause)
+            weight = largest_of(forms, self.fitted.vector[at], covariance, cause)
         elif cause.additive:
             weight = np.ones(len(own))
         else:
             return max((self.fitted.amount(i) for i in own), key=lambda pair: abs(pair[0]))
-        at = [extension.amounts_at[i] for i in own]
-        variance = float(weight @ self.fitted.covariance[np.ix_(at, at)] @ weight)
+        variance = float(weight @ covariance @ weight)
         return float(weight @ self.fitted.vector[at]), float(np.sqrt(max(variance, 0.0)))
 
     def impossible(self, catalogue: Sequence[Cause], most: float) -> Cause | None:

@@ -25,6 +25,7 @@ from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.statistics.variance_component import Component, component
 from pipeline.records import Finding
+from pipeline.rounding import plain
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
 
@@ -155,7 +156,7 @@ def _told(
 
 def told(scatter: Component) -> Finding:
     """The finding ``log/displacement-scatter``."""
-    size, least, most = (f"{1e6 * value:.2g}" for value in (scatter.std, *scatter.between))
+    size, least, most = (plain(1e6 * value, 2) for value in (scatter.std, *scatter.between))
     message = (
         f"the displacements of the log scatter by {size} um (95 %: {least} to {most} um) about what photos and forces "
         "say of each step, more than the log tells; the diagnosis allowed for that"

@@ -282,17 +282,17 @@ def _traced_length(found: Faults, settings: DiagnosisSettings) -> Faults:
     off = float(np.median(traced)) / test.length - 1.0
     if abs(off) < settings.length_mismatch or np.ptp(traced) / test.length > abs(off):
         return Faults(test)
-    return Faults(
-        test,
-        (
-            Finding(
-                "length/traced",
-                "warning",
-                f"the photos show a cable of {1e3 * float(np.median(traced)):.1f} mm where length_mm says "
-                f"{1e3 * test.length:.1f} mm: length or scale is wrong",
-            ),
-        ),
+    shown, stated = 1e3 * float(np.median(traced)), 1e3 * test.length
+    message = (
+        f"the photos show a cable of {shown:.1f} mm where length_mm says {stated:.1f} mm: length or scale is wrong"
     )
+    # covers above the cable are seen too far apart, never too near: then neither need be wrong
+    if off > 0.0 and test.axis_parallax_std > 0.0:
+        message = (
+            f"the photos show a cable of {shown:.1f} mm where length_mm says {stated:.1f} mm: length or scale is "
+            "wrong, or the bearing covers lie high above the cable and near to the camera (give distance_mm)"
+        )
+    return Faults(test, (Finding("length/traced", "warning", message),))
 
 
 def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:

@@ -100,6 +100,16 @@ def test_wrong_length():
     assert codes(found) == ["length/traced"] and "181.0 mm" in found.findings[0].message
 
 
+@pytest.mark.parametrize(
+    ("seen_longer", "parallax_std", "covers"), [(0.02, 0.004, 1), (0.02, 0.0, 0), (-0.02, 0.004, 0)]
+)
+def test_covers_above_the_cable_are_told_where_they_may_be_what_is_seen(honest, seen_longer, parallax_std, covers):
+    """Covers 5 mm above the cable under a camera at 0.38 m: the photos showed 145.1 mm of a cable of 143.3 mm."""
+    test = replace(honest, length=honest.length / (1.0 + seen_longer), axis_parallax_std=parallax_std)
+    (finding,) = faults_of_input(test, SETTINGS).findings
+    assert finding.code == "length/traced" and finding.message.count("bearing covers") == covers
+
+
 def test_forces_of_the_wrong_sign_and_unit(honest):
     def scaled(factor):
         return tuple(

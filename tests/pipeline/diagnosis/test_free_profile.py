@@ -8,7 +8,7 @@ from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.causes.profile import deviation, forms, position_of, wave
+from pipeline.diagnosis.causes.profile import deviation, forms, largest_of, position_of, profile, wave
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
 from pipeline.diagnosis.fits.extension import Extension, Term
@@ -103,3 +103,17 @@ def test_the_end_of_a_search_is_told_only_where_a_second_cause_was_suspected():
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=60404, reading=Reading(scale_error=4e-3))
     part, findings = diagnose(test, None, hasty)
     assert part.verdict == "named" and findings == ()
+
+
+def test_size_of_a_profile_is_told_where_photos_show_it():
+    """Waves seen on nine tenths of the cable run far beyond it: the size is not that of what nobody saw."""
+    cause = next(cause for cause in CATALOGUE if cause.name == "pre_curvature_varying")
+    variants = [wave(k) for k in range(1, 17)]
+    seen = np.linspace(0.05, 0.95, 91)
+    table = np.column_stack([profile(form, seen) for form in variants])
+    covariance = np.linalg.inv(table.T @ table / 0.02**2 + np.eye(16) / 0.3**2)
+    loosest = np.linalg.eigh(covariance)[1][:, -1] * np.sqrt(np.linalg.eigvalsh(covariance)[-1])
+    amounts = 0.15 * (np.arange(1, 17) == 3) + loosest
+    weight = largest_of(variants, amounts, covariance, cause)
+    size, std = weight @ amounts, np.sqrt(weight @ covariance @ weight)
+    assert abs(size) == pytest.approx(0.15, abs=3.0 * std) and std < 0.05

@@ -143,6 +143,12 @@ SEEN = could_have_been_seen(
             "beseitigt diese Erweiterung 94 % der Abweichung, und f_EI ändert sich um 20 % (Effektivwert).",
         ),
         (
+            "named",
+            [["hysteresis"]],
+            {"explained": None, "change": 3.704},
+            "Der Simulation fehlt: Hysterese (4,88 ± 0,17\u00a0mN m), und f_EI ändert sich um 370 % (Effektivwert).",
+        ),
+        (
             "class",
             [["bearing_friction", "hysteresis", "plastic_set"]],
             {"change": None},
