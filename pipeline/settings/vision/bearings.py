@@ -47,9 +47,9 @@ class BearingSettings(StageSettings):
         0.6, gt=0, lt=1, description="radii of a cover; largest dot, screw or bevel that marks the axis of one not seen"
     )
     cover_radii_widths: tuple[float, float] = Field(
-        (0.9, 3.2),
-        description="widths of the cable; range of radii searched where no size is given: covers of 2 to 6 diameters,"
-        " and the mask may be a tenth wider or narrower than the cable",
+        (0.62, 3.2),
+        description="widths of the cable; range of radii searched where no size is given: covers of 1.4 to 6 diameters,"
+        " and the mask may be a tenth wider or narrower than the cable; a smaller one shows too little of its rim",
     )
     mark_widths: float = Field(
         0.8,

@@ -1,6 +1,6 @@
 """Round bearing covers whose diameter nobody gave: found by what the ends of the cable vanish under.
 
-``photos with a cable from visible end to visible end -> circles of 2 to 6 cable diameters at both ends -> one radius``
+``photos with a cable from visible end to visible end -> circles of 1.4 to 6 diameters of it at both ends -> radius``
 
 A cable that vanishes ends on the rim of the cover, ahead of which the centre lies; a dot or screw of the right size
 lies too far ahead, a disc under a clamped end not far enough. One radius must serve both ends of several photos, all

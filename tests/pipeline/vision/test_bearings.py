@@ -366,3 +366,12 @@ def test_one_cover_without_a_screw_tells_no_size() -> None:
     photo = painted_covers([left], right, radius)[0]
     photo.pixels[60:120, 580:640] = 150  # the right one's circle is gone
     assert cover_radius([(photo, cable_to_the_rims(left, right, radius))], STAGE) is None
+
+
+def test_size_of_dark_covers_hardly_wider_than_a_dark_cable() -> None:
+    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 20.0  # of a cable 28 px wide
+    photos = painted_covers(lefts, right, radius, disc_grey=60.0)
+    # cable and covers are one dark thing, which ends on the far side of their rims
+    seen = list(zip(photos, [cable_to_the_rims(left, right, -radius) for left in lefts], strict=True))
+    found = cover_radius(seen, STAGE)
+    assert found is not None and abs(found / radius - 1.0) < STAGE.same_radius  # a line 2 px inside the rim draws it in
