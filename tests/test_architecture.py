@@ -99,7 +99,8 @@ INSIDE = {
     ],
     "pipeline.vision.bearings": [("rim",), ("rings",), ("covers",), ("cover_size", "axes", "steady")],
     "pipeline.vision.centerline": [
-        ("curvature", "smoothing", "edge_profile", "ground_waves"),
+        ("curvature", "smoothing", "slow_light", "ground_waves"),
+        ("edge_profile",),
         ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),
         ("path", "refusal"),

@@ -147,6 +147,15 @@ class CurveSettings(StageSettings):
         description="of both edges in a section (1: they count alike) for its width to tell how long errors"
         " last: one edge then has four times the other's variance",
     )
+    slow_light_order: int = Field(
+        5,
+        ge=1,
+        description="of the polynomial of s that level and step of an edge follow on an even sheath and ground: light"
+        " turns with the cable, once from end to end",
+    )
+    least_slow_sections: int = Field(
+        80, ge=20, description="edges of a side; fewer do not tell how far level and step depart from that polynomial"
+    )
     slow_width_order: int = Field(
         5,
         ge=1,

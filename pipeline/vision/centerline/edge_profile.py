@@ -22,6 +22,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
+from pipeline.vision.centerline.slow_light import steadied
 from pipeline.vision.median import median, medians, quantile
 
 Float32 = NDArray[np.float32]
@@ -325,7 +326,10 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
         # Newton squares what is left: 1e-4 px. The other two per cent are sections that will be outliers anyway.
         if quantile(np.abs(shift), 0.98) < 1e-2:
             break
-    by_step, by_place = (noise * np.sqrt(np.linalg.inv(gram)[:, k, k]) for k in (1, 2))
+    covariance = (noise**2)[:, None, None] * np.linalg.inv(gram)
     # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward.
-    lost = (weight.sum(axis=1) < settings.least_pixel_share * count) | (step < settings.least_step_sigmas * by_step)
-    return Edges(np.where(lost, np.nan, place).reshape(shape), by_place.reshape(shape), step.reshape(shape))
+    faint = step < settings.least_step_sigmas * np.sqrt(covariance[:, 1, 1])
+    found = np.where((weight.sum(axis=1) < settings.least_pixel_share * count) | faint, np.nan, place).reshape(shape)
+    light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
+    steady, std = steadied(found, light, errors, s, settings=settings)
+    return Edges(steady, std, step.reshape(shape))

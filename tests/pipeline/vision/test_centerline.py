@@ -43,16 +43,15 @@ def lit(rng, **options):
 # Targets: midline in px, kappa in % of its maximum inside and in the last 10 mm. In side light 0.1 px, 0.2 % and 2 %;
 # an edge blurred by 2 px is told root two worse, at 5 % noise errors nearly double; at 5 px/mm 1 % inside, twice as
 # much as at 12 px/mm at the ends. At a quarter of the noise even light is to reach what the best prototype did,
-# 0.005 px, 0.1 % and 0.5 %. At 5 % noise 0.15 inside is missed in even light:
-# 0.164 on these scenes, 0.158 on 16 others. Edges at the limit of Cramer and Rao, a row's sqrt(2 sqrt(pi) w) n/A, by
-# this spline give 0.150 over 29 such bows if the grey values of sheath and ground were known exactly, and 0.175 if they
-# are found with the place; 0.13 with the penalty's weight chosen by the truth. A stiffer penalty (order 4) gained a
-# tenth inside and lost a fifth at the ends; to hold the grey values to their neighbours gained 4 % and lost 17 % in
-# side light.
+# 0.005 px, 0.1 % and 0.5 %. At 5 % noise 0.15 inside is reached over many bows (0.150 over 172, 0.162 with the grey
+# values of sheath and ground free on each section), but not on these 40: 0.157, which were 0.163. Edges at the limit of
+# Cramer and Rao, a row's sqrt(2 sqrt(pi) w) n/A, by this spline give 0.150 over 29 such bows if those grey values were
+# known exactly; 0.13 with the penalty's weight chosen by the truth. A stiffer penalty (order 4) gained a tenth inside
+# and lost a fifth at the ends. Five bows tell an rms to 15 %, forty to 5 %.
 CASES = {
     "even": (even, {}, {}, (0.02, 0.15, 1.5)),
     "even, noise 0.5 %": (even, {"noise": 0.005}, {}, (0.005, 0.1, 0.5)),
-    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.175, 1.5)),
+    "even, noise 5 %": (even, {"noise": 0.05}, {}, (0.02, 0.16, 1.5)),
     "directional": (lit, {}, {}, (0.1, 0.2, 2.0)),
     "directional, noise 5 %": (lit, {"noise": 0.05}, {}, (0.1, 0.35, 2.5)),
     "directional, JPEG 75": (lit, {}, {"quality": 75}, (0.1, 0.2, 2.0)),
@@ -61,12 +60,13 @@ CASES = {
     "directional, brushed metal": (lit, {"ground": Ground("brushed", contrast=0.03)}, {}, (0.1, 0.2, 2.0)),
     "directional, blur 2 px": (lit, {"blur": 2.0}, {}, (0.1, 0.28, 2.5)),
 }
+BOWS = {"even, noise 5 %": 40}  # else 5
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_targets_are_met(name):
     make, options, traced, (position, interior, ends) = CASES[name]
-    found = traced_errors(5, lambda rng: make(rng, **options), seed=20, **traced)
+    found = traced_errors(BOWS.get(name, 5), lambda rng: make(rng, **options), seed=20, **traced)
     assert rms([e.position() for e in found]) < position
     assert rms([e.interior() for e in found]) < interior
     assert rms([e.ends() for e in found]) < ends
