@@ -65,7 +65,15 @@ INSIDE = {
         ("search", "extended", "stuck_forces", "maps"),
         ("faults",),
         ("workbench",),
-        ("identified_again", "heldout", "bootstrap", "force_breaks", "outlier", "displacement_scatter"),
+        (
+            "identified_again",
+            "heldout",
+            "bootstrap",
+            "force_breaks",
+            "outlier",
+            "displacement_scatter",
+            "photo_scatter",
+        ),
     ],
     "pipeline.diagnosis.explanations": [
         ("explanation", "candidates", "refit", "effort"),
@@ -76,7 +84,7 @@ INSIDE = {
         ("conclusion",),
         ("finer_law",),
     ],
-    "pipeline.diagnosis.presentation": [("leftover", "named", "table"), ("part",)],
+    "pipeline.diagnosis.presentation": [("leftover", "named", "table", "findings"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
         ("guard", "median", "photo", "rough", "render"),

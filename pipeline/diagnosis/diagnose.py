@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.causes.profile import is_wave
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.explanations.effort import Effort
+from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.explanations.finer_law import cost, points_instead
 from pipeline.diagnosis.explanations.friction_in_law import shared
@@ -30,21 +30,21 @@ from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_in
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
+from pipeline.diagnosis.fits.photo_scatter import with_scattered_photos
 from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law, with_points
 from pipeline.diagnosis.observations.work import newton_steps
+from pipeline.diagnosis.presentation.findings import search_ended, too_large
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.leftover import Leftover, leftover_of
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.smooth_fields import smooth_fields
 from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.diagnosis.statistics.verdict import credible_set, probabilities, with_twins
-from pipeline.diagnosis.words import spoken
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
 from pipeline.result import Curve, DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
-from pipeline.units import amount_unit
 from rod.measurement import MeasuredTest
 
 
@@ -87,15 +87,23 @@ def diagnose(
         if not isinstance(again, str) and again.largest <= again.limit:
             faults, bench = joined, again
     known = None if identification is None else curve_of(identification.inverse)
-    begun = newton_steps()
-    bench, conclusion = settled(bench, settings)
+    begun, whole = newton_steps(), Effort.of(settings.all_newton_steps)
+    bench, conclusion = settled(bench, settings, whole)
     part = present(bench, conclusion, settings, identified=known)
     left = max(settings.search_newton_steps - (newton_steps() - begun), 1)  # a second search ends with the first's time
     shorter = settings.model_copy(update={"search_newton_steps": left})
-    faults, bench, conclusion, part = _allowing_for_scatter(faults, bench, conclusion, part, shorter, known)
+    if whole.spent:
+        conclusion = replace(conclusion, curtailed=True)  # nor was it asked whether displacements scatter
+    else:
+        faults, bench, conclusion, part = _allowing_for_scatter(faults, bench, conclusion, part, shorter, known, whole)
+        if part.verdict == "unexplained":
+            fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
+            scattered = with_scattered_photos(faults, bench, fitted, settings)
+            better = None if scattered is None else _explained(*scattered, shorter, known, whole)
+            faults, bench, conclusion, part = better or (faults, bench, conclusion, part)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
-    findings = [*faults.findings, *(_too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
-    return part, (*findings, *_search_ended(conclusion))
+    findings = [*faults.findings, *(too_large(bench, conclusion, settings) if part.verdict == "unexplained" else ())]
+    return part, (*findings, *search_ended(conclusion))
 
 
 def _allowing_for_scatter(
@@ -105,6 +113,7 @@ def _allowing_for_scatter(
     part: DiagnosisPart,
     settings: DiagnosisSettings,
     known: Curve | None,
+    whole: Effort,
 ) -> tuple[Faults, Workbench, Conclusion, DiagnosisPart]:
     """What is concluded with displacements that scatter, where they do so and that explains the data better.
 
@@ -115,18 +124,22 @@ def _allowing_for_scatter(
     fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
     scattered = scatter_beside(faults, bench, fitted, settings)
     if scattered is not None:
-        again, concluded = settled(scattered.bench, settings)
+        again, concluded = settled(scattered.bench, settings, whole)
         presented = present(again, concluded, settings, identified=known)
         likelier = _cost(again, concluded) + scattered.price < paid
         if presented.verdict != "unexplained" and (likelier or part.verdict == "unexplained"):
             return scattered.faults, again, concluded, presented
     left_open = with_scatter(faults, bench, settings) if part.verdict == "unexplained" else None
-    if left_open is not None:
-        again, concluded = settled(left_open[1], settings)
-        presented = present(again, concluded, settings, identified=known)
-        if presented.verdict != "unexplained":
-            return left_open[0], again, concluded, presented
-    return exact
+    return (None if left_open is None else _explained(*left_open, settings, known, whole)) or exact
+
+
+def _explained(
+    faults: Faults, bench: Workbench, settings: DiagnosisSettings, known: Curve | None, whole: Effort
+) -> tuple[Faults, Workbench, Conclusion, DiagnosisPart] | None:
+    """What is concluded of data whose noise is known better; None where that leaves them unexplained."""
+    again, concluded = settled(bench, settings, whole)
+    part = present(again, concluded, settings, identified=known)
+    return None if part.verdict == "unexplained" else (faults, again, concluded, part)
 
 
 def _cost(bench: Workbench, conclusion: Conclusion) -> float:
@@ -169,34 +182,34 @@ def chosen_knots(identification: Identification | None, settings: DiagnosisSetti
     return settings.knots if law is None else int(np.clip(len(law.knots), 3, settings.knots + 1))
 
 
-def settled(bench: Workbench, settings: DiagnosisSettings) -> tuple[Workbench, Conclusion]:
+def settled(bench: Workbench, settings: DiagnosisSettings, whole: Effort = TO_THE_END) -> tuple[Workbench, Conclusion]:
     """What is concluded beside a law so fine that no cause stands for control points it lacks, and its workbench."""
     begun = newton_steps()
-    concluded = conclude(bench, settings)
-    while (points := points_instead(bench, concluded, settings)) is not None:
+    concluded = conclude(bench, settings, whole)
+    while not whole.spent and (points := points_instead(bench, concluded, settings)) is not None:
         left = max(settings.search_newton_steps - (newton_steps() - begun), 1)
         finer = with_points(bench, points, settings)
         if finer is None:
             break
-        again = conclude(finer, settings.model_copy(update={"search_newton_steps": left}))
+        again = conclude(finer, settings.model_copy(update={"search_newton_steps": left}), whole)
         if _cost(finer, again) > _cost(bench, concluded) + bench.limit**2:
             break  # what stands beside the law was not found again
         bench, concluded = finer, again
     return bench, concluded
 
 
-def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
-    """Refit suspects, weigh them, look for a second cause and for what is left."""
-    effort = Effort.of(settings.search_newton_steps)
+def conclude(bench: Workbench, settings: DiagnosisSettings, whole: Effort = TO_THE_END) -> Conclusion:
+    """Refit suspects, weigh them, look for a second cause and for what is left; ``whole`` ends all of it."""
+    effort = Effort.of(settings.search_newton_steps).within(whole)
     if bench.largest <= confirmed_limit(bench, settings):
         masked = masking(bench, settings, effort)
         return replace(_concluded(bench, [], [], 0, masked, settings), curtailed=effort.spent)
-    found = _refitted(bench, settings)
+    found, cut = _refitted(bench, settings, whole)
     singles = [e for e in found if e.impossible(bench.suspicion.causes, settings.impossible) is None]
     impossible = [e for e in found if e not in singles and e.gain > max((s.gain for s in singles), default=0.0)]
     if not singles:
         nothing = _concluded(bench, [], [], 0, None, settings)
-        return replace(nothing, impossible=impossible, alien=nothing.alien or bool(impossible))
+        return replace(nothing, impossible=impossible, alien=nothing.alien or bool(impossible), curtailed=cut)
     freedom = max(len(bench.base.residual) - bench.base.extension.size, 1)
     weight = probabilities(
         [e.weighed for e in singles],
@@ -208,9 +221,11 @@ def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     order = [*members, *(k for k in np.argsort(-weight) if k not in members)]
     singles, chance = [singles[k] for k in order], [float(weight[k]) for k in order]
     named = {explanation.causes[0] for explanation in singles[: len(members)]}
-    two, instead, curtailed = second_cause(bench, singles, named, settings, effort)
+    two, instead, curtailed = None, list[int](), True
+    if not whole.spent:
+        two, instead, curtailed = second_cause(bench, singles, named, settings, effort)
     concluded = _concluded(bench, singles, chance, len(members), two, settings)
-    return replace(concluded, instead=instead, impossible=impossible, curtailed=curtailed)
+    return replace(concluded, instead=instead, impossible=impossible, curtailed=curtailed or cut)
 
 
 def _concluded(
@@ -263,18 +278,18 @@ def _members(
     return with_twins(members, weight, gain, closeness, cosine=settings.twin_cosine, margin=settings.twin_margin)
 
 
-def _refitted(bench: Workbench, settings: DiagnosisSettings) -> list[Explanation]:
-    """All suspects refitted that remove anything, the best first."""
+def _refitted(bench: Workbench, settings: DiagnosisSettings, whole: Effort) -> tuple[list[Explanation], bool]:
+    """All suspects refitted that remove anything, the best first, and whether any was left out for want of time."""
     loading_only = "mounted" not in bench.facts.branch
     suspects = candidates(bench.suspicion, settings, any_sign=loading_only)
-    found = _explanations(bench, suspects, settings)
+    found, cut = _explanations(bench, suspects, settings, whole)
     best = max(found, key=lambda e: e.gain, default=None)
     if best is None or best.gain < CONFIRMED * bench.largest**2 or (loading_only and not _foreseen(bench, best)):
         # A base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit.
         others = [k for k in range(len(bench.suspicion.causes)) if k not in suspects and bench.suspicion.of(k).size]
-        found = [*found, *_explanations(bench, others, settings)]
-        found = [e for e in found if e.gain >= CONFIRMED * bench.limit**2]
-    return sorted(found, key=lambda e: -e.gain)
+        more, late = _explanations(bench, others, settings, whole)
+        found, cut = [e for e in (*found, *more) if e.gain >= CONFIRMED * bench.limit**2], cut or late
+    return sorted(found, key=lambda e: -e.gain), cut
 
 
 def _foreseen(bench: Workbench, found: Explanation) -> bool:
@@ -287,15 +302,19 @@ CONFIRMED = 0.5
 """Share of a score's chi-square that its refit must remove: a score that no refit confirms is no finding."""
 
 
-def _explanations(bench: Workbench, causes: list[int], settings: DiagnosisSettings) -> list[Explanation]:
-    """The named causes refitted, as far as they remove anything."""
+def _explanations(
+    bench: Workbench, causes: list[int], settings: DiagnosisSettings, whole: Effort
+) -> tuple[list[Explanation], bool]:
+    """The named causes refitted, as far as they remove anything and there is time, and whether that was too short."""
     found: list[Explanation] = []
     for cause in causes:
+        if found and whole.spent:
+            return found, True
         rival = min((e.fitted.chi2 for e in found), default=np.inf)
         explanation = refit_one(bench.observation, bench.base, bench.suspicion, cause, settings, rival=rival)
         if explanation is not None and explanation.gain > 0.0:
             found.append(explanation)
-    return found
+    return found, False
 
 
 def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:
@@ -315,34 +334,6 @@ def _left_over(bench: Workbench, fitted: Fit, settings: DiagnosisSettings) -> Le
         draws=settings.null_draws,
         rng=np.random.default_rng(settings.seed),
     )
-
-
-def _too_large(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> tuple[Finding, ...]:
-    """What would explain an unexplained specimen if it could be that large."""
-    for explanation in conclusion.impossible[:1]:
-        cause = explanation.impossible(bench.suspicion.causes, settings.impossible)
-        if cause is None:
-            break
-        amount, std = explanation.amount(cause)
-        size = amount_unit(cause.unit, amount, std).text(amount, std)
-        times = abs(amount) / cause.plausible(bench.facts)
-        message = (
-            f"{spoken(cause.name)} would remove the misfit, but only at {size}, {times:.0f} times its usual size: it "
-            "is something else, or scale, length or photos are wrong"
-        )
-        return (Finding("diagnosis/impossible-size", "warning", message),)
-    return ()
-
-
-def _search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:
-    """That not every pair was tried, where the search for two causes was ended."""
-    if not conclusion.curtailed:
-        return ()
-    message = (
-        "the search for two causes was ended before all pairs were tried, it took too long: "
-        "another pair of causes may explain the data better"
-    )
-    return (Finding("diagnosis/search-ended", "warning", message),)
 
 
 def _data_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:

@@ -111,6 +111,13 @@ class DiagnosisSettings(BaseModel):
         " single causes included; about 1,000 a second, and what comes before and after takes 10 to 20 s of the minute"
         " it all may take; searches that found their pair took 5,000 to 30,000",
     )
+    all_newton_steps: int = Field(
+        45_000,
+        gt=0,
+        description="Newton steps after which a diagnosis begins no further search of any kind and presents what it"
+        " has; 1,000 to 3,000 a second; the last thing begun may take 10,000 more; of 18 photographed"
+        " specimens none took 30,000",
+    )
     pair_prior: float = Field(
         0.1, description="probability of two causes against one of as many free numbers, before the data are looked at"
     )

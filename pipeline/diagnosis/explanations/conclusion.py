@@ -34,7 +34,7 @@ class Conclusion:
     impossible : list of Explanation
         Single causes that would remove more than the accepted one, but only at a size that such a cause cannot have.
     curtailed : bool
-        Whether the search for two causes was ended before its end.
+        Whether the search for causes was ended before its end.
     """
 
     singles: list[Explanation]

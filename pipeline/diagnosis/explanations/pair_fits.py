@@ -126,6 +126,8 @@ def in_any_form(
         rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
         fitted, hopeless = pair.fitted, rival + settings.refit_least
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
+            if effort.spent:
+                break
             fitted = with_free_profile(bench.observation, fitted, kind, settings, hopeless=hopeless)
             if is_profile(kind) or not kind.combines:
                 continue

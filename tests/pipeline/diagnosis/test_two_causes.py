@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fixtures.aliens import with_alien
 from fixtures.continuum import Cable
-from fixtures.hidden import LOOP, THREE, Protocol, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, THREE, Protocol, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
@@ -73,6 +74,21 @@ def test_its_prior_alone_does_not_keep_a_pair_out_of_the_class(bench):
 def test_a_search_whose_effort_is_spent_begins_nothing(bench):
     assert exchanged(bench, [explanation(PAIR, 400.0, 1)], SETTINGS, Effort.of(-1)) == []
     assert not Effort().spent
+
+
+def test_a_diagnosis_as_a_whole_has_an_end_and_says_so():
+    """Data that nothing explains kept every search at work; what is left out then is what comes last."""
+    test = hidden_test(Cable(), SIX, largest=0.0138, seed=21, reading=Reading(lens=2e-2))
+    strange = with_alien(test, "bump", 2e-4)
+    hasty = SETTINGS.model_copy(update={"all_newton_steps": 300})
+    spent = []
+    for settings in (hasty, SETTINGS):
+        before = newton_steps()
+        part, findings = diagnose(strange, None, settings)
+        spent.append(newton_steps() - before)
+        assert part.verdict == "unexplained"
+        assert ("diagnosis/search-ended" in [f.code for f in findings]) == (settings is hasty)
+    assert spent[0] < 0.7 * spent[1]
 
 
 def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time():

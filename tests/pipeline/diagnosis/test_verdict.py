@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.diagnosis.causes.cause import Variant
 from pipeline.diagnosis.diagnose import _beyond_catalogue, _refitted
+from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.statistics.score import score
 from pipeline.diagnosis.statistics.verdict import Weighed, credible_set, decide, probabilities, scan_share, with_twins
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -96,9 +97,9 @@ def test_a_cause_that_no_score_announced_is_not_refitted_alone(monkeypatch, bran
     """Without the force-free photo it was found in another valley of K0, where other causes fit as well."""
     tried = []
 
-    def explanations(bench, causes, settings):
+    def explanations(bench, causes, settings, whole):
         tried.append(causes)
-        return [SimpleNamespace(causes=(0,), gain=50.0)] if 0 in causes else []
+        return [SimpleNamespace(causes=(0,), gain=50.0)] if 0 in causes else [], False
 
     suspicion = SimpleNamespace(
         causes=("friction", "offset", "nothing"),
@@ -111,7 +112,7 @@ def test_a_cause_that_no_score_announced_is_not_refitted_alone(monkeypatch, bran
     room = sys.modules[_refitted.__module__]  # its package names a function as the module
     monkeypatch.setattr(room, "candidates", lambda *_, any_sign: [0])
     monkeypatch.setattr(room, "_explanations", explanations)
-    _refitted(bench, DiagnosisSettings())
+    _refitted(bench, DiagnosisSettings(), Effort())
     assert tried == ([[0], [1]] if others else [[0]])
 
 
