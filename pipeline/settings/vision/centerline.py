@@ -197,6 +197,12 @@ class CurveSettings(StageSettings):
         description="ratio of the errors by the width's variation to those that scatter and light tell, above which"
         " the former count: over ten effective parameters chance passes it once in a hundred",
     )
+    least_wave_px: float = Field(
+        0.01,
+        ge=0,
+        description="px; waves in a midline that no width need show: grid of pixels, demosaicing, tone curve; of this"
+        " size they are on photos of even light and little noise",
+    )
     least_wave_gain: float = Field(
         6.0,
         ge=0,

@@ -27,7 +27,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
-from pipeline.vision.centerline.ground_waves import HalfWidths, ground_waves
+from pipeline.vision.centerline.ground_waves import HalfWidths, edge_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.centerline.refusal import (
@@ -226,9 +226,10 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
 
 
 def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) -> tuple[float, float]:
-    """Size and length (m) of the waves that the ground makes in the midlines of all photos of a series."""
+    """Size and length (m) of the waves that ground and camera make in the midlines of all photos of a series."""
     halves = [cable.half_widths(settings.curve) for cable in cables if isinstance(cable, Followed)]
-    return ground_waves(halves, settings.curve)
+    scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
+    return edge_waves(halves, settings.curve, metres_per_px=max(scales, default=0.0))
 
 
 def centerline_of(

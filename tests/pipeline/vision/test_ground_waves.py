@@ -10,7 +10,7 @@ from fixtures.photographed.specimen import Order, make, write
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
 from pipeline.settings.vision.centerline import CurveSettings
-from pipeline.vision.centerline.ground_waves import HalfWidths, ground_waves
+from pipeline.vision.centerline.ground_waves import HalfWidths, edge_waves, ground_waves
 from pipeline.vision.series import trace_series
 from rod.inverse.whitening import block_covariance
 from rod.measurement import slow_covariance
@@ -47,6 +47,14 @@ def test_few_sections_tell_nothing():
     short = photo(np.random.default_rng(3), 2e-5, 8e-3, n=80)
     assert ground_waves([short] * 7, OPTIONS) == (0.0, 0.0)
     assert ground_waves([], OPTIONS) == (0.0, 0.0)
+
+
+def test_every_photo_has_waves_of_its_own():
+    rng = np.random.default_rng(5)
+    photos = [photo(rng, 0.0, 1.0) for _ in range(4)]
+    assert ground_waves(photos, OPTIONS) == (0.0, 0.0)
+    assert edge_waves(photos, OPTIONS, metres_per_px=1e-4) == (pytest.approx(1e-6), pytest.approx(0.04 * 0.18))
+    assert edge_waves([], OPTIONS, metres_per_px=1e-4) == (0.0, 0.0)
 
 
 def test_a_speck_on_one_edge_is_no_wave():
