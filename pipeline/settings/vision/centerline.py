@@ -156,6 +156,13 @@ class CurveSettings(StageSettings):
     least_slow_sections: int = Field(
         80, ge=20, description="edges of a side; fewer do not tell how far level and step depart from that polynomial"
     )
+    least_slow_share: float = Field(
+        0.9,
+        gt=0,
+        le=1,
+        description="of the sections, by edge; where fewer show it, what they show is no even light: white on white,"
+        " edges held to it made a curve that looked right, 20 px beside the cable",
+    )
     slow_width_order: int = Field(
         5,
         ge=1,

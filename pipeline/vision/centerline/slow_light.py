@@ -49,7 +49,7 @@ def steadied(
     """
     free = np.sqrt(covariance[..., 2, 2])
     known = np.isfinite(place)
-    if known.sum(axis=1).min() < settings.least_slow_sections:
+    if known.sum(axis=1).min() < settings.least_slow_sections or known.mean(axis=1).min() < settings.least_slow_share:
         return place, free
     slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, settings.slow_light_order)
     off, extra, plain = np.zeros(light.shape), np.zeros((2, 2)), known.copy()

@@ -81,12 +81,20 @@ def test_letters_move_no_edge():
 
 def test_sections_without_an_edge_stay_without_and_a_picture_without_noise_has_no_errors():
     place = np.zeros(COUNT)
-    place[10:30] = np.nan
+    place[10:30] = np.nan  # a twelfth of them
     found, _ = both(place, SLOW, np.broadcast_to(covariance(0.05), (COUNT, 3, 3)))
     np.testing.assert_array_equal(np.isnan(found), np.isnan(place))
     found, std = both(np.zeros(COUNT), SLOW, np.zeros((COUNT, 3, 3)))
     np.testing.assert_array_equal(found, 0.0)
     np.testing.assert_array_equal(std, 0.0)
+
+
+def test_where_many_sections_show_no_edge_the_others_stay_as_they_are():
+    errors = np.broadcast_to(covariance(0.05), (COUNT, 3, 3))
+    place = np.random.default_rng(5).standard_normal(COUNT)
+    place[::8] = np.nan
+    found, _ = both(place, SLOW + 0.01 * np.random.default_rng(6).standard_normal((COUNT, 2)), errors)
+    np.testing.assert_array_equal(found, place)
 
 
 def test_few_sections_tell_no_light():
