@@ -64,6 +64,9 @@ class MeasuredShape:
     wave_std, wave_length : m
         The same of waves that a textured ground makes along the edges: longer than `correlation_length`, shorter than
         a bend of the cable; 0 where there are none.
+    common_std : m
+        Of waves of that length which are the same at the same s on all photos of a test: print on the sheath, the
+        ground below the end that stands still.
     """
 
     s: Array
@@ -85,11 +88,13 @@ class MeasuredShape:
     systematic_length: float
     wave_std: float = 0.0
     wave_length: float = 0.0
+    common_std: float = 0.0
 
     @property
     def slow(self) -> SlowErrors:
-        """Standard deviation and correlation length (m) of the light's error and of the waves."""
-        return (self.systematic_std, self.systematic_length), (self.wave_std, self.wave_length)
+        """Standard deviation and correlation length (m) of the light's error and of all waves of one photo."""
+        waves = float(np.hypot(self.wave_std, self.common_std))
+        return (self.systematic_std, self.systematic_length), (waves, self.wave_length)
 
     def section_offsets(self) -> Array:
         """Distance of the sections from the smooth curve along its normal, (k,) m; cubic Hermite between its points."""

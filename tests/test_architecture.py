@@ -48,6 +48,7 @@ INSIDE = {
     ],
     "pipeline.diagnosis.observations": [
         ("prediction", "noise", "force_noise", "work"),
+        ("common_waves",),
         ("simulation", "observation"),
         ("linearised",),
     ],

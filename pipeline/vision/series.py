@@ -21,6 +21,7 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
+from pipeline.vision.centerline.ground_waves import Waves
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
@@ -258,7 +259,7 @@ def _tied(
     _, told = jointly(images, sights, _told)
     _, waves = jointly(images, cables, partial(waves_of, settings=settings))
     return tuple(
-        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes, waves or (0.0, 0.0)))
+        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes, waves))
         for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
     )
 
@@ -274,7 +275,7 @@ def _shown(
     preview: Preview | None,
     settings: VisionSettings,
     told: AxesTold | None = None,
-    waves: tuple[float, float] = (0.0, 0.0),
+    waves: Waves | None = None,
 ) -> Centerline | Rejected:
     """Centerline of a cable, with its picture."""
     if isinstance(cable, Rejected):

@@ -149,6 +149,6 @@ def whereabouts(observation: Observation, field: Array) -> Whereabouts:
     if photo is None:
         return Whereabouts(share, strongest)
     own = observation.rows.of_photo(strongest)
-    across = photo.basis @ linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, field[own])[0]
+    across = photo.basis @ linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, observation.separated(field)[own])[0]
     s = photo.sections.s
     return Whereabouts(share, strongest, float(s[int(np.argmax(np.abs(across)))]), across.tolist(), s.tolist())

@@ -67,7 +67,7 @@ def columns_of(
         chord = np.column_stack([there.chord - at.chord for there in moved])
         for photo, own in zip(observation.photos, places.of_photo, strict=True):
             parts.append(photo.whiten @ np.vstack([chord[photo.step], across[own]]))
-    return np.asarray(np.vstack(parts) / np.asarray(steps))
+    return np.asarray(observation.joined(np.vstack(parts)) / np.asarray(steps))
 
 
 def _forces(observation: Observation, at: Prediction, moved: Sequence[Prediction]) -> Array:

@@ -42,7 +42,9 @@ class Sections:
         Distance of neighbouring sections.
     correlation_length : m
     slow : tuple of (std m, length m)
-        Slow sideways errors: of the light, of waves that a textured ground makes.
+        Slow sideways errors of this photo alone: of the light, of waves that a textured ground makes.
+    common : (std m, length m)
+        Waves that are the same at the same s on all photos.
     """
 
     s: Array
@@ -54,6 +56,7 @@ class Sections:
     pitch: float
     correlation_length: float
     slow: SlowErrors
+    common: tuple[float, float] = (0.0, 0.0)
 
 
 def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
@@ -85,7 +88,8 @@ def block_means(shape: MeasuredShape, *, blocks: int) -> Sections:
         members=members,
         pitch=float(np.median(np.diff(s))),
         correlation_length=shape.correlation_length,
-        slow=shape.slow,
+        slow=((shape.systematic_std, shape.systematic_length), (shape.wave_std, shape.wave_length)),
+        common=(shape.common_std, shape.wave_length),
     )
 
 

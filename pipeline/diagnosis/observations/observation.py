@@ -14,7 +14,8 @@ Sign: residual = (data - model) / sigma.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -23,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from pipeline.diagnosis.observations.common_waves import CommonWaves, common_waves
 from pipeline.diagnosis.observations.force_noise import common_rounding, force_noise
 from pipeline.diagnosis.observations.noise import (
     PhotoNoise,
@@ -107,6 +109,8 @@ class Observation:
         Freedom of each step's ``force_std``, where each has a level of its own; else empty.
     force_common : tuple of float
         Error (N) of each step that all its samples have alike (rounding, see `force_noise`); empty where there is none.
+    common : CommonWaves or None
+        What all photos err alike.
     photos : tuple of PhotoData
     photo_noise : PhotoNoise
     rows : Row
@@ -124,6 +128,20 @@ class Observation:
     added: Array | float = 0.0
     force_own: tuple[float, ...] = ()
     force_common: tuple[float, ...] = ()
+    common: CommonWaves | None = None
+
+    def joined(self, values: Array) -> Array:
+        """Values (N, ...) of rows whitened photo by photo, with what all photos err alike."""
+        return values if self.common is None else self._with_photos(values, self.common.whitened)
+
+    def separated(self, values: Array) -> Array:
+        """The inverse of `joined`: how each photo by itself sees values (N, ...) of the rows."""
+        return values if self.common is None else self._with_photos(values, self.common.undone)
+
+    def _with_photos(self, values: Array, change: Callable[[Array], Array]) -> Array:
+        own, out = np.concatenate([self.rows.of_photo(photo.step) for photo in self.photos]), np.array(values, float)
+        out[own] = change(out[own])
+        return out
 
     def estimated(self, count: int) -> list[tuple[NDArray[np.bool_], float]]:
         """Rows (count,) whose noise is one level estimated from samples, with its freedom; empty where it is stated."""
@@ -188,10 +206,10 @@ def observe(
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
     rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
-    common = tuple(common_rounding(test.steps, level.std).tolist())
-    return Observation(
-        tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, force_own=level.own, force_common=common
-    )
+    alike = common_waves([photo.sections for photo in photos], [photo.whiten for photo in photos])
+    rounding = tuple(common_rounding(test.steps, level.std).tolist())
+    observed = Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, common=alike)
+    return replace(observed, force_own=level.own, force_common=rounding)
 
 
 def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:
@@ -244,7 +262,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     across = _distance(sections, prediction)
     for photo, own in zip(observation.photos, sections.of_photo, strict=True):
         parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across[own]])
-    return np.asarray(np.concatenate(parts) + observation.added)
+    return np.asarray(observation.joined(np.concatenate(parts)) + observation.added)
 
 
 def of_hold(off: Array, common: float) -> Array:

@@ -56,7 +56,7 @@ def smooth_fields(observation: Observation, facts: Facts, *, rows: int) -> Array
         for photo in observation.photos:
             chord[own[photo.step]] = pattern[photo.step] * photo.whiten[:, 0]
         fields.append(_Field(order + CHORD, chord))
-    return np.column_stack([field.column for field in sorted(fields, key=lambda field: field.fineness)])
+    return observation.joined(np.column_stack([field.column for field in sorted(fields, key=lambda f: f.fineness)]))
 
 
 def _patterns(facts: Facts) -> Array:

@@ -211,9 +211,9 @@ class CurveSettings(StageSettings):
         " size they are on photos of even light and little noise",
     )
     least_wave_gain: float = Field(
-        6.0,
+        7.8,
         ge=0,
-        description="-2 log likelihood that waves in the widths must gain: two parameters gain as much by chance once"
+        description="-2 log likelihood that waves in the widths must gain: three parameters gain as much by chance once"
         " in twenty series at most",
     )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")

@@ -1,24 +1,28 @@
-"""Waves in the midline that the ground makes: how large and how long, from the widths of all photos of a series.
+"""Waves in the midline that ground and sheath make: how large and how long, from the widths of all photos of a series.
 
 Edges on the grain of a wooden table, on lines or print move along the cable in waves far longer than the scatter of
 neighbouring sections lasts, and far shorter than the light's error. The curve follows them like a bend, so no residual
 shows them; but they are in the width as well, which no bend of the cable changes: the errors ``a`` and ``b`` of two
 edges move the midline by ``(a + b) / 2`` and half the width by ``(a - b) / 2``.
 
+What is printed on the sheath or mottles it is in the same place of the cable on all photos, as is the ground below the
+end that stands still: their waves are *common*, and eight photos average nothing of them. Those of the ground farther
+in change from photo to photo: they are each photo's *own*.
+
 Half the width of every photo is split into Legendre polynomials of s, orthonormal over its sections. What its scatter
-puts on each is known; the waves add ``std^2 exp(-ds^2 / (2 length^2))``, whose std and length are the likeliest over
-all photos together: one photo has some 25 such components, which alone tell a variance to a third. Where the likelihood
-gains no more than chance does there are none (`pipeline.settings.vision.centerline.CurveSettings.least_wave_gain`).
+puts on each is known; the waves add ``std^2 exp(-ds^2 / (2 length^2))``, own and common, whose sizes and length are the
+likeliest over all photos together: one photo has some 25 such components, which alone tell a variance to a third. Where
+the likelihood gains no more than chance does there are none (`CurveSettings.least_wave_gain`).
 
 Some waves every photo has: grid of the pixels, demosaicing, tone curve. They are no larger than a hundredth of a pixel
 (`least_wave_px`), and on sharp photos no scatter hides them: midlines traced to 0.01 px, with 0.015 px of scatter in a
-section, were told to misfit a true simulation in two of 23 specimens.
+section, were told to misfit a true simulation in two of 23 specimens. Half as much is common.
 
 On a wooden table (grain of 3 % of white, 5 to 7 px/mm) both midline and half width have two to three times the variance
 of their scatter in waves of a twentieth to a fifth of the length. Without them, simulations of cables that nothing was
 wrong with were told to misfit.
 
-``half widths of the sections on every photo -> std and length of the waves``
+``half widths of the sections on every photo -> std of own and common waves, and their length``
 """
 
 from __future__ import annotations
@@ -40,6 +44,9 @@ _LENGTHS = np.geomspace(0.01, 0.06, 7)
 
 _USUAL = 0.04
 """Of the seen length, correlation length of a photo's own waves: in the middle of those tried."""
+
+_SIZES = 40
+"""Variances tried, a factor 1.27 apart."""
 
 _PLACES = 240
 """Of an even grid on which the waves' share in each polynomial is computed."""
@@ -63,24 +70,34 @@ class HalfWidths:
     correlation_length: float
 
 
-def edge_waves(photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_per_px: float) -> tuple[float, float]:
-    """Standard deviation and correlation length (m) of the waves, not smaller than a photo's own.
+@dataclass(frozen=True)
+class Waves:
+    """Standard deviations (m) of a photo's own waves and of those common to all, and their correlation length (m)."""
+
+    own: float = 0.0
+    common: float = 0.0
+    length: float = 0.0
+
+
+def edge_waves(photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_per_px: float) -> Waves:
+    """The waves, not smaller than those that every photo has.
 
     Parameters
     ----------
     photos, settings
-        As in `ground_waves`.
+        As in `seen_waves`.
     metres_per_px : m
     """
     if not photos:
-        return 0.0, 0.0
-    std, length = ground_waves(photos, settings)
+        return Waves()
+    seen, least = seen_waves(photos, settings), settings.least_wave_px * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
-    return float(np.hypot(std, settings.least_wave_px * metres_per_px)), length or _USUAL * reach
+    own, common = np.hypot(seen.own, least), np.hypot(seen.common, 0.5 * least)
+    return Waves(float(own), float(common), seen.length or _USUAL * reach)
 
 
-def ground_waves(photos: Sequence[HalfWidths], settings: CurveSettings) -> tuple[float, float]:
-    """Standard deviation and correlation length (m) of what the ground adds; zeros where the widths show none.
+def seen_waves(photos: Sequence[HalfWidths], settings: CurveSettings) -> Waves:
+    """What the widths show of waves; none where they show none.
 
     Parameters
     ----------
@@ -90,23 +107,41 @@ def ground_waves(photos: Sequence[HalfWidths], settings: CurveSettings) -> tuple
     """
     told = [photo for photo in photos if len(photo.s) >= 3 * _HIGHEST]
     if not told:
-        return 0.0, 0.0
+        return Waves()
     coarsest = settings.slow_width_order + 1
     found = np.array([_components(photo)[:, coarsest:] for photo in told])  # (photos, 2, k)
-    square, scatter = found[:, 0] ** 2, found[:, 1]
-    shares = _shares()[:, coarsest:]
-    counts = np.array([len(photo.s) for photo in told])
-    # of the waves' variance: nothing, then all up to what would be the whole of the widths' own
-    largest = float(np.mean(square.sum(axis=1) / counts))
-    variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, 60)]
-    added = variances[:, None, None, None] * counts[None, None, :, None] * shares[None, :, None, :]
-    total = scatter + added  # (variances, lengths, photos, k)
-    value = np.sum(np.log(total) + square / total, axis=(2, 3))
-    best = np.unravel_index(int(np.argmin(value)), value.shape)
-    if value[0, 0] - value[best] < settings.least_wave_gain:
-        return 0.0, 0.0
+    counts = np.array([len(photo.s) for photo in told], float)
+    # of the waves' variances: nothing, then all up to what would be the whole of the widths' own
+    largest = float(np.mean(np.sum(found[:, 0] ** 2, axis=1) / counts))
+    variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, _SIZES)]
+    value = np.array([_surprise(found, counts, share, variances) for share in _shares()[:, coarsest:]])
+    length, own, common = np.unravel_index(int(np.argmin(value)), value.shape)
+    if value[0, 0, 0] - value[length, own, common] < settings.least_wave_gain:
+        return Waves()
     reach = median(np.array([np.ptp(photo.s) for photo in told]))
-    return float(np.sqrt(variances[best[0]])), float(_LENGTHS[best[1]] * reach)
+    std = np.sqrt(variances)
+    return Waves(float(std[own]), float(std[common]), float(_LENGTHS[length] * reach))
+
+
+def _surprise(found: Array, counts: Array, share: Array, variances: Array) -> Array:
+    """-2 log likelihood (v, v) of own and common waves of these variances; the polynomials count as independent.
+
+    Parameters
+    ----------
+    found : (photos, 2, k)
+        Components of half the width, and what scatter alone puts there.
+    counts : (photos,)
+        Sections; a component of common waves grows with their root.
+    share : (k,)
+        What waves of unit variance put on each polynomial, per section.
+    """
+    scatter = found[:, 1] + variances[:, None, None] * counts[:, None] * share  # (v, photos, k)
+    component, root = found[:, 0], np.sqrt(counts)[:, None]
+    alone = np.sum(np.log(scatter) + component**2 / scatter, axis=(1, 2))
+    weight, alike = np.sum(root**2 / scatter, axis=1), np.sum(root * component / scatter, axis=1)  # (v, k)
+    added = variances[:, None] * share  # (v, k)
+    grown = 1.0 + added * weight[:, None]  # (v, v, k)
+    return np.asarray(alone[:, None] + np.sum(np.log(grown) - added * alike[:, None] ** 2 / grown, axis=2))
 
 
 def _components(photo: HalfWidths) -> Array:

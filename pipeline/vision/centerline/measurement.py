@@ -27,7 +27,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
-from pipeline.vision.centerline.ground_waves import HalfWidths, edge_waves
+from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.centerline.refusal import (
@@ -225,8 +225,8 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
-def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) -> tuple[float, float]:
-    """Size and length (m) of the waves that ground and camera make in the midlines of all photos of a series."""
+def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) -> Waves:
+    """The waves that ground and camera make in the midlines of all photos of a series."""
     halves = [cable.half_widths(settings.curve) for cable in cables if isinstance(cable, Followed)]
     scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
     return edge_waves(halves, settings.curve, metres_per_px=max(scales, default=0.0))
@@ -236,7 +236,7 @@ def centerline_of(
     followed: Followed,
     settings: VisionSettings,
     told: AxesTold | None = None,
-    waves: tuple[float, float] = (0.0, 0.0),
+    waves: Waves | None = None,
 ) -> Centerline:
     """Record of a followed cable, from foot to foot of the bearing axes.
 
@@ -246,8 +246,8 @@ def centerline_of(
     settings : VisionSettings
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
-    waves : (std m, length m)
-        Of the waves that the ground makes in its midline, see `pipeline.vision.centerline.ground_waves`. They are noise
+    waves : Waves, optional
+        That ground and sheath make in its midline, see `pipeline.vision.centerline.ground_waves`. They are noise
         of the sections; what they do to the curvature the width of each photo tells (`_width_excess`).
     """
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
@@ -257,7 +257,7 @@ def centerline_of(
     fit, covariance = followed.tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
-    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves)
+    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves or Waves())
     length_std = _length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
@@ -297,9 +297,7 @@ def _with_axes(covariance: Array, chord: ChordFrame) -> Array:
     return whole
 
 
-def _shape(
-    fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: tuple[float, float]
-) -> MeasuredShape:
+def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: Waves) -> MeasuredShape:
     """What is measured at arc lengths ``s`` (n,), from the first on; slow errors of light and ground, m."""
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
@@ -323,8 +321,9 @@ def _shape(
         correlation_length=fit.smooth.correlation_length,
         systematic_std=light[0],
         systematic_length=light[1],
-        wave_std=waves[0],
-        wave_length=waves[1],
+        wave_std=waves.own,
+        wave_length=waves.length,
+        common_std=waves.common,
     )
 
 

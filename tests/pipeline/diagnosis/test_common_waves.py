@@ -1,0 +1,49 @@
+"""What photos err alike: the joint whitening against the covariance written out."""
+
+import numpy as np
+import pytest
+
+from pipeline.diagnosis.observations.common_waves import common_waves
+from pipeline.diagnosis.observations.noise import Sections, section_covariance, smooth_basis
+
+LENGTH = 0.18
+COMMON = (2e-6, 8e-3)
+
+
+def sections(count, common=COMMON):
+    s, flat = np.linspace(0.01, 0.17, count), np.zeros(count)
+    std = np.full(count, 4e-6)
+    return Sections(s, s, flat, flat, std, 3, 1e-4, 5e-4, ((3e-6, 0.06), (1e-6, 8e-3)), common)
+
+
+def whitening(own):
+    """Components of the sections along a smooth basis, of unit variance by the photo's own noise; the chord is idle."""
+    root = np.linalg.cholesky(section_covariance(own))
+    design = np.linalg.solve(root, smooth_basis(own.s, LENGTH, functions=12))
+    rows = np.linalg.qr(design)[0].T @ np.linalg.inv(root)
+    return np.hstack([np.zeros((12, 1)), rows])
+
+
+def test_rows_of_all_photos_have_unit_covariance():
+    photos = [sections(60), sections(50), sections(60)]
+    whiten = [whitening(own) for own in photos]
+    found = common_waves(photos, whiten)
+    at = np.concatenate([own.s for own in photos])
+    alike = COMMON[0] ** 2 * np.exp(-0.5 * (np.subtract.outer(at, at) / COMMON[1]) ** 2)
+    whole, ends = np.zeros((36, len(at))), np.cumsum([0, *(len(own.s) for own in photos)])
+    for k, root in enumerate(whiten):
+        whole[12 * k : 12 * k + 12, ends[k] : ends[k + 1]] = root[:, 1:]
+    covariance = np.eye(36) + whole @ alike @ whole.T
+    assert np.linalg.eigvalsh(covariance).max() > 2.0  # what photos err alike matters here
+    mixed = found.whitened(np.eye(36))
+    # directions below a thousandth are left out
+    assert mixed @ covariance @ mixed.T == pytest.approx(np.eye(36), abs=2e-3)
+    assert mixed == pytest.approx(mixed.T)
+    assert found.undone(found.whitened(np.arange(36.0))) == pytest.approx(np.arange(36.0))
+
+
+def test_nothing_alike():
+    photos = [sections(60, (0.0, 0.0))] * 3
+    assert common_waves(photos, [whitening(own) for own in photos]) is None
+    assert common_waves([sections(60)], [whitening(sections(60))]) is None
+    assert common_waves([], []) is None
