@@ -16,7 +16,7 @@ the curve of the seen part alone misses the axes is a figure of quality.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ from pipeline.vision.median import median
 from pipeline.vision.rough import AxisKind, RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
-from rod.measurement import MeasuredShape
+from rod.measurement import MeasuredShape, slow_covariance
 
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
 
@@ -181,7 +181,7 @@ def follow_cable(
         return refused
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
-    covariance = _with_light(fit, *light)
+    covariance = fit.smooth.covariance + _slow(fit, *light)
     covariance *= _width_excess(fit, sections.balance * (width - median(width)), covariance, options) ** 2
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
@@ -247,17 +247,18 @@ def centerline_of(
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
     waves : Waves, optional
-        That ground and sheath make in its midline, see `pipeline.vision.centerline.ground_waves`. They are noise
-        of the sections; what they do to the curvature the width of each photo tells (`_width_excess`).
+        That ground and sheath make in its midline, see `pipeline.vision.centerline.ground_waves`.
     """
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
     options, (middle, scatter) = settings.curve, middle_width(width)
     misses = feet_of_axes(followed.fit, chord)[1]
     metres = median(width / sections.width)
-    fit, covariance = followed.tied(told, settings)
+    waves = waves or Waves()
+    errors = _slow(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
+    fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
-    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves or Waves())
+    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves)
     length_std = _length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
@@ -348,14 +349,13 @@ def _std(basis: Array, covariance: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
 
 
-def _with_light(fit: CurveFit, std: float, length: float) -> Array:
-    """Covariance of q with the light's slow error carried through the fit.
+def _slow(fit: CurveFit, std: float, length: float) -> Array:
+    """Covariance of q that a slow error of the midline makes, carried through the fit.
 
-    The error follows the direction of the cable against the light, a smooth function of s: Gaussian correlation.
+    The light's error follows the direction of the cable against the light, a smooth function of s; that of the edges'
+    waves what lies along them: Gaussian correlation.
     """
-    s = fit.s[fit.weight > 0.0]
-    light = std**2 * np.exp(-0.5 * ((s[:, None] - s[None, :]) / length) ** 2)
-    return np.asarray(fit.smooth.covariance + fit.smooth.gain @ light @ fit.smooth.gain.T)
+    return np.asarray(fit.smooth.gain @ slow_covariance(fit.s[fit.weight > 0.0], ((std, length),)) @ fit.smooth.gain.T)
 
 
 def _width_excess(fit: CurveFit, off_width: Array, covariance: Array, options: CurveSettings) -> float:
