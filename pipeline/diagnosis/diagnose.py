@@ -31,7 +31,7 @@ from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.photo_scatter import with_scattered_photos
-from pipeline.diagnosis.fits.workbench import Workbench, prepare, with_finer_law, with_points
+from pipeline.diagnosis.fits.workbench import Workbench, in_deeper_valley, prepare, with_finer_law, with_points
 from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.presentation.findings import search_ended, too_large
 from pipeline.diagnosis.presentation.part import present
@@ -319,7 +319,8 @@ def _explanations(
 
 def _with_finer_law(bench: Workbench, accepted: Explanation, settings: DiagnosisSettings) -> Explanation:
     """The accepted explanation with f_EI identified again: more control points, and a range that fits its shapes."""
-    finer = with_finer_law(bench.observation, accepted.fitted, settings)
+    finer = in_deeper_valley(bench.observation, accepted.fitted, settings)
+    finer = with_finer_law(bench.observation, finer, settings)
     return replace(accepted, fitted=finer, gain=bench.base.chi2 - finer.chi2)
 
 
