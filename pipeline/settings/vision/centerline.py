@@ -238,6 +238,12 @@ class CurveSettings(StageSettings):
     max_width_scatter: float = Field(
         0.08, gt=0, description="relative, robust, along s; a cable's width is constant within 5 %"
     )
+    max_section_scatter: float = Field(
+        0.025,
+        gt=0,
+        description="of the width, along the normal; 0.006 on the worst of 280 photos of whole rigs, 0.04 and more"
+        " where shades of a white cable on white ground were followed, 20 px beside it",
+    )
     min_contrast_to_noise: float = Field(
         5.0, gt=0, description="ratio; below it false edges win and the errors are not Gaussian"
     )

@@ -37,6 +37,7 @@ from pipeline.vision.centerline.refusal import (
     refusal,
     refusal_beside_axis,
     refusal_of_bend,
+    refusal_of_scatter,
 )
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
@@ -176,7 +177,11 @@ def follow_cable(
     if refused is not None:
         return refused
     fit = _fit(sections, chord, width, breaks_m, options)
-    refused = refusal_beside_axis(rough, fit, chord, width, options) or refusal_of_bend(rough, fit, width, options)
+    refused = (
+        refusal_beside_axis(rough, fit, chord, width, options)
+        or refusal_of_bend(rough, fit, width, options)
+        or refusal_of_scatter(rough, fit, width, options)
+    )
     if refused is not None:
         return refused
     metres = median(width / sections.width)

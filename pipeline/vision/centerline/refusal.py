@@ -151,6 +151,20 @@ def refusal_of_bend(rough: RoughCable, fit: CurveFit, width: Array, options: Cur
     )
 
 
+def refusal_of_scatter(rough: RoughCable, fit: CurveFit, width: Array, options: CurveSettings) -> Rejected | None:
+    """Refuse sections that lie about no smooth curve: what was followed are shades, not the edges of a cable."""
+    share = median(fit.point_std[fit.weight > 0.0]) / middle_width(width)[0]
+    if share <= options.max_section_scatter:
+        return None
+    return Rejected(
+        rough.image,
+        "photo/contrast",
+        f"the middles of what was traced scatter by {100.0 * share:.1f} % of its width about any smooth curve: shades"
+        " were taken for the edges of the cable",
+        figure={"section_scatter": share},
+    )
+
+
 def beside_axis(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
     """Finding about a curve that passes ``miss`` (m) beside an axis, of a cable ``width`` (m) wide."""
     if miss <= 0.5 * options.axis_distance_radii * width:

@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.measurement import measure_centerline
-from pipeline.vision.render import render
+from pipeline.vision.render import Ground, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.scale.plane import PlaneMap
-from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, errors, rough_cable
+from pipeline.vision.series import trace_photo
+from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, directional, errors, rough_cable
 
 
 def even(rng, **options):
@@ -191,3 +192,15 @@ def test_path_beside_the_cable_is_refused(seed):
     # no edges are there: noise is not taken for them, nor for a bad outline
     assert isinstance(found, Rejected) and found.code == "photo/contrast"
     assert found.figure["measured_share"] == 0.0
+
+
+@pytest.mark.parametrize("ground", [Ground("plain", (0.85,) * 3), Ground("cloth", (0.8,) * 3, 0.03)])
+def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
+    rng = np.random.default_rng([96, 112])
+    white = Sheath(colour=(0.85, 0.85, 0.85), gloss=0.2)
+    picture = render(bow_scene(rng, light=directional(rng), sheath=white, ground=ground, noise=0.01))
+    cv2.imwrite(str(tmp_path / "white.png"), picture.pixels)
+    found = trace_photo(tmp_path / "white.png", diameter_px=DIAMETER * 12e3)
+    # 20 and 25 px beside the cable before, with 3.6 and 2 px stated
+    assert isinstance(found, Rejected)
+    assert found.figure["section_scatter"] > 0.025
