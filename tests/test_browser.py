@@ -1,7 +1,7 @@
 """Report and index in a real Chromium: what a reader sees, presses and types.
 
-No network, no errors on the console, no sideways scrolling. Chromium and its driver are Debian's packages ``chromium``
-and ``chromium-driver``; without them these tests fail and say so.
+No network, no errors on the console, no sideways scrolling. What becomes of these tests on a machine without Chromium
+is said in ``tests/conftest.py``.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
 
+pytestmark = pytest.mark.browser
+
 FLAGS = (
     "--headless",
     "--no-sandbox",
@@ -40,15 +42,12 @@ ROWS = 2000
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory):
-    programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
-    missing = [name for name, path in programs.items() if path is None]
-    assert not missing, f"{' and '.join(missing)} missing: apt-get install chromium chromium-driver"
     options = Options()
-    options.binary_location = programs["chromium"]
+    options.binary_location = shutil.which("chromium")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
         options.add_argument(flag)
-    driver = webdriver.Chrome(options=options, service=Service(programs["chromedriver"]))
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     yield driver
     driver.quit()
 
