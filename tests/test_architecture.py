@@ -53,14 +53,14 @@ INSIDE = {
         ("linearised",),
     ],
     "pipeline.diagnosis.statistics": [
-        ("score", "twins", "verdict", "pairs", "gain"),
-        ("smooth_fields", "photo_table", "variance_component"),
+        ("score", "twins", "verdict", "gain"),
+        ("pairs", "smooth_fields", "photo_table", "variance_component"),
         ("leftover",),
     ],
     "pipeline.diagnosis.fits": [
         ("base",),
         ("extension",),
-        ("bending",),
+        ("bending", "step"),
         ("sensitivities",),
         ("fit",),
         ("search", "extended", "stuck_forces", "maps"),

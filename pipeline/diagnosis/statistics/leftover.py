@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from pipeline.diagnosis.observations.observation import KINDS, Observation, Row
 from pipeline.diagnosis.statistics.photo_table import PhotoTable
@@ -159,8 +158,8 @@ def _drawn(
         other &= ~rows
     for rows, doubt in (*((rows, np.sqrt(2.0 / freedom)) for rows, freedom in levels), (other, 0.0)):
         if np.any(rows):
-            triangle = linalg.qr(sums[rows], mode="r")[0][: sums.shape[1]]
-            total += _levels(doubt, draws, rng)[:, None] * (rng.standard_normal((draws, len(triangle))) @ triangle)
+            own = rng.standard_normal((draws, int(rows.sum()))) @ sums[rows]
+            total += _levels(doubt, draws, rng)[:, None] * own
     along, component = total[:, : fitted.shape[1]], total[:, fitted.shape[1] :]
     return component, (flat - along @ fitted[photos.rows.ravel()].T).reshape(noise.shape)
 
