@@ -30,6 +30,7 @@ def answer(test, names):
 ON_LOADING = "bearing_friction displacement_offset hysteresis nonlinear_stiffness"
 IN_THE_PICTURE = "camera_tilt scale_error lens_distortion in_plane_load"
 LOADS = "in_plane_load force_offset displacement_offset"
+DISPLACED = "rig_compliance displacement_offset length_error"
 TURNING_BACK = "bearing_friction hysteresis plastic_set"
 
 BORDERLINE = [
@@ -39,6 +40,10 @@ BORDERLINE = [
     ("six", "camera_tilt", 0.00176, IN_THE_PICTURE, "in_plane_load camera_tilt"),
     ("six", "in_plane_load", 0.03271, LOADS, ""),
     ("six", "in_plane_load", 0.03282, LOADS, "in_plane_load"),
+    ("six", "rig_compliance", 5.624e-6, DISPLACED, "rig_compliance displacement_offset"),
+    ("six", "rig_compliance", 5.644e-6, DISPLACED, "rig_compliance"),
+    ("six", "displacement_offset", 3.806e-6, DISPLACED, ""),
+    ("six", "displacement_offset", 3.817e-6, DISPLACED, "displacement_offset"),
     ("loop", "bearing_friction", 0.0001087, TURNING_BACK, "bearing_friction hysteresis"),
     ("loop", "bearing_friction", 0.000109, TURNING_BACK, "bearing_friction"),
 ]
