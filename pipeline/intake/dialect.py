@@ -19,6 +19,10 @@ from pipeline.errors import InputError
 Decimal = Literal[".", ","]
 Row = tuple[int, list[str]]  # line number from 1, cells
 
+MOST_COLUMNS = 1000
+"""In a line; what stands behind them is left as one cell."""
+HEAD_CHARACTERS = 1_000_000
+"""Of a log that are searched for its header, at most: a table of a thousand columns has a line of 20,000."""
 SEPARATORS = ("\t", ";", ",")
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 OTHER_FILES = {
@@ -104,15 +108,17 @@ def cells(text: str, separator: str, *, most: int | None = None) -> list[Row]:
     Line by line, so that a stray quotation mark cannot swallow the rest of the file.
     """
     rows: list[Row] = []
+    if most is not None:
+        text = text[:HEAD_CHARACTERS]
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip(" \t;,"):
             continue
         if len(rows) == most:
             break
         if '"' in line and len(line) < csv.field_size_limit():
-            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])[: MOST_COLUMNS + 1]
         else:
-            parts = line.split(separator)
+            parts = line.split(separator, MOST_COLUMNS)
         rows.append((number, [part.strip() for part in parts]))
     return rows
 
