@@ -40,6 +40,7 @@ CLOCK_WITH_COMMA = re.compile(r"\d:\d\d,\d+$", re.ASCII)
 INFINITE = ("inf", "-inf", "+inf", "infinity")
 SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
 MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
+DIGITS = frozenset("0123456789")
 # Digit grouping by space or apostrophe, and the typographic minus sign
 _SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
 
@@ -131,7 +132,7 @@ def smooth(cell: str) -> str:
 
 def is_missing(cell: str) -> bool:
     """True for the ways in which programs write "no value", infinity included."""
-    return cell.casefold() in MISSING
+    return not cell or (cell[-1] not in DIGITS and cell.casefold() in MISSING)
 
 
 def decimal_sign(
@@ -161,10 +162,10 @@ def decimal_sign(
     """
     if decimal is not None:
         return decimal
-    written = [smooth(token) for token in tokens if not is_missing(token)]
-    marked = [token for token in written if "." in token or "," in token]
+    marked = [token for token in tokens if ("." in token or "," in token) and not is_missing(token)]
     if not marked or (separator == "," and not any("," in token for token in marked)):
         return "."
+    marked = [smooth(token) for token in marked]
     point = [token for token in marked if not _fits(POINT, token)]
     comma = [token for token in marked if not _fits(COMMA, token)]
     if bool(point) != bool(comma):
@@ -227,6 +228,8 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
 
 def decimals(cell: str, decimal: Decimal) -> int:
     """Digits behind the decimal sign: the resolution of the log."""
+    if PLAIN[decimal].fullmatch(cell):
+        return len(cell.partition(decimal)[2])
     mantissa = EXPONENT.split(smooth(cell), maxsplit=1)
     shift = int(mantissa[1]) if len(mantissa) > 1 else 0
     return len(mantissa[0].partition(decimal)[2].strip()) - shift

@@ -64,7 +64,7 @@ def load_steps(
     """
     name = path.name
     displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
-    left_out = []
+    left_out: list[Finding] = []
     while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs, settings)):
         line, force = samples.lines[wild[0]], quantity(float(samples.forces[wild[0]]), "N")
         message = f"{len(wild)} forces are off by more than the largest of all holds and were left out"
