@@ -20,9 +20,6 @@ from typing import Any, TypeVar
 Item = TypeVar("Item")
 Done = TypeVar("Done")
 
-# An interpreter of its own: a fork inherits locks of threads, and `multiprocessing` runs the caller's script again.
-PROGRAM = "from pipeline.batch.apart import serve; serve()"
-
 
 def apart(
     work: Callable[[Item], Done],
@@ -30,7 +27,7 @@ def apart(
     *,
     seconds: float,
     lost: Callable[[Item, bool], Done],
-    preload: str = __name__,
+    preload: str = "os",
 ) -> Iterator[Done]:
     """Do work on items, in their order.
 
@@ -68,9 +65,10 @@ def apart(
 
 
 def _started(preload: str) -> subprocess.Popen[bytes]:
+    """An interpreter of its own: a fork inherits locks of threads, `multiprocessing` runs the caller's script again."""
     paths = os.pathsep.join(path or os.curdir for path in sys.path)
     child = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, preload],
+        [sys.executable, "-m", __name__, preload],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": paths},
@@ -127,3 +125,7 @@ def serve() -> None:
             question = pickle.load(sys.stdin.buffer)
             pickle.dump(None if question is None else question[0](question[1]), back)
             back.flush()
+
+
+if __name__ == "__main__":
+    serve()

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from pipeline.errors import InputError
+from pipeline.intake.tomltable import shown
 
 Decimal = Literal[".", ","]
 Row = tuple[int, list[str]]  # line number from 1, cells
@@ -237,5 +238,5 @@ def decimals(cell: str, decimal: Decimal) -> int:
 
 def column_names(rows: Sequence[Row]) -> str:
     """The cells of a row for a message: at most ten, in quotes."""
-    names = [repr(cell) for cell in rows[0][1] if cell][:10] if rows else []
+    names = [shown(cell) for cell in rows[0][1] if cell][:10] if rows else []
     return ", ".join(names) or "nothing"
