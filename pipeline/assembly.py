@@ -53,9 +53,9 @@ def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str
         "python": platform.python_version(),
         "libraries": {name: importlib.metadata.version(name) for name in LIBRARIES},
         "inputs_sha256": specimen.hashes,
-        # the language of a report changes no result: the same numbers are the same bytes in every one
-        "settings": settings.model_dump(mode="json", exclude={"report": {"language"}}),
-        "command": command or f"{PROGRAM} run {specimen.folder} -o OUT",
+        # neither workers nor the language of a report change a result: the same numbers are the same bytes
+        "settings": settings.model_dump(mode="json", exclude={"batch": True, "report": {"language"}}),
+        "command": command or f"{PROGRAM} run {specimen.folder.absolute()} -o OUT",
         "clock": {"created_utc": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")},
     }
 
