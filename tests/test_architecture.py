@@ -88,7 +88,9 @@ INSIDE = {
     "pipeline.diagnosis.presentation": [("leftover", "named", "table", "findings"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
-        ("guard", "median", "photo", "rough", "render"),
+        ("guard",),
+        ("photo_file",),
+        ("median", "photo", "rough", "render"),
         ("scale", "search"),
         ("bearings", "centerline", "preview", "wholeness"),
         ("judgement",),

@@ -109,14 +109,15 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
             return outcome
         return _measured(store, order, stages, started)
     except InputError as error:
-        finding = FindingPart(code=error.code, level="error", message=error.sentence)
-        return store_failure(order, finding, started)
+        return store_failure(order, refusal(error), started)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
-        return store_failure(order, _refusal(error), started, trace=traceback.format_exc())
+        return store_failure(order, refusal(error), started, trace=traceback.format_exc())
 
 
-def _refusal(error: Exception) -> FindingPart:
-    """What a reader of the index is told about an error nobody foresaw."""
+def refusal(error: Exception) -> FindingPart:
+    """What is told about an error that costs a specimen: a file of the user, or what nobody foresaw."""
+    if isinstance(error, InputError):
+        return FindingPart(code=error.code, level="error", message=error.sentence)
     told = " ".join(str(error).split())[:300]
     code, message = "specimen/program-error", f"the program failed ({type(error).__name__}: {told}); please report it"
     if isinstance(error, MemoryError):
@@ -129,12 +130,17 @@ def _refusal(error: Exception) -> FindingPart:
 def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
     """Why a specimen is not tried (again); None if it may be."""
     if store.overdue(order.name).exists():
-        message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
-        return FindingPart(code="specimen/timeout", level="error", message=message)
+        return overdue(timeout_s)
     if store.begin(order.name) >= attempts:
         message = f"its process died {attempts} times (out of memory, or a crash in a library); photos may be damaged"
         return FindingPart(code="specimen/worker-died", level="error", message=message)
     return None
+
+
+def overdue(timeout_s: float) -> FindingPart:
+    """What is told of a specimen that took longer than it may."""
+    message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
+    return FindingPart(code="specimen/timeout", level="error", message=message)
 
 
 @contextlib.contextmanager

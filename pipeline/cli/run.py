@@ -76,6 +76,7 @@ def run(
 def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
+    from pipeline.intake.access import is_folder
     from pipeline.intake.folder import find_specimens, find_undescribed, misnamed
 
     specimens: dict[Path, None] = {}
@@ -86,7 +87,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
         except InputError as error:
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
-    for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
+    for folder in find_undescribed((folder for folder in folders if is_folder(folder)), settings):
         other = misnamed(folder)
         if other is not None and folder in folders:
             continue  # said above
