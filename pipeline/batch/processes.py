@@ -84,7 +84,7 @@ def measure_in_processes(
             for worker, *_ in doing.values():
                 if worker.fatter_than(limit):
                     worker.process.kill()
-            for pipe in ended:
+            for pipe in [pipe for pipe in doing if pipe in ended]:
                 worker, order, started = doing.pop(pipe)
                 try:
                     outcome = worker.pipe.recv()
@@ -149,7 +149,7 @@ def _work(pipe: Pipe, by_value: bytes) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     stages = pickle.loads(by_value)
-    with contextlib.suppress(EOFError):  # the parent closed its end
+    with contextlib.suppress(EOFError, OSError):  # the parent closed its end
         while True:
             pipe.send(measure_order(pipe.recv(), stages))
 

@@ -89,7 +89,8 @@ def cheap_stages() -> Stages:
             Path(argument).touch()
             os._exit(1)
         elif wish == "hang":
-            time.sleep(3600.0)
+            grown = b"x" * int(argument or 0)
+            time.sleep(3600.0 + len(grown))
         elif wish == "bug":
             raise ZeroDivisionError("float division by zero")
         elif wish == "memory":

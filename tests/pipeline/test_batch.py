@@ -183,3 +183,11 @@ def test_a_worker_that_dies_once_is_forgiven(tmp_path):
     tally = run_cheaply(tmp_path / "batch", tmp_path / "out", workers=1)
     assert (tally.measured, tally.failed) == (3, 0)
     assert (tmp_path / "died").exists()
+
+
+def test_a_worker_that_grows_too_much_costs_its_specimen(tmp_path):
+    write_specimens(tmp_path / "batch", ["a", "c"])
+    write_specimens(tmp_path / "batch", ["b"], notes="hang 1000000000")
+    tally = run_cheaply(tmp_path / "batch", tmp_path / "out", workers=1, memory_per_worker_gb=0.8)
+    assert (tally.measured, tally.failed) == (2, 1)
+    assert Store(tmp_path / "out").entry("b")["code"] == "specimen/worker-died"
