@@ -85,7 +85,7 @@ def run_batch(
     InputError
         ``out/busy``, ``out/unwritable``, ``batch/no-scheduler``.
     """
-    from pipeline.batch.engine import measure_all  # dask takes half a second to load
+    from pipeline.batch.engine import measure_all
 
     store, stages = Store(out.absolute()), stages or Stages.of_pipeline()
     with store.locked(), _log(store) as log:

@@ -235,6 +235,12 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
     return Outcome(order.name, "failed", finding.message, False, time.monotonic() - started, unstored)
 
 
+def store_death(order: Order, told: str, started: float) -> Outcome:
+    """Store a specimen whose worker ended without an outcome, and not by its fault as far as its notes tell."""
+    finding = FindingPart(code="specimen/worker-died", level="error", message=f"its worker failed ({told})")
+    return store_failure(order, finding, started)
+
+
 def failed_result(order: Order, finding: FindingPart, trace: str | None = None) -> Result:
     """The result of a specimen that could not be measured."""
     provenance = {"command": order.command, "version": order.version}

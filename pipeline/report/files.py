@@ -1,7 +1,11 @@
-"""Writing so that a reader never meets half a file: the text goes beside its place and is moved there when complete."""
+"""Writing so that a reader never meets half a file, not even after a power cut.
+
+The text goes beside its place and is moved there once it is complete and on the disk.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -29,12 +33,29 @@ def write_atomic(path: Path, content: str | bytes) -> Path:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         # mkstemp makes files for the owner alone; a report is read by others as any file of this user is
         mask = os.umask(0)
         os.umask(mask)
         beside.chmod(0o666 & ~mask)
         beside.replace(path)
+        synced(path.parent)
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
     return path
+
+
+def synced(path: Path) -> None:
+    """Wait until a file's content, or a folder's list of names, is on the disk."""
+    if os.name == "nt":
+        return  # Windows syncs only what is open for writing, and opens no folders
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems of networks and devices that cannot
+            raise
+    finally:
+        os.close(handle)
