@@ -158,6 +158,12 @@ class Store:
             return None
         return entry if isinstance(entry, dict) else None
 
+    def forget_row(self, name: str) -> None:
+        """Take the row of the index out of an entry: its result is not what it was."""
+        entry = self.entry(name)
+        if entry is not None and entry.pop("row", None) is not None:
+            write_entry(entry, self.out / name)
+
     def names(self) -> list[str]:
         """Names of all stored specimens in natural order."""
         found = (place.name for place in self.out.iterdir() if (place / ENTRY).is_file())

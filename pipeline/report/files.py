@@ -8,18 +8,19 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 
-def write_atomic(path: Path, content: str | bytes) -> Path:
+def write_atomic(path: Path, content: str | bytes | Iterable[str]) -> Path:
     """Write a file at once or not at all; two writers leave one of their two files, never a mixture.
 
     Parameters
     ----------
     path : Path
         Its folder is made if it does not exist.
-    content : str or bytes
-        Text is written as UTF-8 with the line ends it has.
+    content : str, bytes or iterable of str
+        Text, whole or in pieces, is written as UTF-8 with the line ends it has.
 
     Returns
     -------
@@ -27,12 +28,12 @@ def write_atomic(path: Path, content: str | bytes) -> Path:
         The path given.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    pieces = (content,) if isinstance(content, str | bytes) else content
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     beside = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            file.writelines(piece.encode("utf-8") if isinstance(piece, str) else piece for piece in pieces)
             file.flush()
             os.fsync(file.fileno())
         # mkstemp makes files for the owner alone; a report is read by others as any file of this user is
