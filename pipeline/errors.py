@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+# Letters of a message or a remedy. Both quote files, where a line may have a million; what is cut is their middle.
+LONGEST = 600
+
 
 class InputError(Exception):
     """A file or setting of the user cannot be used: what is wrong, where, and what to do, in one sentence.
@@ -34,12 +37,21 @@ class InputError(Exception):
 
     @property
     def sentence(self) -> str:
-        """One readable sentence: place, trouble, remedy."""
+        """One readable sentence: place, trouble, remedy; one line of letters that a terminal shows and does not obey."""
         place = "" if self.path is None else f"{self.path}{'' if self.line is None else f', line {self.line}'}: "
-        return f"{place}{self.message}; {self.remedy}."
+        return _printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
         return (_rebuild, (self.message, self.path, self.line, self.code, self.remedy))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 100]} ... {text[-95:]}"
+
+
+def _printable(text: str) -> str:
+    """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def _rebuild(message: str, path: Path | str | None, line: int | None, code: str, remedy: str) -> InputError:
