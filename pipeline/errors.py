@@ -6,6 +6,7 @@ nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a 
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
 
 # Letters of a message or a remedy. Both quote files, where a line may have a million; what is cut is their middle.
@@ -37,7 +38,7 @@ class InputError(Exception):
 
     @property
     def sentence(self) -> str:
-        """One readable sentence: place, trouble, remedy; one line of letters that a terminal shows and does not obey."""
+        """One readable sentence: place, trouble, remedy; a single line, and nothing in it that a terminal obeys."""
         place = "" if self.path is None else f"{self.path}{'' if self.line is None else f', line {self.line}'}: "
         return _printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
 
@@ -51,7 +52,7 @@ def _shortened(text: str) -> str:
 
 def _printable(text: str) -> str:
     """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
 
 
 def _rebuild(message: str, path: Path | str | None, line: int | None, code: str, remedy: str) -> InputError:

@@ -20,5 +20,7 @@ def test_a_sentence_is_one_short_line_whatever_it_quotes():
 
 
 def test_a_usual_sentence_is_as_it_was_written():
-    error = InputError("'Weg / µm' is no column", path="Prüfling Ω/force.csv", line=3, code="a/b", remedy="correct it")
-    assert error.sentence == "Prüfling Ω/force.csv, line 3: 'Weg / µm' is no column; correct it."
+    error = InputError(
+        "'Weg\xa0/ µm' is no column", path="Prüfling Ω/force.csv", line=3, code="a/b", remedy="correct it"
+    )
+    assert error.sentence == "Prüfling Ω/force.csv, line 3: 'Weg\xa0/ µm' is no column; correct it."
