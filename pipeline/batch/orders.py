@@ -45,6 +45,8 @@ class Order:
 def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, options: str = "") -> list[Order]:
     """Orders for a batch, in the order of the folders.
 
+    The command in a result names the specimen from anywhere, and no folder of results: the same bytes go into any.
+
     Parameters
     ----------
     folders : sequence of Path
@@ -63,7 +65,7 @@ def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, optio
             out=where,
             settings=settings,
             version=version,
-            command=" ".join(filter(None, ("cablebend run", quoted(folder), "-o", quoted(out), options))),
+            command=" ".join(filter(None, ("cablebend run", quoted(folder.absolute()), "-o OUT", options))),
         )
         for folder, name in zip(folders, result_names(folders, settings), strict=True)
     ]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import signal
+from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -32,7 +35,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; say what a user's file or setting did wrong without a traceback."""
         try:
-            return super().invoke(ctx)
+            with _ended_alike():
+                return super().invoke(ctx)
         except InputError as error:
             click.echo(f"cablebend: {error.sentence}", err=True)
             ctx.exit(2)
@@ -45,6 +49,16 @@ class Commands(click.Group):
             reason = (error.strerror or type(error).__name__).lower()
             click.echo(f"cablebend: {error.filename}: {reason}; check that the place exists and can be used.", err=True)
             ctx.exit(2)
+
+
+@contextlib.contextmanager
+def _ended_alike() -> Iterator[None]:
+    """SIGTERM (`kill`, a shutdown, the time limit of a cluster) ends a command as Ctrl-C does."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
