@@ -121,6 +121,7 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     faults = [
         f"{r.specimen.id} is not usable: {said.reason.rstrip('.')}." for r in (a, b) if not (said := answer(r)).usable
     ]
+    faults += [f"f_EI of {r.specimen.id} is not positive." for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
     if faults:
         return _not_comparable(a, b, methods, " ".join(faults), settings)
     first, second = _log_curve(one), _log_curve(two)

@@ -152,7 +152,8 @@ def _report(result: Result, folder: str, out: Path, settings: ReportSettings) ->
 def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
     words = Words(settings.language)
-    unit = suited((v for row in rows if row.curve for v in row.curve.tangent), "N m²", decimal=words.decimal)
+    curves = (row.curve for row in rows if row.curve and row.usable)
+    unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words, settings))

@@ -111,7 +111,7 @@
   };
   // Bands are {k, v, std, colour, opacity}, lines {k, v, colour, dash, width, class}; key entries {text, colour, dash, opacity}.
   const plot = (place, alt, bands, lines, key) => {
-    const W = Math.max(340, Math.min(640, place.clientWidth)), H = Math.round(60 + W / 2);
+    const W = Math.max(340, Math.min(640, place.clientWidth)), H = Math.max(290, Math.round(60 + W / 2));
     const xs = [...lines, ...bands].flatMap((c) => [c.k[0], c.k[c.k.length - 1]]), ys = [0, ...lines.flatMap((c) => c.v), ...bands.flatMap((c) => c.v.map((v, i) => v + data.half * c.std[i]))];
     const x0 = Math.min(...xs), x1 = Math.max(...xs), y0 = Math.min(...ys), y1 = 1.05 * Math.max(...ys);
     const X = (v) => L + (v - x0) / (x1 - x0 || 1) * (W - L - R), Y = (v) => H - B - (v - y0) / (y1 - y0 || 1) * (H - T - B);
@@ -126,7 +126,7 @@
       const edge = (sign) => path(k, v.map((value, j) => value + sign * data.half * std[j]));
       node(drawn, "path", { d: `M${edge(1).join("L")}L${edge(-1).reverse().join("L")}Z`, fill: colour, "fill-opacity": opacity });
     }
-    for (const { k, v, colour, dash, width, name } of lines) node(drawn, "path", { class: name, d: "M" + path(k, v).join("L"), fill: "none", stroke: colour, "stroke-width": width, "stroke-dasharray": dash });
+    for (const { k, v, colour, dash, width, name, opacity } of lines) node(drawn, "path", { class: name, "stroke-opacity": name === "single" ? opacity : 1, d: "M" + path(k, v).join("L"), fill: "none", stroke: colour, "stroke-width": width, "stroke-dasharray": dash });
     const list = node(place, "ul", { class: "key" });
     for (const { text, colour, dash, opacity } of key) {
       const entry = node(list, "li");
@@ -155,11 +155,17 @@
   find("clear").addEventListener("click", () => tick(rows, false));
 
   const mean = (place, { alt, members, kappa, mean, std, scatter }) => {
-    const single = members.map((index) => ({ k: data.rows[index][0], v: data.rows[index][1], colour: "var(--muted)", width: 0.7, name: "single" }));
+    const single = members.map((index) => ({ k: data.rows[index][0], v: data.rows[index][1], colour: "var(--muted)", width: 0.7, opacity: 0.6, name: "single" }));
     const blue = "var(--inverse)", bands = [{ k: kappa, v: mean, std: scatter, colour: blue, opacity: 0.14 }, { k: kappa, v: mean, std, colour: blue, opacity: 0.3 }];
     const key = [{ text: say.pooled_single, colour: "var(--muted)" }, { text: say.pooled_scatter, colour: blue, opacity: 0.14 }, { text: say.pooled_mean, colour: blue, opacity: 0.3 }];
     plot(place, alt, bands, [...single, { k: kappa, v: mean, colour: blue, width: 2.2, name: "mean" }], key);
   };
-  document.querySelectorAll(".pooled").forEach((place, i) => mean(place, data.pooled[i]));
+  // Figures are drawn when the reader comes near.
+  const places = [...document.querySelectorAll(".pooled")];
+  const near = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) if (isIntersecting && !target.firstChild) mean(target, data.pooled[places.indexOf(target)]);
+  }, { rootMargin: "600px 0px" });
+  for (const place of places) near.observe(place);
+  addEventListener("beforeprint", () => { for (const place of places) if (!place.firstChild) mean(place, data.pooled[places.indexOf(place)]); });
   filter(); overlay();
 })();
