@@ -98,6 +98,7 @@ def cut_everywhere(act: Callable[[Path], None], how: str, before: Path, here: Pa
             assert results(here) == wanted, f"{where}: the same command does not finish"
         if count is not None:
             assert count == n - 1
+            assert left == wanted, f"{how} after the end: something was not on the disk"
             break
     return count
 

@@ -20,13 +20,18 @@ RENAMES, REMOVALS = ("rename", "replace"), ("unlink", "remove", "rmdir")
 
 
 def run_until(n: int, how: str, root: Path, action: Callable[[], None]) -> int | None:
-    """How many operations a child process needed for an action; None if it was cut off before the n-th, from 1."""
+    """How many operations an action needs in a child process; None if it was cut off before the n-th, from 1.
+
+    Power is lost after an action that came to its end, too.
+    """
     there, here = os.pipe()
     child = os.fork()
     if child == 0:
         disk = _Disk(n, how, root)
         with disk.watched():
             action()
+            if how != "killed":
+                disk.lose()
         os.write(here, str(disk.count).encode())
         os._exit(0)
     os.close(here)
