@@ -1,7 +1,7 @@
 """A run and a report cut off before each of their operations on files, by a kill and by a power cut.
 
-``python -m tests.pipeline.cut_batches run|report FOLDER`` prints how many operations there were. After each cut every
-result must be the old one or the new one, whole, and the same command must finish.
+``python -m tests.pipeline.cut_batches run|report killed|power|reordered FOLDER`` prints how many operations there were.
+After each cut every result must be the old one or the new one, whole, and the same command must finish.
 """
 
 import argparse
@@ -57,13 +57,15 @@ def results(out: Path) -> dict[str, dict[str, bytes]]:
     return found
 
 
-def cut_everywhere(act: Callable[[Path], None], before: Path, here: Path, new: set[str]) -> int:
+def cut_everywhere(act: Callable[[Path], None], how: str, before: Path, here: Path, new: set[str]) -> int:
     """Cut an action off before each operation; how many there were.
 
     Parameters
     ----------
     act : callable
         Changes the folder of results it is given.
+    how : str
+        See `run_until`.
     before : Path
         Folder of results at the beginning.
     here : Path
@@ -71,27 +73,33 @@ def cut_everywhere(act: Callable[[Path], None], before: Path, here: Path, new: s
     new : set of str
         Names of results that may be missing after a cut: there was none before.
     """
-    old = results(before)
+    old, pages = results(before), {stored(before)["index.txt"]}
     shutil.copytree(before, here)
     act(here)
     wanted = results(here)
-    assert all(wanted[name] != files for name, files in old.items() if name in wanted)
-    for power in (False, True):
-        for n in range(1, 10_000):
-            shutil.rmtree(here)
-            shutil.copytree(before, here)
-            count = run_until(n, power, here, functools.partial(act, here))
-            where = f"{'power' if power else 'killed'} before operation {n}"
-            with Store(here).locked():
-                left = results(here)
-            for name in wanted:
-                assert left.get(name) in (old.get(name), wanted[name]), f"{where}: {name} is neither old nor new"
-                assert name in left or name in new, f"{where}: {name} is lost"
+    assert all(wanted[name] != files for name, files in old.items())
+    pages.add(stored(here)["index.txt"])
+    begun: list[object] = []  # what the same command began with after a cut; from the same again it ends the same way
+    for n in range(1, 10_000):
+        shutil.rmtree(here)
+        shutil.copytree(before, here)
+        count = run_until(n, how, here, functools.partial(act, here))
+        where = f"{how} before operation {n}"
+        with Store(here).locked():
+            left = results(here)
+        for name in wanted:
+            assert left.get(name) in (old.get(name), wanted[name]), f"{where}: {name} is neither old nor new"
+            assert name in left or name in new, f"{where}: {name} is lost"
+        assert stored(here)["index.txt"] in pages, f"{where}: half a page"
+        state = left, sorted((here / ".cablebend").rglob("*"))
+        if state not in begun:
+            begun.append(state)
             act(here)
             assert results(here) == wanted, f"{where}: the same command does not finish"
-            if count is not None:
-                assert count == n - 1
-                break
+        if count is not None:
+            assert count == n - 1
+            assert left == wanted, f"{how} after the end: something was not on the disk"
+            break
     return count
 
 
@@ -99,6 +107,7 @@ def main() -> None:
     """Make a small batch, cut it off everywhere, print the number of operations."""
     parser = argparse.ArgumentParser()
     parser.add_argument("action", choices=["run", "report"])
+    parser.add_argument("how", choices=["killed", "power", "reordered"])
     parser.add_argument("folder", type=Path)
     given = parser.parse_args()
     batch, before, here = (given.folder / name for name in ("batch", "before", "here"))
@@ -106,12 +115,12 @@ def main() -> None:
     run(batch, here, "first")
     here.rename(before)
     if given.action == "report":
-        count = cut_everywhere(lambda out: report(batch, out, "second"), before, here, set())
+        count = cut_everywhere(lambda out: report(batch, out, "second"), given.how, before, here, set())
     else:
         log = batch / "a/force.csv"
         log.write_text(log.read_text().replace("2.301", "2.302"))
         shutil.rmtree(before / "b")
-        count = cut_everywhere(lambda out: run(batch, out, "second"), before, here, {"b"})
+        count = cut_everywhere(lambda out: run(batch, out, "second"), given.how, before, here, {"b"})
     sys.stdout.write(f"{count}\n")
 
 

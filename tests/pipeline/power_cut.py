@@ -1,9 +1,10 @@
 """A process that dies before the n-th thing it does to files, or whose machine loses power there.
 
 `run_until` runs a function in a child and counts what it does to files: opening for writing, every write, sync, rename,
-removal, new folder, change of mode. Before the n-th the child ends at once; of a write half comes through. With
+removal, new folder, change of mode. Before the n-th the child is ``killed``; of a write half comes through. With
 ``power`` the disk keeps no more than POSIX promises: content that was not synced is gone, names that were not synced
-with their folder too, and renames are undone. (Removals that were not synced stay: to undo them would only help.)
+with their folder too, and renames are undone; ``reordered`` keeps of these renames the last that can do without the
+others. (Removals that were not synced stay: to undo them would only help.)
 """
 
 import builtins
@@ -18,14 +19,19 @@ CUT = 77
 RENAMES, REMOVALS = ("rename", "replace"), ("unlink", "remove", "rmdir")
 
 
-def run_until(n: int, power: bool, root: Path, action: Callable[[], None]) -> int | None:
-    """How many operations a child process needed for an action; None if it was cut off before the n-th, from 1."""
+def run_until(n: int, how: str, root: Path, action: Callable[[], None]) -> int | None:
+    """How many operations an action needs in a child process; None if it was cut off before the n-th, from 1.
+
+    Power is lost after an action that came to its end, too.
+    """
     there, here = os.pipe()
     child = os.fork()
     if child == 0:
-        disk = _Disk(n, power, root)
+        disk = _Disk(n, how, root)
         with disk.watched():
             action()
+            if how != "killed":
+                disk.lose()
         os.write(here, str(disk.count).encode())
         os._exit(0)
     os.close(here)
@@ -69,8 +75,8 @@ class _File:
 class _Disk:
     """What was done to files, and what of it would be left."""
 
-    def __init__(self, n, power, root):
-        self.n, self.power, self.root, self.count = n, power, root, 0
+    def __init__(self, n, how, root):
+        self.n, self.how, self.root, self.count = n, how, root, 0
         self.real = {name: getattr(os, name) for name in (*RENAMES, *REMOVALS, "fsync", "mkdir", "chmod", "open")}
         self.real_open = io.open
         self.files = {}  # by descriptor
@@ -82,7 +88,7 @@ class _Disk:
         self.count += 1
         if self.count == self.n:
             torn()
-            if self.power:
+            if self.how != "killed":
                 self.lose()
             os._exit(CUT)
 
@@ -157,12 +163,20 @@ class _Disk:
 
     def lose(self):
         """Leave on the disk what was synced."""
+        if self.how == "reordered":
+            made = {destination for _, destination, *_ in self.renamed}
+            kept = [entry for entry in self.renamed if entry[0] not in made][-1:]
+            self.renamed = [entry for entry in self.renamed if entry not in kept]
+            for _, destination, *_ in kept:  # so its folder lists it
+                self.unlisted.pop(_inode(destination), None)
         for source, destination, before, _ in reversed(self.renamed):
             if destination.exists() and not source.exists() and source.parent.exists():
                 self.real["replace"](destination, source)
                 if before is not None:
                     with self.real_open(destination, "wb") as file:
                         file.write(before)
+                    self.unlisted.pop(_inode(destination), None)  # a new inode, maybe once another's
+                    self.unsynced.discard(_inode(destination))
         for name in REMOVALS:
             setattr(os, name, self.real[name])
         for path in sorted(self.root.rglob("*"), reverse=True):  # what is in a folder before the folder
