@@ -126,7 +126,7 @@ INSIDE = {
     ],
 }
 PIPELINE = [
-    ("errors",),
+    ("errors", "threads"),
     ("rounding",),
     ("units",),
     ("records",),

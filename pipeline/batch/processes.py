@@ -25,8 +25,9 @@ import psutil
 from dask.system import CPU_COUNT
 
 from pipeline.batch.orders import Order
-from pipeline.batch.specimen import ONE_THREAD, Outcome, Stages, measure_order, store_death
+from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
 from pipeline.settings.batch import BatchSettings
+from pipeline.threads import ONE_THREAD
 
 LOOK_S = 0.2  # between two looks at Ctrl-C and at the memory of the workers while nothing ended
 SHARED = 0.95  # of the memory of this machine, by the workers; the rest is for this process

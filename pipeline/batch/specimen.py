@@ -24,14 +24,12 @@ from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.settings import Settings
+from pipeline.threads import one_thread
 
 Measure = Callable[..., Result]
 Write = Callable[..., None]
 WriteIndex = Callable[[Path, Settings], Iterable[str] | None]  # sentences on specimens that contradict each other
 ENTRY_SCHEMA = "cablebend/entry/1"
-# One thread a worker: processes fill the cores, and threads of libraries beside them only wait for each other.
-THREAD_LIMITS = ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
-ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in THREAD_LIMITS} | {"OPENCV_FOR_THREADS_NUM": "1"}
 
 
 @dataclass(frozen=True)
@@ -169,8 +167,7 @@ def _deadline(seconds: float, note: Path) -> Iterator[None]:
 
 def _measured(store: Store, order: Order, stages: Stages, started: float) -> Outcome:
     """Read, compare with what is stored, measure, store."""
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)  # for workers that were started by others; before the libraries load
+    one_thread()  # for workers that were started by others
     store.place(order.name)  # refuses before the work, not after it
     specimen = read_specimen(order.folder, order.settings.intake)
     mark = fingerprint(specimen, order)

@@ -12,6 +12,7 @@ import click
 
 from pipeline import __version__
 from pipeline.errors import InputError
+from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
 COMMANDS = ("run", "check", "init", "report", "predict", "compare", "demo", "simulate", "design", "explain", "paper")
@@ -71,3 +72,4 @@ def main() -> None:
     Exit codes: 0 all measured; 1 finished, but a specimen failed; 2 usage or configuration; 3 nothing could be
     measured; 130 interrupted, the same command resumes.
     """
+    one_thread()
