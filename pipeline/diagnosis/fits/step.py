@@ -30,9 +30,6 @@ BEND_REACH = 0.2
 SWING = 0.1
 """Share of the lower of two neighbouring control points below which the law between them is held."""
 
-BETWEEN = np.linspace(0.0, 1.0, 7)[1:-1]
-"""Where it is asked for, as shares of the way from one control point to the next."""
-
 INSIDE = 1e-9
 """Of a bound's own scale; what exceeds it by less is rounding."""
 
@@ -71,12 +68,12 @@ def _positive_law(extension: Extension, vector: Array) -> Bounds:
     base = extension.base
     if len(base.knots) < 3:
         return Bounds(np.zeros((0, extension.size)), np.zeros(0))
-    law = base.characteristic(vector)
-    lower = np.repeat(np.minimum(law.ordinates[1:], law.ordinates[:-1]), len(BETWEEN))
-    at = (base.knots[:-1, None] + np.diff(base.knots)[:, None] * BETWEEN).ravel()
-    moves = base.law_directions(vector, at) / lower[:, None]
+    ordinates = base.ordinates(vector)
+    moves = base.between * ordinates
+    lower = np.repeat(np.minimum(ordinates[1:], ordinates[:-1]), len(moves) // (len(ordinates) - 1))
+    law, moves = moves.sum(axis=1) / lower, moves / lower[:, None]
     rows = np.hstack([moves, np.zeros((len(moves), extension.size - moves.shape[1]))])
-    return Bounds(rows, np.minimum(SWING - law.f(at) / lower, 0.0))
+    return Bounds(rows, np.minimum(SWING - law, 0.0))
 
 
 def reach(extension: Extension) -> Bounds:
