@@ -25,7 +25,7 @@ import locket
 
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
-from pipeline.report.files import synced
+from pipeline.report.files import synced, write_atomic
 
 ENTRY = "entry.json"
 WORK = ".cablebend"  # staging, ready, attempts and lock
@@ -188,6 +188,5 @@ class Store:
 
 
 def write_entry(entry: dict[str, Any], folder: Path) -> None:
-    """Write ``entry.json`` into a staged folder."""
-    text = json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True)
-    (folder / ENTRY).write_text(text + "\n", encoding="utf-8")
+    """Write ``entry.json`` into a folder, at once or not at all: one that is in place already may be read meanwhile."""
+    write_atomic(folder / ENTRY, json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True) + "\n")
