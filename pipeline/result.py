@@ -148,7 +148,6 @@ class InversePart(Part):
     pre_curvature_std_per_m: float | None = None
     supported_per_m: tuple[float, float] | None = None
     knots: list[KnotPart] = []
-    knots_chosen_by: str = ""
     curve: Curve | None = None
     misfit: MisfitPart | None = None
     nuisance: dict[str, tuple[float, float]] = Field({}, description="fitted value and std, e.g. scale, length")

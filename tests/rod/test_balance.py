@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rod.balance.compliance import compliance_basis, compliance_curve
+from rod.balance.smoothness import NEAR_REST, smoothnesses
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
-from rod.balance.compliance import compliance_basis, compliance_curve
 from rod.balance.moment_points import moment_points, pointwise_graph
-from rod.balance.smoothness import NEAR_REST, smoothnesses
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import Fading, StickSlip, bent_by_bvp, equilibrium, force_free
 from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, stretched

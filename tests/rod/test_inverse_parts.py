@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from rod.inverse.control_points import fit
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from rod.inverse.control_points import fit
 from rod.inverse.evaluation import evaluate
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
 from rod.inverse.knots import first_slope, place_knots, roughness

@@ -62,7 +62,7 @@ def curve(
     own = base.law_directions(fitted.vector, law.knots)  # the parameters are logarithms
     by_tangent, by_moment = np.zeros((2, points, fitted.extension.size))
     by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own
-    by_moment[:, : own.shape[1]] = law.moment_by_ordinates(K, K0) @ own
+    by_moment[:, : own.shape[1]] = law.moment_by_parameters(K, K0) @ own
     if (bend := base.pre_curvature_index) is not None:
         by_tangent[:, bend] = -_slope(law, K, K0)
         by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
