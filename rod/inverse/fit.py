@@ -40,7 +40,7 @@ SHORTER = 6
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit that ended: model, evaluation at the last unknowns, posterior there, how many of them, and whether settled."""
+    """A fit that ended: model, last evaluation with the posterior there, number of evaluations, and whether settled."""
 
     model: FitModel
     evaluation: Evaluation

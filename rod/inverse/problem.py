@@ -59,12 +59,16 @@ FITS = 1.3
 """The same of a fit that needs no other start: with hundreds of data noise alone stays below it."""
 
 
-def estimate(test: MeasuredTest, *, options: InverseOptions | None = None) -> Estimate:
+def estimate(
+    test: MeasuredTest, *, start: tuple[float, float] | None = None, options: InverseOptions | None = None
+) -> Estimate:
     """Characteristic, pre-curvature and their uncertainty by fitting the simulated experiment.
 
     Parameters
     ----------
     test : MeasuredTest
+    start : (N m^2, 1/m) or None
+        Constant EI and K0 to start from; None takes both from a regression of curvature on moment.
     options : InverseOptions or None
         None means the defaults.
 
@@ -81,6 +85,8 @@ def estimate(test: MeasuredTest, *, options: InverseOptions | None = None) -> Es
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
     law, K0 = regressed(moments, curvatures)
+    if start is not None:
+        law, K0 = replace(law, basis=replace(law.basis, unit=1.0 / start[0]), coefficients=0.0 * law.coefficients), start[1]
     model = fit_model(test, data, law.basis, elements=options.elements)
     best = _from(model, law, K0, options)
     used = best.evaluations
