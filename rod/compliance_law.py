@@ -89,7 +89,8 @@ class LawBasis:
 
     def place(self, moment: ArrayLike) -> Array:
         """Abscissa xi of moments (n,), N m; that of the nearer end outside."""
-        return np.asarray(np.interp(np.asarray(moment, float), self.moments, self.xi[::2]))
+        m = np.clip(np.asarray(moment, float), self.moments[0], self.moments[-1])
+        return np.clip(CubicHermiteSpline(self.moments, self.xi[::2], 1.0 / self.pace[::2])(m), 0.0, 1.0)
 
     def at(self, moment: ArrayLike) -> Array:
         """B-splines (n, p) at moments (n,) N m; those of the nearer end outside."""
@@ -114,17 +115,24 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
         If all moments are zero.
     """
     low, high = _with_rest(low, high)
-    return _basis(np.array([low, high]), np.array([0.0, 1.0]), unit=unit, size=size)
+    span = high - low
+    return _basis(np.array([low, high]), np.array([0.0, 1.0]), lambda m: np.full(m.shape, span), unit=unit, size=size)
 
 
 def refreshed(law: ComplianceLaw, low: float, high: float) -> LawBasis:
     """Basis over the moments [min(low, 0), max(high, 0)] N m with xi the mean share of moment and bend of a law."""
     low, high = _with_rest(low, high)
-    m = np.unique(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments, [low, 0.0, high]]))
+    m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
     m = m[(m >= low) & (m <= high)]
+    m = m[np.append(np.diff(m) > 1e-3 * (high - low) / CELLS, True)]  # rounding puts one moment in two places
+    m[0] = low
     bend = law.bend(m)
     share = 0.5 * ((m - low) / (high - low) + (bend - bend[0]) / (bend[-1] - bend[0]))
-    return _basis(m, share, unit=law.basis.unit, size=law.basis.size)
+
+    def pace(at: Array) -> Array:
+        return np.asarray(2.0 / (1.0 / (high - low) + law.compliance(at) / (bend[-1] - bend[0])))
+
+    return _basis(m, share, pace, unit=law.basis.unit, size=law.basis.size)
 
 
 def _with_rest(low: float, high: float) -> tuple[float, float]:
@@ -143,17 +151,17 @@ def splines(size: int) -> BSpline:
     return BSpline(np.r_[np.zeros(DEGREE), inner, np.ones(DEGREE)], np.eye(size), DEGREE)
 
 
-def _basis(m: Array, share: Array, *, unit: float, size: int) -> LawBasis:
-    """Basis whose abscissa runs through the points (m, share), both increasing, share from 0 to 1."""
+def _basis(m: Array, share: Array, pace_at: Callable[[Array], Array], *, unit: float, size: int) -> LawBasis:
+    """Basis whose abscissa runs through the points (m, share), both increasing, share from 0 to 1, pace dm/dshare."""
     rest_at = float(np.interp(0.0, m, share))
     below = round(CELLS * rest_at)
     ends = np.concatenate([np.linspace(0.0, rest_at, below + 1)[:-1], np.linspace(rest_at, 1.0, CELLS - below + 1)])
     xi = np.empty(2 * ends.size - 1)
     xi[::2], xi[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
-    pace = np.interp(xi, share, np.gradient(m, share)) if m.size > 2 else np.full(xi.size, m[-1] - m[0])
+    pace = pace_at(CubicHermiteSpline(share, m, pace_at(m))(xi))
     moments = _cumulated(pace[:, None], xi)[:, 0]
     rest = int(np.argmin(np.abs(ends - rest_at)))
-    # the pace at points is that of a smooth curve through them: right but for its integral's last digits
+    # to the last digits of the integral
     scale = (m[-1] - m[0]) / moments[-1]
     moments, pace = (moments - moments[rest]) * scale, pace * scale
     table = np.asarray(splines(size)(xi))

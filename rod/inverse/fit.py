@@ -25,7 +25,7 @@ ANNEALED = (30.0, 5.0, 1.0)
 """Factors on the noise, one after the other: a start that is off by a factor of two is ten standard deviations of good
 photos away, where their linearisation says nothing."""
 
-ROUGHLY, FINELY = 0.5, 0.02
+ROUGHLY, FINELY = 0.5, 0.002
 """Standard deviations by which the unknowns may still move where the noise is lowered, and in the end."""
 
 LAW_STEP = 1.0

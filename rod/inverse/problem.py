@@ -84,12 +84,16 @@ def estimate(
     moments, curvatures = moments_and_curvatures(data)
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
-    law, K0 = regressed(moments, curvatures)
-    if start is not None:
-        law, K0 = replace(law, basis=replace(law.basis, unit=1.0 / start[0]), coefficients=0.0 * law.coefficients), start[1]
-    model = fit_model(test, data, law.basis, elements=options.elements)
-    best = _from(model, law, K0, options)
-    used = best.evaluations
+    straight = straight_line(moments, curvatures) if start is None else start
+    basis = moment_basis(float(moments.min()), float(moments.max()), unit=1.0 / straight[0])
+    model = fit_model(test, data, basis, elements=options.elements)
+    line = basis.law(np.zeros(basis.size)), straight[1]
+    used = 0
+    for law, K0 in ([regressed(*line, moments, curvatures)] if start is None else []) + [line]:
+        best = _from(model, law, K0, options)
+        used += best.evaluations
+        if best.posterior is not None:
+            break
     if best.posterior is None or not any(d.at_rest for d in data) or _misfit(best) > FITS:
         if best.posterior is not None:
             law, K0 = best.model.law(best.evaluation.unknowns), best.model.pre_curvature(best.evaluation.unknowns)
@@ -168,17 +172,21 @@ def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:
     return np.concatenate(moments), np.concatenate(curvatures)
 
 
-def regressed(m: Array, K: Array) -> tuple[ComplianceLaw, float]:
-    """Law and K0 (1/m) by a rough regression of curvature on moment, over all photographed points.
-
-    A straight line would do for most cables. One that loses its stiffness early is bent along half of its length at
-    nearly one moment: a line through that lies far from its K0.
-    """
+def straight_line(m: Array, K: Array) -> tuple[float, float]:
+    """Constant EI (N m^2) and K0 (1/m) by a straight line of curvature over moment."""
     slope, K0 = (float(v) for v in np.polyfit(m, K, 1))
     # Noise alone may turn the slope around; its size is still a start.
-    slope = max(abs(slope), ROUGH * float(np.ptp(K)) / float(np.ptp(m)))
-    basis = moment_basis(float(m.min()), float(m.max()), unit=slope)
-    u = np.concatenate([np.zeros(basis.size), [K0]])
+    return float(np.ptp(m)) / max(abs(slope) * float(np.ptp(m)), ROUGH * float(np.ptp(K))), K0
+
+
+def regressed(law: ComplianceLaw, K0: float, m: Array, K: Array) -> tuple[ComplianceLaw, float]:
+    """Law and K0 (1/m) by a rough regression of curvature on moment from a straight line, all points of all photos.
+
+    The line would do for most cables. One that loses its stiffness early is bent along half of its length at nearly one
+    moment: a line through that lies far from its K0.
+    """
+    basis = law.basis
+    u = np.concatenate([law.coefficients, [K0]])
     std = ROUGH * float(np.ptp(K)) * np.sqrt(K.size / INDEPENDENT)
     for _ in range(REGRESSIONS):
         law = basis.law(u[:-1])

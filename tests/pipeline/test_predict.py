@@ -71,10 +71,12 @@ def test_steps_held_back_are_inside_their_bands():
 def test_the_covariance_with_the_pre_curvature_is_read_off_the_moment_band(way, result):
     """Against the covariance of the fit itself, which result.json does not hold."""
     model, u = way.model, way.unknowns
-    law, K0, k = way.characteristic, way.law.pre_curvature, way.model.knots.size
+    law, K0, p = way.characteristic, way.law.pre_curvature, way.model.basis.size
     by_tangent = np.zeros((way.law.kappa.size + 1, u.size))
-    by_tangent[:-1, :k] = law.tangent_by_ordinates(way.law.kappa, K0) * law.ordinates
-    by_tangent[-1, k] = 1.0 / model.length
+    f, m = law.tangent(way.law.kappa, K0), law.moment(way.law.kappa, K0)
+    by_tangent[:-1, :p] = f[:, None] * law.log_tangent_by_parameters(way.law.kappa, K0)
+    by_tangent[:-1, p] = f * law.log_slope(m) * f / model.length  # the law moves along with K0
+    by_tangent[-1, p] = 1.0 / model.length
     exact = by_tangent @ way.covariance @ by_tangent.T
     found = identified_model(result)
     joint = found.factor @ found.factor.T

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rod.balance.compliance import compliance_basis, compliance_curve
-from rod.balance.smoothness import NEAR_REST, smoothnesses
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
 from rod.balance.moment_points import moment_points, pointwise_graph
@@ -129,23 +127,6 @@ def test_pre_curvature_of_cables_that_stiffen_without_a_force_free_photo(law):
     assert np.median([graph.pre_curvature_std for graph in graphs]) < 0.1
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_smoothness_along_moment_and_root_of_the_curvature(which):
-    """A straight line of the one or the other has no roughness along that, and the slope that it was given."""
-    slope, t, near = -0.8, np.linspace(0.0, 1.0, 4001), np.sqrt(NEAR_REST)
-    curvature = (near + t * (np.sqrt(1.0 + NEAR_REST) - near)) ** 2 - NEAR_REST
-    stiffness = np.exp(-slope * 0.5 * (t[1:] + t[:-1]))
-    moment = t if which == 0 else np.concatenate([[0.0], np.cumsum(np.diff(curvature) * stiffness)])
-    basis = compliance_basis(0.0, 0.05, unit=60.0, coefficients=40)
-    log_c = np.interp(t, moment / moment[-1], slope * t)
-    coefficients = np.linalg.lstsq(basis.spline(t), log_c, rcond=None)[0]
-    found = smoothnesses(compliance_curve(basis, coefficients))
-    bent = [coefficients @ smooth.roughness @ coefficients for smooth in found]
-    assert bent[which] < 2e-3 * bent[1 - which]
-    # a root bends within one cell of the splines at rest
-    assert found[which].first_slope @ coefficients == pytest.approx(slope, rel=0.1 if which else 1e-5)
-
-
 def test_checks_are_quiet_on_a_uniform_cable():
     checks = balance(measured(seed=4)).checks
     assert abs(checks["left_right_z"]) < 3.5
@@ -224,20 +205,3 @@ def test_fewer_points_per_photo_change_nothing_beyond_the_band():
     one, two = law_of(test), law_of(test, options=BalanceOptions(points=40))
     assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < one.tangent_std)
     assert max(p.s.size for p in moment_points(test, points=40)) == 40
-
-
-def test_curve_goes_on_beyond_the_moments_met():
-    """Moments corrected for a common error of the axes leave the range: excess, compliance and inverse stay one law."""
-    basis = compliance_basis(-1e-3, 0.05, unit=60.0)
-    curve = compliance_curve(basis, np.linspace(-0.3, 0.4, 10))
-    m = np.array([-2e-3, -1.2e-3, 0.02, 0.052, 0.06])
-    step = 1e-6
-    slope = (curve.excess(m + step) - curve.excess(m - step)) / (2.0 * step)
-    assert np.allclose(slope, curve.compliance(m), rtol=1e-4)  # inside it is a sum over cells
-    assert np.allclose(curve.moment(curve.excess(m)), m, rtol=1e-9)
-    beyond = curve.excess_by_coefficients(m)
-    for k in range(10):
-        moved = curve.coefficients + step * np.eye(10)[k]
-        numeric = (compliance_curve(basis, moved).excess(m) - curve.excess(m)) / step
-        # the quotient errs by half the step, relative, and by rounding over the step
-        assert np.allclose(beyond[:, k], numeric, rtol=1e-5, atol=1e-8)

@@ -76,13 +76,16 @@ def test_far_starts_find_the_same_optimum_of_any_cable(number):
     assert np.all(np.abs(far.tangent - near.tangent) < 0.05 * near.tangent_std)
 
 
-def test_results_scale_with_the_stiffness():
-    unit = law_of(measured(), options=QUICK)
-    other = law_of(measured(law=replace(LAW, EI0=1.0, EI1=0.3)), options=QUICK)
-    # The fit stops within a thousandth of a standard deviation, not at the last digit.
-    assert np.all(np.abs(other.tangent * 5e-3 - unit.tangent) < 0.01 * unit.tangent_std)
-    assert np.allclose(other.tangent_std * 5e-3, unit.tangent_std, rtol=1e-3)
-    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.01 * unit.pre_curvature_std)
+@pytest.mark.parametrize("stiffer", [1e-3, 200.0])
+def test_results_scale_with_the_stiffness(stiffer):
+    """The same photos with all forces larger by a factor: photos made anew differ by 1e-5 in the curvature."""
+    test = measured()
+    steps = tuple(replace(s, force=stiffer * s.force, force_std=stiffer * s.force_std) for s in test.steps)
+    unit, other = law_of(test, options=QUICK), law_of(replace(test, steps=steps), options=QUICK)
+    # The fit stops within a few thousandths of a standard deviation, not at the last digit.
+    assert np.all(np.abs(other.tangent / stiffer - unit.tangent) < 0.005 * unit.tangent_std)
+    assert np.allclose(other.tangent_std / stiffer, unit.tangent_std, rtol=5e-4)
+    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.005 * unit.pre_curvature_std)
 
 
 def test_finer_rods_change_nothing_beyond_a_tenth_of_the_band():
@@ -155,7 +158,10 @@ def test_axes_seen_too_far_apart_are_found_and_leave_the_law_alone(seed, foot):
     steps = tuple(replace(step, picture_centre=(0.1, 0.01)) for step in test.steps)  # not just above the camera's foot
     test = replace(test, steps=steps, axis_parallax_std=2.5e-3, camera_foot_std=0.05)
     result = estimate(test, options=QUICK)
-    assert result.model.nuisance(result.unknowns, "parallax") == pytest.approx(parallax, abs=0.1 * parallax)
+    place = result.model.index("parallax")
+    std = 2.5e-3 * np.sqrt(result.covariance[place, place])
+    assert std < 0.1 * parallax
+    assert result.model.nuisance(result.unknowns, "parallax") == pytest.approx(parallax, abs=3 * std)
     assert rms(result, LAW) < 0.02  # as without the error: 0.3 to 1.2 % by the seed
     assert result.evaluation.chi2("shape")[0] < 1.2 * result.evaluation.chi2("shape")[1]
 
@@ -193,7 +199,9 @@ def test_what_the_model_cannot_follow_widens_the_bands_and_bends_no_nuisance():
     good, bad = estimate(test), estimate(whole)
     assert bad.outcome is not InverseOutcome.NO_EQUILIBRIUM
     assert bad.model.blur[1] > 3.0
-    assert np.median(bad.law.tangent_std) > 3.0 * np.median(good.law.tangent_std)
+    # three forces 15 % too large for one law, three as much too small: their mean is known to 15 % over sqrt(6)
+    assert np.median(bad.law.tangent_std / bad.law.tangent) > 0.9 * 0.15 / np.sqrt(6)
+    assert np.median(bad.law.tangent_std) > 2.0 * np.median(good.law.tangent_std)
     assert all(abs(bad.unknowns[bad.model.index(name)]) < 3.0 for name in ("length", "scale"))
     # Residuals are reported in the noise as stated, not in the blurred one.
     assert bad.evaluation.chi2("force")[0] / 6 > 100.0
