@@ -1,15 +1,16 @@
 """What is known of the form of a law before its data, and the posterior averaged over what is not known of it.
 
 The unknowns of a law are the coefficients a of g = log c on a `rod.compliance_law.LawBasis`, over its abscissa t = xi
-from 0 to 1. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of the densities
+from 0 to 1, or over its root from rest on. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of
 
     rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
     smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
 
-times exp(-(g1(rest) / `REST_SLOPE`)^2 / 2): most cables bend alike to both sides of rest, so their law is flat there.
+times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides of rest.
 They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall smoothly are
-known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone. Nothing is chosen:
-the posterior is the average over both and over all tau, each normalised and weighted by its evidence (Laplace), and the
+known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws that change most
+just beside rest, where covers hide the cable, by those over the root. Nothing is chosen: the posterior is the average
+over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and the
 bands hold what the data leave open.
 
 Both ways to the characteristic read the law through this module; nothing else do they share.
@@ -22,6 +23,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 
 from rod.compliance_law import LawBasis, splines
 
@@ -30,8 +32,12 @@ Array = NDArray[np.float64]
 REACH = 0.25
 """Of the abscissa: so far apart the log compliance of a rough law has forgotten itself."""
 
-REST_SLOPE = 0.5
-"""Prior standard deviation of g1 at rest: a law that falls by a factor of e per half of the range is steep there."""
+REST_SLOPES = (0.5, 3.0)
+"""Prior standard deviations of g1 at rest: of cables that bend alike to both sides, whose law is flat there, and of
+such as were set and are steepest there."""
+
+NEAR_REST = 0.02
+"""Of the abscissa: nearer to rest its root is a straight line. So much lies under the covers of most photos."""
 
 ROUGH, SMOOTH = np.geomspace(0.05, 300.0, 8), np.geomspace(0.05, 300.0, 12)
 """Values of tau: from laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor
@@ -54,22 +60,49 @@ class Priors:
     log_norms: Array
 
 
+def _squares(spline: BSpline, at: Array, weights: Array, pace: Array, bend: Array, turn: Array) -> list[Array]:
+    """Integrals (p, p) of g1^2, g2^2, g3^2 over an abscissa t of which `at` (n,) has dt, d^2t, d^3t by xi."""
+    by_xi = [np.asarray(spline(at, order)) for order in (1, 2, 3)]
+    pace, bend, turn = (v[:, None] for v in (pace, bend, turn))
+    first = by_xi[0] / pace
+    second = (by_xi[1] - first * bend) / pace**2
+    third = (by_xi[2] - 3.0 * second * pace * bend - first * turn) / pace**3
+    return [d.T @ (weights[:, None] * pace * d) for d in (first, second, third)]
+
+
 @lru_cache(maxsize=64)
 def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
-    edges = np.unique(spline.t)
-    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact for products of a cubic's derivatives
+    edges = np.unique(np.append(spline.t, rest))
+    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-4 along its root
     half = 0.5 * np.diff(edges)[:, None]
-    at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()[:, None]
-    first, second, third = (np.asarray(spline(at, order)) for order in (1, 2, 3))
-    squares = [d.T @ (weight * d) for d in (first, second, third)]
-    families = [(squares[1] + squares[0] / REACH**2, ROUGH)]
-    if smooth:
-        families.append((squares[2] + squares[1] + squares[0], SMOOTH))
-    flat = np.asarray(spline(rest, 1)) / REST_SLOPE
+    at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
+    reach = max(rest, 1.0 - rest)
+    root = np.sqrt(np.abs(at - rest) / reach + NEAR_REST)
+    unit = reach * (np.sqrt(1.0 + NEAR_REST) - np.sqrt(NEAR_REST))
+    none = np.zeros_like(at)
+    along = [
+        _squares(spline, at, weight, np.ones_like(at), none, none),
+        _squares(
+            spline,
+            at,
+            weight,
+            0.5 / (unit * root),
+            -0.25 * np.sign(at - rest) / (unit * reach * root**3),
+            0.375 / (unit * reach**2 * root**5),
+        ),
+    ]
+    rise = np.asarray(spline(rest, 1))
     level = np.full((size, size), 1.0 / size)  # B-splines of equal coefficients are the level, which has no prior
-    precisions = np.array([form / tau**2 + np.outer(flat, flat) for form, taus in families for tau in taus])
+    made = []
+    for first, second, third in along:
+        families = [(second + first / REACH**2, ROUGH)]
+        if smooth:
+            families.append((third + second + first, SMOOTH))
+        for slope in REST_SLOPES:
+            made += [form / tau**2 + np.outer(rise, rise) / slope**2 for form, taus in families for tau in taus]
+    precisions = np.array(made)
     return Priors(precisions, 0.5 * np.linalg.slogdet(precisions + level)[1])
 
 

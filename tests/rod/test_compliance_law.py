@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
-from rod.law_prior import REACH, REST_SLOPE, ROUGH, SMOOTH, averaged, priors
+from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, ROUGH, SMOOTH, averaged, priors
 
 RNG = np.random.default_rng(3)
 STEEP = 2.0 * np.tanh((np.arange(COEFFICIENTS) - 12) / 2.0) + 0.2 * RNG.normal(size=COEFFICIENTS)
@@ -73,19 +73,30 @@ def test_a_law_needs_moments():
         moment_basis(0.0, 0.0, unit=1.0)
 
 
+def quadratic(forms, a):
+    """Twice minus the log densities of coefficients a, one per prior and slope at rest."""
+    return np.einsum("i,nij,j->n", a, forms.precisions, a)
+
+
 def test_priors_are_the_integrals_of_the_module():
-    """On a polynomial of degree three, which the splines hold: g = t^3, rest at t = 0."""
+    """Of g = t^3 and g = t, which the splines hold, rest at t = 0; then of g = root, straight over its own abscissa."""
     basis = moment_basis(0.0, 0.05, unit=60.0)
-    t = np.linspace(0.0, 1.0, 200)
-    a = np.linalg.lstsq(splines(basis.size)(t), t**3, rcond=None)[0]
-    slope, bend, third = 9.0 / 5.0, 36.0 / 3.0, 36.0
-    told = np.einsum("i,nij,j->n", a, priors(basis).precisions, a)
-    exact = np.r_[(bend + slope / REACH**2) / ROUGH**2, (third + bend + slope) / SMOOTH**2]
-    assert np.allclose(told, exact, rtol=1e-8)
-    assert np.allclose(told[: ROUGH.size], np.einsum("i,nij,j->n", a, priors(basis, smooth=False).precisions, a))
-    a = np.linalg.lstsq(splines(basis.size)(t), t, rcond=None)[0]
-    flat = 1.0 / REST_SLOPE**2
-    assert np.allclose(np.einsum("i,nij,j->n", a, priors(basis).precisions, a)[ROUGH.size :], 1 / SMOOTH**2 + flat)
+    t = np.linspace(0.0, 1.0, 400)
+    half = (ROUGH.size + SMOOTH.size) * len(REST_SLOPES)
+    cube, line = (np.linalg.lstsq(splines(basis.size)(t), t**n, rcond=None)[0] for n in (3, 1))
+    exact = np.r_[(36.0 / 3.0 + 9.0 / 5.0 / REACH**2) / ROUGH**2, (36.0 + 36.0 / 3.0 + 9.0 / 5.0) / SMOOTH**2]
+    assert np.allclose(quadratic(priors(basis), cube)[:half], np.tile(exact, len(REST_SLOPES)), rtol=1e-8)
+    for k, slope in enumerate(REST_SLOPES):
+        told = quadratic(priors(basis), line)[k * exact.size : (k + 1) * exact.size]
+        assert np.allclose(told, np.r_[1 / REACH**2 / ROUGH**2, 1 / SMOOTH**2] + 1 / slope**2, rtol=1e-8)
+    rough = [form[: ROUGH.size] for form in np.split(quadratic(priors(basis), cube), 2 * len(REST_SLOPES))]
+    assert np.allclose(quadratic(priors(basis, smooth=False), cube), np.concatenate(rough))
+    many = moment_basis(0.0, 0.05, unit=60.0, size=80)
+    root = (np.sqrt(t + NEAR_REST) - np.sqrt(NEAR_REST)) / (np.sqrt(1 + NEAR_REST) - np.sqrt(NEAR_REST))
+    a = np.linalg.lstsq(splines(80)(t), root, rcond=None)[0]
+    at_rest = float(splines(80)(0.0, 1) @ a)
+    told = quadratic(priors(many), a)[half : half + ROUGH.size] - at_rest**2 / REST_SLOPES[0] ** 2
+    assert np.allclose(told, 1 / REACH**2 / ROUGH**2, rtol=0.02)
     level = priors(basis).precisions @ np.ones(basis.size)
     assert np.allclose(level, 0.0, atol=1e-9 * priors(basis).precisions.max())
 
@@ -132,7 +143,7 @@ def test_evidence_tells_smooth_laws_from_those_with_a_step():
         true = 2.0 * erf((at - 0.5) / 0.02) if step else 1.5 * at**2
         value = np.r_[-(true / 0.05 + np.random.default_rng(4).normal(size=at.size)), 0.0]
         weights = averaged(value, J, np.zeros(J.shape[1]), priors(basis)).weights
-        shares.append(float(weights[ROUGH.size :].sum()))
+        shares.append(float(weights.reshape(-1, ROUGH.size + SMOOTH.size)[:, ROUGH.size :].sum()))
     assert shares[0] > 0.5
     assert shares[1] < 0.05
 
