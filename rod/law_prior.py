@@ -1,7 +1,7 @@
 """What is known of the form of a law before its data, and the posterior averaged over what is not known of it.
 
 The unknowns of a law are the coefficients a of g = log c on a `rod.compliance_law.LawBasis`, over its abscissa t = xi
-from 0 to 1, or over its root from rest on. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of
+from 0 to 1, or over the logarithm of its distance from rest. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of
 
     rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
     smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
@@ -9,9 +9,9 @@ from 0 to 1, or over its root from rest on. With g1, g2, g3 the derivatives of g
 times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides of rest.
 They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall smoothly are
 known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws that change most
-just beside rest, where covers hide the cable, by those over the root. Nothing is chosen: the posterior is the average
-over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and the
-bands hold what the data leave open.
+just beside rest, where covers hide the cable, by those over the logarithm. Nothing is chosen: the posterior is the
+average over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and the bands hold
+what the data leave open.
 
 Both ways to the characteristic read the law through this module; nothing else do they share.
 """
@@ -37,7 +37,7 @@ REST_SLOPES = (0.5, 3.0)
 such as were set and are steepest there."""
 
 NEAR_REST = 0.02
-"""Of the abscissa: nearer to rest its root is a straight line. So much lies under the covers of most photos."""
+"""Of the abscissa: nearer to rest its logarithm is a straight line. So much lies under the covers of most photos."""
 
 ROUGH, SMOOTH = np.geomspace(0.05, 300.0, 8), np.geomspace(0.05, 300.0, 12)
 """Values of tau: from laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor
@@ -75,12 +75,12 @@ def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
     edges = np.unique(np.append(spline.t, rest))
-    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-4 along its root
+    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
     half = 0.5 * np.diff(edges)[:, None]
     at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
     reach = max(rest, 1.0 - rest)
-    root = np.sqrt(np.abs(at - rest) / reach + NEAR_REST)
-    unit = reach * (np.sqrt(1.0 + NEAR_REST) - np.sqrt(NEAR_REST))
+    apart = np.abs(at - rest) / reach + NEAR_REST
+    unit, side = reach * np.log((1.0 + NEAR_REST) / NEAR_REST), np.sign(at - rest)
     none = np.zeros_like(at)
     along = [
         _squares(spline, at, weight, np.ones_like(at), none, none),
@@ -88,9 +88,9 @@ def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
             spline,
             at,
             weight,
-            0.5 / (unit * root),
-            -0.25 * np.sign(at - rest) / (unit * reach * root**3),
-            0.375 / (unit * reach**2 * root**5),
+            1.0 / (unit * apart),
+            -side / (unit * reach * apart**2),
+            2.0 / (unit * reach**2 * apart**3),
         ),
     ]
     rise = np.asarray(spline(rest, 1))

@@ -61,7 +61,9 @@ def test_jacobian_against_central_differences(blind, scatter):
         h = np.eye(model.size)[place] * (1e-4 if place < model.laws else 1e-2)
         ahead, behind = (evaluate(model, u + sign * h, starts=here.equilibria).value for sign in (1, -1))
         slope = (ahead - behind) / (2 * h[place])
-        assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * np.abs(slope).max()), place
+        # what moves no residual by a hundredth of its standard deviation is a place of the law that no shape visits
+        largest = max(np.abs(slope).max(), 1e-2)
+        assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * largest), place
 
 
 def test_residuals_are_white_at_the_truth():
@@ -75,7 +77,8 @@ def test_residuals_are_white_at_the_truth():
 
 def test_infinite_residuals_where_no_equilibrium_exists():
     model = model_of(measured())
-    there = evaluate(model, start_of(model) + np.eye(model.size)[model.basis.size] * 10.0)  # K0 of 50 1/m: a coil
+    longer = 0.2 / model.nuisances["scale"]  # chords a fifth longer than measured: beyond the cable's length
+    there = evaluate(model, start_of(model) + np.eye(model.size)[model.index("scale")] * longer)
     assert there.failure is not None
     assert np.all(np.isinf(there.value))
 
