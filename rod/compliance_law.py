@@ -221,7 +221,9 @@ class ComplianceLaw:
         m, b = np.asarray(moment, float), self.basis
         place = b.place(m)
         slope = np.asarray(b.spline(place, 1)) @ self.coefficients / np.interp(place, b.xi, b.pace)
-        return np.where((m >= b.moments[0]) & (m <= b.moments[-1]), slope, 0.0)
+        # the end of a range counts as inside, rounded as it may be
+        outside = np.maximum(b.moments[0] - m, m - b.moments[-1])
+        return np.where(outside <= 1e-9 * b.span, slope, 0.0)
 
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""

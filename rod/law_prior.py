@@ -1,17 +1,18 @@
 """What is known of the form of a law before its data, and the posterior averaged over what is not known of it.
 
 The unknowns of a law are the coefficients a of g = log c on a `rod.compliance_law.LawBasis`, over its abscissa t = xi
-from 0 to 1, or over the logarithm of its distance from rest. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of
+from 0 to 1, or over the logarithm of its distance from rest. With g1, g2, g3 the derivatives of g by t, a prior of one
+form is one of
 
     rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
     smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
 
-times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides of rest.
-They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall smoothly are
-known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws that change most
-just beside rest, where covers hide the cable, by those over the logarithm. Nothing is chosen: the posterior is the
-average over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and the bands hold
-what the data leave open.
+with tau of `TAUS`, times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
+of rest. They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall
+smoothly are known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws
+that change most just beside rest, where covers hide the cable, by those over the logarithm. Nothing is chosen: the
+posterior is the average over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and
+the bands hold what the data leave open.
 
 Both ways to the characteristic read the law through this module; nothing else do they share.
 """
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,28 +41,42 @@ such as were set and are steepest there."""
 NEAR_REST = 0.02
 """Of the abscissa: nearer to rest its logarithm is a straight line. So much lies under the covers of most photos."""
 
-ROUGH, SMOOTH = np.geomspace(0.05, 300.0, 8), np.geomspace(0.05, 300.0, 12)
-"""Values of tau: from laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor
-of two to three apart, over which the posterior hardly changes."""
+TAUS = np.geomspace(0.05, 300.0, 12)
+"""From laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor of two apart,
+over which the posterior hardly changes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Priors:
-    """All priors of a law's form.
+class Family:
+    """Priors of one form with all `TAUS`: precisions ``form / tau^2 + fixed`` of the coefficients.
 
     Attributes
     ----------
-    precisions : (n, p, p)
-        Of the coefficients.
-    log_norms : (n,)
+    form, fixed : (p, p)
+    log_norms : (t,)
         Logarithms of the densities' norms, the level left out.
     """
 
-    precisions: Array
+    form: Array
+    fixed: Array
     log_norms: Array
 
 
-def _squares(spline: BSpline, at: Array, weights: Array, pace: Array, bend: Array, turn: Array) -> list[Array]:
+def family(form: Array, fixed: Array) -> Family:
+    """Family with its norms."""
+    size = len(form)
+    level = np.full((size, size), 1.0 / size)  # B-splines of equal coefficients are the level, which has no prior
+    precisions = form / TAUS[:, None, None] ** 2 + fixed + level
+    return Family(form, fixed, 0.5 * np.linalg.slogdet(precisions)[1])
+
+
+def forms(squares: list[Array], *, smooth: bool) -> list[Array]:
+    """Rough form, and the smooth one if asked for, of the integrals (p, p) of g1^2, g2^2, g3^2."""
+    first, second, third = squares
+    return [second + first / REACH**2, third + second + first][: 1 + smooth]
+
+
+def squares(spline: BSpline, at: Array, weights: Array, pace: Array, bend: Array, turn: Array) -> list[Array]:
     """Integrals (p, p) of g1^2, g2^2, g3^2 over an abscissa t of which `at` (n,) has dt, d^2t, d^3t by xi."""
     by_xi = [np.asarray(spline(at, order)) for order in (1, 2, 3)]
     pace, bend, turn = (v[:, None] for v in (pace, bend, turn))
@@ -71,7 +87,7 @@ def _squares(spline: BSpline, at: Array, weights: Array, pace: Array, bend: Arra
 
 
 @lru_cache(maxsize=64)
-def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
+def _families(size: int, rest: float, *, smooth: bool) -> tuple[Family, ...]:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
     edges = np.unique(np.append(spline.t, rest))
@@ -83,8 +99,8 @@ def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
     unit, side = reach * np.log((1.0 + NEAR_REST) / NEAR_REST), np.sign(at - rest)
     none = np.zeros_like(at)
     along = [
-        _squares(spline, at, weight, np.ones_like(at), none, none),
-        _squares(
+        squares(spline, at, weight, np.ones_like(at), none, none),
+        squares(
             spline,
             at,
             weight,
@@ -94,24 +110,20 @@ def _forms(size: int, rest: float, *, smooth: bool) -> Priors:
         ),
     ]
     rise = np.asarray(spline(rest, 1))
-    level = np.full((size, size), 1.0 / size)  # B-splines of equal coefficients are the level, which has no prior
-    made = []
-    for first, second, third in along:
-        families = [(second + first / REACH**2, ROUGH)]
-        if smooth:
-            families.append((third + second + first, SMOOTH))
-        for slope in REST_SLOPES:
-            made += [form / tau**2 + np.outer(rise, rise) / slope**2 for form, taus in families for tau in taus]
-    precisions = np.array(made)
-    return Priors(precisions, 0.5 * np.linalg.slogdet(precisions + level)[1])
+    return tuple(
+        family(form, np.outer(rise, rise) / slope**2)
+        for integrals in along
+        for slope in REST_SLOPES
+        for form in forms(integrals, smooth=smooth)
+    )
 
 
-def priors(basis: LawBasis, *, smooth: bool = True) -> Priors:
+def priors(basis: LawBasis, *, smooth: bool = True) -> tuple[Family, ...]:
     """All priors of a law's form, or those of rough laws alone.
 
     With few data or much noise a smooth law is always the likeliest; a fit that is on its way takes the rough ones.
     """
-    return _forms(basis.size, float(basis.xi[2 * basis.rest]), smooth=smooth)
+    return _families(basis.size, float(basis.xi[2 * basis.rest]), smooth=smooth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +138,12 @@ class Posterior:
         weight it changes included, since d log(evidence) of each is -(J (its mean - mean))^T dr up to a common term.
     shrinkage : (q, p)
         By how much the mean falls short of a law with the coefficients a, per unit of a.
-    weights : (n,)
+    weights : (f, t)
         Of the priors.
     log_evidence : float
         Of the model, up to a constant of the data.
     law_covariance : (p, p)
-        Of the coefficients by the priors alone, as likely as the data make them, the level held.
+        Of the coefficients by the priors alone, averaged as the data weigh them, the level held.
     """
 
     mean: Array
@@ -142,7 +154,7 @@ class Posterior:
     law_covariance: Array
 
 
-def averaged(value: Array, J: Array, unknowns: Array, forms: Priors) -> Posterior:
+def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ...]) -> Posterior:
     """Average over the priors of the law's form, from the linearisation of a fit.
 
     Parameters
@@ -153,32 +165,31 @@ def averaged(value: Array, J: Array, unknowns: Array, forms: Priors) -> Posterio
         Their derivatives by the unknowns.
     unknowns : (q,)
         Where they were taken: coefficients of the law first, then all others.
-    forms : Priors
+    families : tuple of Family
 
     Strategy: what is no coefficient is eliminated once, by orthogonal factors (in a difference of squares what data
     that agree with each other tell would be lost); every prior acts on what is left, and mean, covariance and response
     of all unknowns are linear in what is found there.
     """
-    p = forms.precisions.shape[1]
+    p = len(families[0].form)
     Q, R = np.linalg.qr(J[:, p:])
     solved = np.linalg.inv(R)
     inner, back, offset = solved @ solved.T, -solved @ (Q.T @ J[:, :p]), -solved @ (Q.T @ value)
     beside, left = J[:, :p] - Q @ (Q.T @ J[:, :p]), value - Q @ (Q.T @ value)
-    schur, pull, chi2 = beside.T @ beside, -beside.T @ left, float(left @ left)
-    a = unknowns[:p]
-    inverses, log_det = _inverted(schur + forms.precisions)
-    toward = pull - forms.precisions @ a
-    moves = np.einsum("nij,nj->ni", inverses, toward)
-    misfit = chi2 + (forms.precisions @ a) @ a - np.sum(toward * moves, axis=1)
-    log_det_rest = 2.0 * float(np.sum(np.log(np.abs(np.diag(R)))))
-    evidence = forms.log_norms - 0.5 * (misfit + log_det + log_det_rest)
+    schur, pull = beside.T @ beside, -beside.T @ left
+    ended = [_conditioned(schur, pull, unknowns[:p], one) for one in families]
+    # what all have in common: the misfit of the data and what the unknowns eliminated fill of it
+    common = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(R)))))
+    evidence = common + np.array([one.evidence for one in ended])
     top = float(evidence.max())
     weights = np.exp(evidence - top)
     log_evidence = top + float(np.log(weights.mean()))
     weights /= weights.sum()
-    move = weights @ moves
-    spread = moves - move
-    covariance = np.tensordot(weights, inverses, 1) + (weights[:, None] * spread).T @ spread
+    move = np.sum([one.vectors @ (w @ one.moves) for one, w in zip(ended, weights, strict=True)], axis=0)
+    covariance = np.zeros((p, p))
+    for one, w in zip(ended, weights, strict=True):
+        spread = one.moves @ one.vectors.T - move
+        covariance += (one.vectors * (w @ (1.0 / one.precisions))) @ one.vectors.T + (w[:, None] * spread).T @ spread
     shrinkage = np.eye(p) - covariance @ schur
     across = back @ covariance
     return Posterior(
@@ -187,21 +198,46 @@ def averaged(value: Array, J: Array, unknowns: Array, forms: Priors) -> Posterio
         np.vstack([shrinkage, back @ shrinkage]),
         weights,
         log_evidence,
-        _typical_covariance(forms, weights),
+        _law_covariance(schur, covariance),
     )
 
 
-def _inverted(precisions: Array) -> tuple[Array, Array]:
-    """Inverses (n, p, p) of precisions, and logs (n,) of their determinants; none of rounding becomes negative."""
-    values, vectors = np.linalg.eigh(precisions)
-    values = np.maximum(values, values.shape[-1] * np.finfo(float).eps * values[:, -1:])
-    inverses = (vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1)
-    return np.asarray(inverses), np.asarray(np.sum(np.log(values), axis=1))
+class _Conditioned(NamedTuple):
+    """One family given the data, in coordinates `vectors` (p, p) in which all its precisions are diagonal.
 
-
-def _typical_covariance(forms: Priors, weights: Array) -> Array:
-    """Covariance of the coefficients by the likely priors: the inverse of their mean precision but for the level.
-
-    A mean of the covariances themselves would be that of the widest priors, however unlikely the data make them.
+    Precisions and moves are (t, p); the logarithm of the evidence (t,) lacks what all families have in common.
     """
-    return np.asarray(np.linalg.pinv(np.tensordot(weights, forms.precisions, 1), rcond=1e-12, hermitian=True))
+
+    vectors: Array
+    precisions: Array
+    moves: Array
+    evidence: Array
+
+
+def _conditioned(schur: Array, pull: Array, a: Array, one: Family) -> _Conditioned:
+    """Posterior for all tau at once: data and form are diagonal in one and the same coordinates."""
+    scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
+    # where rounding is all that data and prior tell, it must not become a negative variance
+    scales = np.maximum(scales, scales.size * np.finfo(float).eps * scales[-1])
+    root = axes / np.sqrt(scales)
+    share, turned = np.linalg.eigh(root.T @ one.form @ root)
+    vectors = root @ turned
+    share = np.clip(share, 0.0, 1.0)
+    precisions = (1.0 - share) + share / TAUS[:, None] ** 2
+    fixed, form = vectors.T @ (one.fixed @ a), vectors.T @ (one.form @ a)
+    toward = vectors.T @ pull - fixed - form / TAUS[:, None] ** 2
+    prior = a @ (one.fixed @ a) + (a @ (one.form @ a)) / TAUS**2
+    gained = np.sum(toward**2 / precisions, axis=1) - prior
+    log_det = np.sum(np.log(precisions), axis=1) + np.sum(np.log(scales))
+    return _Conditioned(vectors, precisions, toward / precisions, one.log_norms + 0.5 * (gained - log_det))
+
+
+def _law_covariance(schur: Array, covariance: Array) -> Array:
+    """Covariance of the one normal prior that would have made of the same data the same posterior.
+
+    Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says nothing.
+    """
+    prior = np.linalg.inv(covariance) - schur
+    precisions, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
+    known = precisions > 1e-9 * precisions[-1]
+    return np.asarray((vectors[:, known] / precisions[known]) @ vectors[:, known].T)

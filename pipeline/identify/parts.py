@@ -74,7 +74,8 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
     values, vectors = np.linalg.eigh(law.log_covariance)
     # Directions below a millionth of the largest variance are rounding.
     keep = values > 1e-6 * values[-1]
-    factor = law.tangent[:, None] * vectors[:, keep] * np.sqrt(values[keep])
+    root = np.sqrt(values[keep])
+    factor = law.tangent[:, None] * vectors[:, keep] * root
     return Curve(
         kappa_per_m=_list(law.kappa),
         moment_Nm=_list(law.moment),
@@ -85,6 +86,7 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
         secant_std_Nm2=_list(law.secant_std),
         supported=[True] * law.kappa.size,
         tangent_factor_Nm2=[_list(row) for row in factor],
+        pre_curvature_factor_per_m=_list(vectors[:, keep].T @ law.rest_covariance / root),
     )
 
 

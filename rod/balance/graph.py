@@ -180,7 +180,9 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     curve, p = found.curve, model.size
     K0, errors = float(found.unknowns[p]), model.errors(found.unknowns)
     met = np.concatenate([d.true_moment(errors) for d in model.data])
-    low, high = K0 + curve.bend(np.array([met.min(), met.max()]))
+    # the abscissa was laid along the regression before: beyond it, by a little at most, nothing is known of the law
+    ends = np.clip([met.min(), met.max()], curve.basis.moments[0], curve.basis.moments[-1])
+    low, high = K0 + curve.bend(ends)
     kappa = np.linspace(float(low), float(high), points)
     m, f = curve.bound(np.array([K0]))(kappa)
     by_moment, by_log = np.zeros((2, m.size, found.unknowns.size))

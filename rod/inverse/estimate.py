@@ -101,7 +101,9 @@ def read_off(
     covariance = posterior.covariance + by_forces @ by_forces.T
     curve, K0 = model.law(u), model.pre_curvature(u)
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
-    kappa = np.linspace(min(visited), max(visited), options.grid)
+    # the abscissa was laid along the fit before the last: beyond it, by a little at most, nothing is known of the law
+    low, high = np.clip([min(visited), max(visited)], K0 + curve.bends[0], K0 + curve.bends[-1])
+    kappa = np.linspace(low, high, options.grid)
     moment, f = curve.bound(np.array([K0]))(kappa)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
     by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)
@@ -135,11 +137,16 @@ def read_off(
         ),
         law_forms=splines @ vectors * np.sqrt(np.maximum(values, 0.0)),
         model=model,
-        evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
+        evaluation=found if model.blur == (1.0, 1.0) else _as_stated(model, found),
         unknowns=u,
         covariance=covariance,
         invisible=invisible_combinations(model, law, covariance, bound=options.invisible),
     )
+
+
+def _as_stated(model: FitModel, found: Evaluation) -> Evaluation:
+    """The same evaluation with the noise as stated."""
+    return evaluate(replace(model, blur=(1.0, 1.0)), found.unknowns, starts=found.equilibria)
 
 
 def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Posterior:

@@ -25,6 +25,9 @@ ANNEALED = (30.0, 5.0, 1.0)
 """Factors on the noise, one after the other: a start that is off by a factor of two is ten standard deviations of good
 photos away, where their linearisation says nothing."""
 
+FOLLOWS = 2.0
+"""Root mean square of whitened residuals above which the simulation does not follow the data; no luck makes as much."""
+
 ROUGHLY, FINELY = 0.5, 0.002
 """Standard deviations by which the unknowns may still move where the noise is lowered, and in the end."""
 
@@ -49,9 +52,23 @@ class Fit:
     settled: bool
 
     @property
-    def chi2(self) -> float:
-        """Sum of squares of all whitened residuals."""
-        return float(self.evaluation.value @ self.evaluation.value)
+    def misfit(self) -> tuple[float, float]:
+        """Root mean square of the residuals of shapes and forces in units of the noise of `model`; 1 where unknown."""
+        shapes, forces = (self._rms(kind) if self.posterior is not None else 1.0 for kind in ("shape", "force"))
+        return shapes, forces
+
+    def _rms(self, kind: str) -> float:
+        chi2, count = self.evaluation.chi2(kind)
+        return float(np.sqrt(chi2 / count)) if count else 1.0
+
+    @property
+    def log_evidence(self) -> float:
+        """Of the data as they are, whatever noise they were fitted with; minus infinity where nothing was fitted."""
+        if self.posterior is None:
+            return -np.inf
+        counts = (self.evaluation.chi2(kind)[1] for kind in ("shape", "force"))
+        louder = sum(count * np.log(blur) for count, blur in zip(counts, self.model.blur, strict=True))
+        return self.posterior.log_evidence - float(louder)
 
     def moments(self) -> tuple[float, float]:
         """Smallest and largest bending moment of the simulated cable over all steps, N m."""
@@ -61,24 +78,38 @@ class Fit:
         return float(m[0]), float(m[1])
 
 
-def fit(model: FitModel, start: Array, *, blur: tuple[float, float] = (1.0, 1.0), evaluations: int = 60) -> Fit:
-    """Fit from the unknowns `start` (q,); noise of shapes and forces is `blur` times as large as stated at least."""
-    used, u = 0, start
-    found = Fit(model, evaluate(model, start), None, 1, False)
+def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
+    """Fit from the unknowns `start` (q,).
+
+    The noise is lowered to what is stated, or as far as the simulation follows the data. Where it does not, its misfit
+    counts as noise from there on: a law that is let follow closer bends to hide what the simulation lacks.
+    """
+    used, found = 1, Fit(model, evaluate(model, start), None, 1, False)
     for factor in ANNEALED:
-        if found.evaluation.failure is not None:
-            break
-        if used:
-            basis = refreshed(found.model.law(found.evaluation.unknowns), *found.moments())
-            model, u = found.model.on(basis, found.evaluation.unknowns)
-        louder = max(factor, blur[0]), max(factor, blur[1])
-        within = FINELY if factor == ANNEALED[-1] else ROUGHLY
-        found = _settle(replace(model, blur=louder), u, found.evaluation, within, evaluations - used, smooth=False)
+        before, within = found, FINELY if factor == ANNEALED[-1] else ROUGHLY
+        found = _quieter(before, (factor, factor), within, evaluations - used)
         used += found.evaluations
+        if max(found.misfit) > FOLLOWS:
+            loud = found if before.posterior is None else before
+            needed = (blur * rms for blur, rms in zip(loud.model.blur, loud.misfit, strict=True))
+            shapes, forces = (noise if noise > FOLLOWS else 1.0 for noise in needed)
+            found = _quieter(loud, (shapes, forces), FINELY, evaluations)
+            used += found.evaluations
+            break
+        if not found.settled:
+            break
     if found.settled:
         found = _settle(found.model, found.evaluation.unknowns, found.evaluation, FINELY, evaluations, smooth=True)
         used += found.evaluations
     return replace(found, evaluations=used)
+
+
+def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations: int) -> Fit:
+    """From a fit on with another noise, the abscissa of the law laid along the law found."""
+    model, u = found.model, found.evaluation.unknowns
+    if found.posterior is not None:
+        model, u = model.on(refreshed(model.law(u), *found.moments()), u)
+    return _settle(replace(model, blur=noise), u, found.evaluation, within, evaluations, smooth=False)
 
 
 def _settle(model: FitModel, start: Array, near: Evaluation, within: float, evaluations: int, *, smooth: bool) -> Fit:

@@ -7,7 +7,7 @@ the law and what is known of its form: `rod.compliance_law`, `rod.law_prior`; th
 
 Strategy: (1) a rough regression of K on P y gives a law and K0; (2) fits from there and, where K0 may have a
 second valley, from both sides of it; the best by its evidence; (3) where the simulation cannot follow the data within
-their noise, the misfit counts as noise and the fit is repeated; (4) bands by propagation, on the visited range only.
+their noise, the misfit counts as noise; (4) bands by propagation, on the visited range only.
 
 Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; f_EI is the
 tangent reading dm/dK; SI units.
@@ -52,11 +52,9 @@ ROUGH, INDEPENDENT, REGRESSIONS = 0.02, 30.0, 12
 """Of the regression that a fit starts from: curvatures are off by that share of their range, so many of them on their
 own, and so many iterations, which need not settle."""
 
-MISFIT = 4.0
-"""Mean square of whitened residuals above which they count as misfit of the simulation, not as luck."""
-
-FITS = 1.3
-"""The same of a fit that needs no other start: with hundreds of data noise alone stays below it."""
+FITS = 1.14
+"""Root mean square of the whitened residuals of photos up to which a fit needs no other start: with hundreds of data
+noise alone stays below it."""
 
 
 def estimate(
@@ -94,23 +92,17 @@ def estimate(
         used += best.evaluations
         if best.posterior is not None:
             break
-    if best.posterior is None or not any(d.at_rest for d in data) or _misfit(best) > FITS:
+    if best.posterior is None or not any(d.at_rest for d in data) or best.model.blur[0] * best.misfit[0] > FITS:
         if best.posterior is not None:
             law, K0 = best.model.law(best.evaluation.unknowns), best.model.pre_curvature(best.evaluation.unknowns)
         apart = SIDE * float(np.ptp(curvatures))
         for begin in (K0 - apart, K0 + apart):
             found = _from(model, law, begin, options)
             used += found.evaluations
-            if _evidence(found) > _evidence(best):
+            if found.log_evidence > best.log_evidence:
                 best = found
     if best.posterior is None:
         return Estimate(_refusal(best.evaluation.failure), iterations=used)
-    blur = blur_needed(best)
-    if max(blur) > 1.0:
-        louder = fit(best.model, best.evaluation.unknowns, blur=blur, evaluations=options.evaluations)
-        used += louder.evaluations
-        best = louder if louder.posterior is not None else best
-    assert best.posterior is not None
     result = read_off(
         best.model,
         best.evaluation,
@@ -134,31 +126,6 @@ def _from(model: FitModel, law: ComplianceLaw, K0: float, options: InverseOption
     if trial.failure is None:
         u = rescaled(model, trial)
     return fit(model, u, evaluations=options.evaluations)
-
-
-def _evidence(found: Fit) -> float:
-    return -np.inf if found.posterior is None else found.posterior.log_evidence
-
-
-def _misfit(found: Fit) -> float:
-    """Mean square of the whitened residuals of data, with the noise as stated."""
-    total, count = np.array([_chi2(found, kind) for kind in ("shape", "force")]).sum(axis=0)
-    return float(total / max(count, 1.0))
-
-
-def _chi2(found: Fit, kind: str) -> tuple[float, int]:
-    chi2, count = found.evaluation.chi2(kind)
-    return chi2 * found.model.blur[("shape", "force").index(kind)] ** 2, count
-
-
-def blur_needed(found: Fit) -> tuple[float, float]:
-    """Factors on the noise of shapes and forces with which the residuals of a fit agree; 1 where they do already."""
-    factors = []
-    for kind in ("shape", "force"):
-        chi2, count = _chi2(found, kind)
-        ratio = chi2 / count if count else 1.0
-        factors.append(float(np.sqrt(ratio)) if ratio > MISFIT else 1.0)
-    return factors[0], factors[1]
 
 
 def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
-from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, ROUGH, SMOOTH, averaged, priors
+from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, averaged, priors
 
 RNG = np.random.default_rng(3)
 STEEP = 2.0 * np.tanh((np.arange(COEFFICIENTS) - 12) / 2.0) + 0.2 * RNG.normal(size=COEFFICIENTS)
@@ -74,41 +74,66 @@ def test_a_law_needs_moments():
         moment_basis(0.0, 0.0, unit=1.0)
 
 
-def quadratic(forms, a):
-    """Twice minus the log densities of coefficients a, one per prior and slope at rest."""
-    return np.einsum("i,nij,j->n", a, forms.precisions, a)
+def quadratic(families, a):
+    """Twice minus the log densities of coefficients a, (families, TAUS)."""
+    return np.array([(a @ one.form @ a) / TAUS**2 + a @ one.fixed @ a for one in families])
 
 
 def test_priors_are_the_integrals_of_the_module():
-    """Of g = t^3 and g = t, which the splines hold, rest at t = 0; then of g = logarithm, straight over its own abscissa."""
+    """Of t^3 and t, which the splines hold, rest at t = 0; then of log t, which is straight over its own abscissa."""
     basis = moment_basis(0.0, 0.05, unit=60.0)
     t = np.linspace(0.0, 1.0, 400)
-    half = (ROUGH.size + SMOOTH.size) * len(REST_SLOPES)
     cube, line = (np.linalg.lstsq(splines(basis.size)(t), t**n, rcond=None)[0] for n in (3, 1))
-    exact = np.r_[(36.0 / 3.0 + 9.0 / 5.0 / REACH**2) / ROUGH**2, (36.0 + 36.0 / 3.0 + 9.0 / 5.0) / SMOOTH**2]
-    assert np.allclose(quadratic(priors(basis), cube)[:half], np.tile(exact, len(REST_SLOPES)), rtol=1e-8)
-    for k, slope in enumerate(REST_SLOPES):
-        told = quadratic(priors(basis), line)[k * exact.size : (k + 1) * exact.size]
-        exact = np.r_[1 / REACH**2 / ROUGH**2, 1 / SMOOTH**2] + 1 / slope**2
-        assert np.allclose(told, exact, rtol=1e-6)  # third derivatives of lines are differences of large numbers
-    rough = [form[: ROUGH.size] for form in np.split(quadratic(priors(basis), cube), 2 * len(REST_SLOPES))]
-    assert np.allclose(quadratic(priors(basis, smooth=False), cube), np.concatenate(rough))
+    rough, smooth = 36.0 / 3.0 + 9.0 / 5.0 / REACH**2, 36.0 + 36.0 / 3.0 + 9.0 / 5.0
+    along, slopes = 2, len(REST_SLOPES)
+    told = quadratic(priors(basis), cube).reshape(along, slopes, 2, TAUS.size)
+    assert np.allclose(told[0], np.outer([rough, smooth], TAUS**-2.0), rtol=1e-8)
+    told = quadratic(priors(basis), line).reshape(along, slopes, 2, TAUS.size)
+    exact = np.outer([1 / REACH**2, 1.0], TAUS**-2.0) + np.array(REST_SLOPES)[:, None, None] ** -2
+    assert np.allclose(told[0], exact, rtol=1e-6)  # third derivatives of lines are differences of large numbers
+    assert np.allclose(quadratic(priors(basis, smooth=False), cube), quadratic(priors(basis), cube)[::2])
     many = moment_basis(0.0, 0.05, unit=60.0, size=80)
     logarithm = np.log1p(t / NEAR_REST) / np.log1p(1.0 / NEAR_REST)
     a = np.linalg.lstsq(splines(80)(t), logarithm, rcond=None)[0]
     at_rest = float(splines(80)(0.0, 1) @ a)
-    told = quadratic(priors(many), a)[half : half + ROUGH.size] - at_rest**2 / REST_SLOPES[0] ** 2
-    assert np.allclose(told, 1 / REACH**2 / ROUGH**2, rtol=0.02)
-    level = priors(basis).precisions @ np.ones(basis.size)
-    assert np.allclose(level, 0.0, atol=1e-9 * priors(basis).precisions.max())
+    told = quadratic(priors(many), a).reshape(along, slopes, 2, TAUS.size)[1, 0, 0] - (at_rest / REST_SLOPES[0]) ** 2
+    assert np.allclose(told, TAUS**-2.0 / REACH**2, rtol=0.02)
+    for one in priors(basis):
+        assert np.allclose((one.form + one.fixed) @ np.ones(basis.size), 0.0, atol=1e-9 * one.form.max())
 
 
 def test_the_norm_of_a_prior_is_that_of_its_density():
     """Over all g but its level the density integrates to one: by the determinant."""
-    forms = priors(moment_basis(0.0, 0.05, unit=60.0))
-    for precision, norm in zip(forms.precisions, forms.log_norms, strict=True):
-        values = np.linalg.eigvalsh(precision)[1:]  # the first is the level, without a prior
-        assert norm == pytest.approx(0.5 * np.sum(np.log(values)), abs=1e-3)
+    for one in priors(moment_basis(0.0, 0.05, unit=60.0)):
+        for tau, norm in zip(TAUS, one.log_norms, strict=True):
+            values = np.linalg.eigvalsh(one.form / tau**2 + one.fixed)[1:]  # the first is the level, without a prior
+            assert norm == pytest.approx(0.5 * np.sum(np.log(values)), abs=1e-3)
+
+
+def test_average_is_that_of_each_prior_by_its_normal_equations():
+    basis, _, _, value, J = data(np.random.default_rng(5))
+    at, p = RNG.normal(size=J.shape[1]), basis.size
+    families = priors(basis)
+    found = averaged(value, J, at, families)
+    means, covariances, evidence = [], [], []
+    for one in families:
+        for tau, norm in zip(TAUS, one.log_norms, strict=True):
+            P = np.zeros((p + 1, p + 1))
+            P[:p, :p] = one.form / tau**2 + one.fixed
+            A = J.T @ J + P
+            means.append(at - np.linalg.solve(A, J.T @ value + P @ at))
+            there = value + J @ (means[-1] - at)
+            covariances.append(np.linalg.inv(A))
+            misfit = there @ there + means[-1] @ P @ means[-1]
+            evidence.append(norm - 0.5 * (misfit + np.linalg.slogdet(A)[1]))
+    weights = np.exp(np.array(evidence) - max(evidence))
+    weights /= weights.sum()
+    mean = weights @ means
+    off = np.array(means) - mean
+    assert np.allclose(found.weights.ravel(), weights, atol=1e-6)
+    assert np.allclose(found.mean, mean, atol=1e-6)
+    whole = np.tensordot(weights, covariances, 1) + (weights[:, None] * off).T @ off
+    assert np.allclose(found.covariance, whole, atol=1e-5 * whole.max())
 
 
 def data(rng, noise=0.05):
@@ -145,9 +170,9 @@ def test_evidence_tells_smooth_laws_from_those_with_a_step():
         true = 2.0 * erf((at - 0.5) / 0.02) if step else 1.5 * at**2
         value = np.r_[-(true / 0.05 + np.random.default_rng(4).normal(size=at.size)), 0.0]
         weights = averaged(value, J, np.zeros(J.shape[1]), priors(basis)).weights
-        shares.append(float(weights.reshape(-1, ROUGH.size + SMOOTH.size)[:, ROUGH.size :].sum()))
-    assert shares[0] > 0.5
+        shares.append(float(weights[1::2].sum()))
     assert shares[1] < 0.05
+    assert shares[0] > 5.0 * shares[1]
 
 
 @pytest.mark.parametrize("strength", [1e3, 1e6, 1e8])
