@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rod.compliance_law import ComplianceLaw
 from rod.inverse.evaluation import Evaluation, evaluate
@@ -110,15 +111,16 @@ def read_off(
     by_moment[:, p] = -f / model.length
     by_log[:, :p] = curve.log_tangent_by_parameters(kappa, K0)
     by_log[:, p] = curve.log_slope(moment) * f / model.length
+    scale = _unknown_scale(model, found, by_log @ covariance @ by_log.T)
     law = propagated(
         kappa,
         K0,
         moment=moment,
         tangent=f,
-        by_moment=by_moment,
-        by_log=by_log,
-        by_pre_curvature=np.eye(u.size)[p] / model.length,
-        covariance=covariance,
+        by_moment=np.column_stack([by_moment, scale * moment]),
+        by_log=np.column_stack([by_log, np.full(kappa.size, scale)]),
+        by_pre_curvature=np.eye(u.size + 1)[p] / model.length,
+        covariance=block_diag(covariance, 1.0),
     )
     splines = model.basis.at(moment)
     values, vectors = np.linalg.eigh(posterior.law_covariance)
@@ -142,6 +144,16 @@ def read_off(
         covariance=covariance,
         invisible=invisible_combinations(model, law, covariance, bound=options.invisible),
     )
+
+
+def _unknown_scale(model: FitModel, found: Evaluation, log_covariance: Array) -> float:
+    """Standard deviation of a common factor of f by which the covariance (n, n) of log f falls short of the forces.
+
+    Only forces tell it, and no law knows it better. A prior of its form over an abscissa of moments holds it all the
+    same: by nothing where forces are good to a per cent, too sharply where they contradict each other by many.
+    """
+    known = [(s.simulated.force / (s.data.step.force_std * model.blur[1])) ** 2 for s in found.steps if s.force]
+    return float(np.sqrt(max(1.0 / sum(known) - float(log_covariance.mean()), 0.0)))
 
 
 def _as_stated(model: FitModel, found: Evaluation) -> Evaluation:

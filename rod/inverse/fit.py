@@ -91,9 +91,7 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         used += found.evaluations
         if max(found.misfit) > FOLLOWS:
             loud = found if before.posterior is None else before
-            needed = (blur * rms for blur, rms in zip(loud.model.blur, loud.misfit, strict=True))
-            shapes, forces = (noise if noise > FOLLOWS else 1.0 for noise in needed)
-            found = _quieter(loud, (shapes, forces), FINELY, evaluations)
+            found = _quieter(loud, _needed(loud, found), FINELY, evaluations)
             used += found.evaluations
             break
         if not found.settled:
@@ -102,6 +100,15 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         found = _settle(found.model, found.evaluation.unknowns, found.evaluation, FINELY, evaluations, smooth=True)
         used += found.evaluations
     return replace(found, evaluations=used)
+
+
+def _needed(loud: Fit, quiet: Fit) -> tuple[float, float]:
+    """Noise of shapes and forces with which residuals agree: by the last fit that followed them, as stated at least."""
+    needed = []
+    for one, other, kind in zip(loud.misfit, quiet.misfit, (0, 1), strict=True):
+        rms = loud.model.blur[kind] * one if other > FOLLOWS else quiet.model.blur[kind] * other
+        needed.append(rms if rms > FOLLOWS else 1.0)
+    return needed[0], needed[1]
 
 
 def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations: int) -> Fit:
