@@ -76,45 +76,36 @@ def forms(squares: list[Array], *, smooth: bool) -> list[Array]:
     return [second + first / REACH**2, third + second + first][: 1 + smooth]
 
 
-def squares(spline: BSpline, at: Array, weights: Array, pace: Array, bend: Array, turn: Array) -> list[Array]:
-    """Integrals (p, p) of g1^2, g2^2, g3^2 over an abscissa t of which `at` (n,) has dt, d^2t, d^3t by xi."""
-    by_xi = [np.asarray(spline(at, order)) for order in (1, 2, 3)]
-    pace, bend, turn = (v[:, None] for v in (pace, bend, turn))
-    first = by_xi[0] / pace
-    second = (by_xi[1] - first * bend) / pace**2
-    third = (by_xi[2] - 3.0 * second * pace * bend - first * turn) / pace**3
-    return [d.T @ (weights[:, None] * pace * d) for d in (first, second, third)]
+def integrals(spline: BSpline, rest: float | None = None) -> list[Array]:
+    """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or over its logarithm from `rest` on."""
+    edges = np.unique(spline.t if rest is None else np.append(spline.t, rest))
+    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
+    half = 0.5 * np.diff(edges)[:, None]
+    at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
+    # dt, d^2t, d^3t by xi
+    pace, bend, turn = np.ones_like(at), np.zeros_like(at), np.zeros_like(at)
+    if rest is not None:
+        reach = max(rest, 1.0 - rest)
+        apart = np.abs(at - rest) / reach + NEAR_REST
+        pace = 1.0 / (reach * np.log((1.0 + NEAR_REST) / NEAR_REST) * apart)
+        bend, turn = -np.sign(at - rest) * pace / (reach * apart), 2.0 * pace / (reach * apart) ** 2
+    first, second, third = (np.asarray(spline(at, order)).T for order in (1, 2, 3))
+    first = first / pace
+    second = (second - first * bend) / pace**2
+    third = (third - 3.0 * second * pace * bend - first * turn) / pace**3
+    return [(d * weight * pace) @ d.T for d in (first, second, third)]
 
 
 @lru_cache(maxsize=64)
 def _families(size: int, rest: float, *, smooth: bool) -> tuple[Family, ...]:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
-    edges = np.unique(np.append(spline.t, rest))
-    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
-    half = 0.5 * np.diff(edges)[:, None]
-    at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
-    reach = max(rest, 1.0 - rest)
-    apart = np.abs(at - rest) / reach + NEAR_REST
-    unit, side = reach * np.log((1.0 + NEAR_REST) / NEAR_REST), np.sign(at - rest)
-    none = np.zeros_like(at)
-    along = [
-        squares(spline, at, weight, np.ones_like(at), none, none),
-        squares(
-            spline,
-            at,
-            weight,
-            1.0 / (unit * apart),
-            -side / (unit * reach * apart**2),
-            2.0 / (unit * reach**2 * apart**3),
-        ),
-    ]
     rise = np.asarray(spline(rest, 1))
     return tuple(
         family(form, np.outer(rise, rise) / slope**2)
-        for integrals in along
+        for squares in (integrals(spline), integrals(spline, rest))
         for slope in REST_SLOPES
-        for form in forms(integrals, smooth=smooth)
+        for form in forms(squares, smooth=smooth)
     )
 
 
@@ -142,8 +133,8 @@ class Posterior:
         Of the priors.
     log_evidence : float
         Of the model, up to a constant of the data.
-    law_covariance : (p, p)
-        Of the coefficients by the priors alone, averaged as the data weigh them, the level held.
+    information : (p, p)
+        Of the data on the coefficients.
     """
 
     mean: Array
@@ -151,7 +142,20 @@ class Posterior:
     shrinkage: Array
     weights: Array
     log_evidence: float
-    law_covariance: Array
+    information: Array
+
+    @property
+    def law_covariance(self) -> Array:
+        """Covariance (p, p) of the one normal prior that would have made of the same data the same posterior.
+
+        Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says
+        nothing.
+        """
+        p = len(self.information)
+        prior = np.linalg.inv(self.covariance[:p, :p]) - self.information
+        precisions, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
+        known = precisions > 1e-9 * precisions[-1]
+        return np.asarray((vectors[:, known] / precisions[known]) @ vectors[:, known].T)
 
 
 def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ...]) -> Posterior:
@@ -198,7 +202,7 @@ def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ..
         np.vstack([shrinkage, back @ shrinkage]),
         weights,
         log_evidence,
-        _law_covariance(schur, covariance),
+        schur,
     )
 
 
@@ -230,14 +234,3 @@ def _conditioned(schur: Array, pull: Array, a: Array, one: Family) -> _Condition
     gained = np.sum(toward**2 / precisions, axis=1) - prior
     log_det = np.sum(np.log(precisions), axis=1) + np.sum(np.log(scales))
     return _Conditioned(vectors, precisions, toward / precisions, one.log_norms + 0.5 * (gained - log_det))
-
-
-def _law_covariance(schur: Array, covariance: Array) -> Array:
-    """Covariance of the one normal prior that would have made of the same data the same posterior.
-
-    Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says nothing.
-    """
-    prior = np.linalg.inv(covariance) - schur
-    precisions, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
-    known = precisions > 1e-9 * precisions[-1]
-    return np.asarray((vectors[:, known] / precisions[known]) @ vectors[:, known].T)

@@ -102,7 +102,7 @@ def test_common_errors_move_the_estimate_as_told():
 def test_a_smooth_law_falls_short_by_nothing():
     """A constant stiffness is what the prior expects; between straight line and bent law it takes a part."""
     graph = law_of(measured())
-    assert np.allclose(graph.shortfall.sum(axis=1), 0.0, atol=1e-8)  # rounding
+    assert np.allclose(graph.shortfall.sum(axis=1), 0.0, atol=1e-6)  # rounding of large third derivatives
     t = (graph.kappa - graph.kappa[0]) / np.ptp(graph.kappa)
     assert np.abs(graph.shortfall @ t).max() < 0.1 * np.abs(graph.shortfall @ np.sin(9 * t)).max()
 
