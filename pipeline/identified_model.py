@@ -3,14 +3,8 @@
 What belongs to the cable goes with it into any other experiment: friction between its wires, set, stiffness and
 pre-curvature that vary along it. What belongs to rig, load cell or camera stays behind.
 
-Uncertainty: the result holds f on a grid K_j with F F^T its covariance, K0 with its standard deviation, and the
-standard deviation of the moment m(K) = int_{K0}^{K} f dk. Because of
-
-    dm(K) = int_{K0}^{K} df dk - f(K0) dK0,
-
-the last contains the covariance of K0 with f:  2 f(K0) cov(K0, int df) = var(int df) + f(K0)^2 var(K0) - var(m).
-`identified_model` reads it off there, so that forces get the band that belongs to the moment curve: errors of f and
-of K0 largely cancel in it. Amounts and forms of causes have rows of their own beside F.
+Uncertainty: the result holds f on a grid K_j with F F^T its covariance, and g with F g its covariance with K0. Errors
+of f and of K0 largely cancel in the moment, and so in forces. Amounts and forms of causes have rows beside F.
 
 Signs and units: SI; amounts in the units of their causes.
 """
@@ -22,7 +16,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
 from pipeline.diagnosis.causes.law import LAW
@@ -34,10 +27,6 @@ from rod.characteristic import Characteristic
 
 Array = NDArray[np.float64]
 Zero = Literal["natural", "length"]
-
-RESOLVED = 1e-2
-"""Share of the largest moment band below which a direction of the covariance tells nothing about its link to K0: the
-integrals are trapezoidal sums, right to about 1e-4."""
 
 IN_THE_LAW = (LAW,)
 """Causes of the cable that are in its characteristic already."""
@@ -142,25 +131,21 @@ def identified_model(result: Result) -> IdentifiedModel | None:
         return None
     K0, std = pre_curvature(result, curve)
     law = Characteristic.from_ordinates(curve.kappa, curve.tangent)
-    factor = _joint_factor(curve, K0, std)
+    factor = _joint_factor(curve, std)
     forms = _forms(result, columns=factor.shape[1]) if curve.method == "extended" else ()
     return IdentifiedModel(curve.method, law, K0, factor, (float(curve.kappa[0]), float(curve.kappa[-1])), forms)
 
 
-def _joint_factor(curve: Visited, K0: float, std: float) -> Array:
+def _joint_factor(curve: Visited, std: float) -> Array:
     """Factor of the joint covariance of f along the curve and K0, (n + 1, r); see the module.
 
     Without a factor of f its errors are taken as one common factor on the whole curve: the widest band of a force.
     """
-    F = curve.factor if curve.factor.shape[1] else curve.tangent_std[:, None]
-    rise = cumulative_trapezoid(F, curve.kappa, axis=0, initial=0)
-    rise -= np.array([np.interp(K0, curve.kappa, column) for column in rise.T])  # int_{K0}^{K} of each column
-    f0 = float(np.interp(K0, curve.kappa, curve.tangent))
-    linked = (np.sum(rise**2, axis=1) + (f0 * std) ** 2 - curve.moment_std**2) / (2.0 * f0)
-    size = RESOLVED * np.linalg.norm(rise, axis=1).max()
-    link = np.linalg.solve(rise.T @ rise / size**2 + np.eye(F.shape[1]), rise.T @ linked / size**2)
+    F, link = curve.factor, curve.rest_factor
+    if not F.shape[1]:
+        F, link = curve.tangent_std[:, None], np.zeros(1)
     length = float(np.linalg.norm(link))
-    link *= min(1.0, std / length) if length > 0.0 else 0.0  # a correlation of one at most
+    link = link * (min(1.0, std / length) if length > 0.0 else 0.0)  # a correlation of one at most, rounded
     own = np.sqrt(max(std**2 - float(link @ link), 0.0))
     return np.block([[F, np.zeros((len(F), 1))], [link[None, :], np.array([[own]])]])
 

@@ -37,6 +37,8 @@ class Visited:
     tangent, tangent_std, secant, secant_std : (n,) N m^2
     factor : (n, r) N m^2
         Factor F with F F^T the covariance of the tangent; r = 0 where it is not known.
+    rest_factor : (r,) 1/m
+        With F rest_factor the covariance of the tangent with the pre-curvature; zeros where it is not known.
     """
 
     method: str
@@ -48,6 +50,7 @@ class Visited:
     secant: Array
     secant_std: Array
     factor: Array
+    rest_factor: Array
 
     def rest(self) -> tuple[float, float]:
         """Curvature of zero moment and its standard deviation, which is that of the moment there over f; 1/m."""
@@ -74,6 +77,8 @@ def visited(method: str, curve: Curve | None) -> Visited | None:
     def kept(values: list[float] | list[list[float]]) -> Array:
         return np.asarray(values, dtype=np.float64)[keep]
 
+    factor = kept(curve.tangent_factor_Nm2) if curve.tangent_factor_Nm2 else np.zeros((keep.size, 0))
+    rest = np.asarray(curve.pre_curvature_factor_per_m, dtype=np.float64)
     return Visited(
         method=method,
         kappa=kept(curve.kappa_per_m),
@@ -83,7 +88,8 @@ def visited(method: str, curve: Curve | None) -> Visited | None:
         tangent_std=kept(curve.tangent_std_Nm2),
         secant=kept(curve.secant_Nm2),
         secant_std=kept(curve.secant_std_Nm2),
-        factor=kept(curve.tangent_factor_Nm2) if curve.tangent_factor_Nm2 else np.zeros((keep.size, 0)),
+        factor=factor,
+        rest_factor=rest if rest.size == factor.shape[1] else np.zeros(factor.shape[1]),
     )
 
 

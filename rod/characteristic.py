@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +63,18 @@ class MomentCurve(Protocol):
 
     def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Energy per length int_{K0}^{K} m dk, N."""
+
+
+@runtime_checkable
+class ParametricCurve(MomentCurve, Protocol):
+    """A moment curve with numbers that a fit may move: control points, or coefficients."""
+
+    @property
+    def parameters(self) -> int:
+        """How many."""
+
+    def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of the moment by them at fixed curvature, (n, p)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +194,7 @@ class Characteristic:
         u = np.abs(u) if even else u
         at = np.linspace(u.min(), u.max(), knots) if isinstance(knots, int) else np.asarray(knots, float)
         unit = cls(at, np.ones_like(at), reading, even, abscissa)
-        columns = unit.moment_by_ordinates(K, K0)
+        columns = unit.moment_by_parameters(K, K0)
         scales = np.max(np.abs(columns), axis=0, initial=0.0)
         if free_zero:
             columns = np.column_stack([columns, np.full(K.size, scales.max(initial=0.0))])
@@ -261,7 +273,12 @@ class Characteristic:
 
         return moment_and_tangent
 
-    def moment_by_ordinates(self, K: ArrayLike, K0: ArrayLike) -> Array:
+    @property
+    def parameters(self) -> int:
+        """Number of control points."""
+        return int(self.knots.size)
+
+    def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment with respect to the control points, (n, p) in 1/m; exact, m is linear in them."""
         u, u0, D = self._arguments(K, K0)
         c = self._pieces.cardinal

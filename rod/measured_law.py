@@ -34,6 +34,8 @@ class MeasuredLaw:
         With ``moment_std``, ``tangent_std``, ``secant_std``.
     log_covariance : (n, n)
         Joint covariance of log(tangent) on the grid.
+    rest_covariance : (n,) 1/m
+        Covariance of log(tangent) with the pre-curvature.
     gains : dict
         Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
         same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
@@ -58,6 +60,7 @@ class MeasuredLaw:
     secant: Array
     secant_std: Array
     log_covariance: Array
+    rest_covariance: Array
     gains: dict[Source, Array] = field(default_factory=dict)
     shortfall: Array = field(default_factory=lambda: np.empty((0, 0)))
     loaded_pre_curvature: float = np.nan
@@ -110,4 +113,5 @@ def propagated(
         secant=np.where(near, tangent, moment / D),
         secant_std=std(by_secant),
         log_covariance=by_log @ covariance @ by_log.T,
+        rest_covariance=by_log @ covariance @ by_pre_curvature,
     )

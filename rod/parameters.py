@@ -8,7 +8,7 @@ A parameter is a name, or a pair of a name and a basis along the cable:
 =======================  ======================================================================  =============
 name                     what changes                                                            unit
 =======================  ======================================================================  =============
-``ordinates``            every control point of the characteristic, one column each              N m^2
+``ordinates``            every control point or coefficient of the law, one column each            N m^2, -
 ``pre_curvature``        K0, uniformly; or a basis of K0(s)                                      1/m
 ``stiffness_profile``    EI(s) relative, uniformly; or a basis                                   -
 ``chord``                imposed distance of the axes, of each step                              m
@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, Characteristic, MomentCurve
+from rod.characteristic import Array, MomentCurve, ParametricCurve
 
 Basis = ArrayLike | Callable[[Array], ArrayLike] | Sequence[Callable[[Array], ArrayLike]]
 
@@ -168,7 +168,7 @@ def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions
     names = tuple(name for block in blocks for name in block[0])
     q, joints = len(names), test.rod.section.pre_curvature.size
     law, friction = test.characteristic, test.friction
-    p = law.knots.size if isinstance(law, Characteristic) else 0
+    p = law.parameters if isinstance(law, ParametricCurve) else 0
     e = 0 if friction is None else friction.stick.size
     pre_curvature, profile, ordinates, edges, slip, stick = (
         np.zeros((q, size)) for size in (joints, joints, p, joints + 1, e, e)
@@ -269,9 +269,9 @@ def _block(test: BendingTest, parameter: Parameter) -> tuple[tuple[str, ...], st
     if given is not None:
         raise ValueError(f"{name} takes no basis")
     if name == "ordinates":
-        if not isinstance(test.characteristic, Characteristic):
-            raise ValueError("only a Characteristic has ordinates")
-        p = test.characteristic.knots.size
+        if not isinstance(test.characteristic, ParametricCurve):
+            raise ValueError("only a law with parameters has ordinates")
+        p = test.characteristic.parameters
         return tuple(f"ordinates[{i}]" for i in range(p)), name, np.eye(p)
     return (name,), name, None
 

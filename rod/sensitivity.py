@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, Characteristic
+from rod.characteristic import Array, ParametricCurve
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System
@@ -235,8 +235,8 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
         by_read = law.moment_by_pre_curvature(read.at, K0) * move
         if read.by_set:
             by_read = by_read + law.tangent(read.at, K0) * (read.by_set * set_move + read.by_rest * move)
-        if isinstance(law, Characteristic) and moves.lawful:
-            by_read = by_read + moves.ordinates @ law.moment_by_ordinates(read.at, K0).T
+        if isinstance(law, ParametricCurve) and moves.lawful:
+            by_read = by_read + moves.ordinates @ law.moment_by_parameters(read.at, K0).T
         for column, before, after, by in moves.laws:
             by_read[column] += (after.moment(read.at, K0) - before.moment(read.at, K0)) / by
         if section.profile is not None:

@@ -12,7 +12,8 @@ LONGEST_FILE = 400
 # From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
 ROD = [
     ("measurement", "measured_law", "spline"),
-    ("characteristic",),
+    ("characteristic", "compliance_law"),
+    ("law_prior",),
     ("laws", "elastica", "section", "support"),
     ("discretisation",),
     ("energy", "reduction"),
@@ -29,13 +30,12 @@ INSIDE = {
     "rod.inverse": [
         ("whitening", "knots", "options"),
         ("photo_residual", "law_prior"),
-        ("fit_model",),
+        ("fit_model", "smoothness"),
         ("evaluation",),
-        ("smoothness",),
-        ("control_points", "estimate"),
+        ("fit", "estimate"),
         ("problem",),
     ],
-    "rod.balance": [("compliance",), ("moment_points", "smoothness"), ("moment_regression",), ("graph",)],
+    "rod.balance": [("moment_points",), ("moment_regression",), ("graph",)],
     "pipeline.diagnosis": [
         ("observations",),
         ("causes", "statistics"),

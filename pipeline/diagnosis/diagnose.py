@@ -57,7 +57,7 @@ def diagnose(
     ----------
     test : MeasuredTest
     identification : Identification or None
-        Its inverse estimate chose the number of control points.
+        Its curve is what the extended one is held against.
     settings : DiagnosisSettings or None
 
     Returns
@@ -76,7 +76,7 @@ def diagnose(
     faults = faults_of_input(test, settings)
     if not faults.loaded_forces():
         return _nothing_to_compare("no force under load can be used"), faults.findings
-    bench = prepare(faults, settings, knots=chosen_knots(identification, settings))
+    bench = prepare(faults, settings, knots=settings.knots)
     if isinstance(bench, str):
         return _nothing_to_compare(bench), faults.findings
     fault = _data_at_fault(bench, settings)
@@ -174,12 +174,6 @@ def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
     std = max((step.chord_std or settings.chord_std * test.length for step in test.steps), default=0.0)
     moved = max(chords, default=0.0) - min(chords, default=0.0) > settings.fault_sigma * std
     return logged == {0.0} or (len(logged) == 1 and moved)
-
-
-def chosen_knots(identification: Identification | None, settings: DiagnosisSettings) -> int:
-    """Number of control points: that of the identification, within what leaves causes visible, or the default."""
-    law = None if identification is None else identification.inverse.characteristic
-    return settings.knots if law is None else int(np.clip(len(law.knots), 3, settings.knots + 1))
 
 
 def settled(bench: Workbench, settings: DiagnosisSettings, whole: Effort = TO_THE_END) -> tuple[Workbench, Conclusion]:

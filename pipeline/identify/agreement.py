@@ -9,7 +9,7 @@ sent through both,
     V = sum (G_1 - G_2) S (G_1 - G_2)^T + (B_1 - B_2) F F^T (B_1 - B_2)^T
 
 over the sources with covariance S (of photos, forces, nuisances), for laws of the forms F that the smoothness prior
-allows (`rod.inverse.law_prior`, with the weights that the data give them). What both miss alike cancels. Over cables of
+allows (`rod.law_prior`, with the weights that the data give them). What both miss alike cancels. Over cables of
 the accuracy study the test of level 5 % rejects 2 to 4 %, with and without a force-free photo, for both kinds of law.
 
 The test itself is `pipeline.identify.contrast`'s: the mean of the log ratio over each third of the common range.
@@ -25,7 +25,6 @@ from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
-from rod.inverse.law_prior import forms
 from rod.measured_law import MeasuredLaw, Source
 from rod.measurement import MeasuredTest
 
@@ -72,8 +71,7 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
     if grid is None:
         return None
     ratio = first.log_on(grid) - second.log_on(grid)
-    knots, law = inverse.model.knots, inverse.law_covariance
-    laws = forms(knots, law, one.kappa), forms(knots, law, two.kappa)
+    laws = inverse.law_forms, _on(one.kappa, two.kappa, inverse.law_forms)
     covariance = difference_covariance(test, one, two, laws, grid)
     p = p_value(parts_difference(first, second, grid), covariance)
     return Agreement(
@@ -85,6 +83,11 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
         level=level,
         hints=() if p >= level else difference_hints(test, one, two, graph.checks.get("left_right_z", 0.0)),
     )
+
+
+def _on(kappa: Array, other: Array, columns: Array) -> Array:
+    """Columns (n, p) on a grid of curvature, on another one by linear interpolation."""
+    return np.stack([np.interp(other, kappa, column) for column in columns.T], axis=1)
 
 
 def difference_covariance(

@@ -19,14 +19,18 @@ from pipeline.result import (
     PointwisePart,
     StepPart,
 )
-from pipeline.rounding import plain
 from rod.balance import BalanceGraph
 from rod.balance.moment_points import pointwise_graph
+from rod.compliance_law import ComplianceLaw
 from rod.inverse import Estimate, InverseOutcome
 from rod.inverse.evaluation import StepFit
 from rod.inverse.fit_model import FitModel
 from rod.inverse.photo_residual import Pose, curve_distance
+from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredShape
+
+READINGS = 8
+"""Points of the fitted law that are listed; the curve has them all."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,8 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
     values, vectors = np.linalg.eigh(law.log_covariance)
     # Directions below a millionth of the largest variance are rounding.
     keep = values > 1e-6 * values[-1]
-    factor = law.tangent[:, None] * vectors[:, keep] * np.sqrt(values[keep])
+    root = np.sqrt(values[keep])
+    factor = law.tangent[:, None] * vectors[:, keep] * root
     return Curve(
         kappa_per_m=_list(law.kappa),
         moment_Nm=_list(law.moment),
@@ -81,6 +86,7 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
         secant_std_Nm2=_list(law.secant_std),
         supported=[True] * law.kappa.size,
         tangent_factor_Nm2=[_list(row) for row in factor],
+        pre_curvature_factor_per_m=_list(vectors[:, keep].T @ law.rest_covariance / root),
     )
 
 
@@ -101,11 +107,7 @@ def inverse_part(found: Identification) -> InversePart:
         pre_curvature_per_m=law.pre_curvature,
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
-        knots=[
-            KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))
-            for k, f, std in zip(spline.knots, spline.ordinates, way.ordinates_std, strict=True)
-        ],
-        knots_chosen_by=_choice(way.evidence, len(spline.knots)),
+        knots=_readings(law, spline),
         curve=curve(way),
         misfit=misfit_part(way),
         nuisance={
@@ -116,16 +118,16 @@ def inverse_part(found: Identification) -> InversePart:
     )
 
 
-def _choice(evidence: dict[int, float], used: int) -> str:
-    """How the number of control points was chosen, in words."""
-    best = max(evidence, key=lambda count: evidence[count])
-    others = ", ".join(f"{n}: {plain(value, 2)}" for n, value in evidence.items() if n != best) or "none tried"
-    if used == best:
-        return f"{used} control points have the largest evidence; log evidence of other numbers against it: {others}"
-    return (
-        f"{used} control points: {best} have the largest evidence, the others hold laws that are no splines; "
-        f"log evidence of other numbers against it: {others}"
-    )
+def _readings(law: MeasuredLaw, fitted: ComplianceLaw) -> list[KnotPart]:
+    """The law where its form needs the most points: evenly along its own abscissa (`rod.compliance_law`)."""
+    place = fitted.basis.place(law.moment)
+    even = np.linspace(place[0], place[-1], READINGS)
+    return [
+        KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))
+        for k, f, std in zip(
+            *(np.interp(even, place, v) for v in (law.kappa, law.tangent, law.tangent_std)), strict=True
+        )
+    ]
 
 
 def misfit_part(way: Estimate) -> MisfitPart | None:
@@ -137,7 +139,7 @@ def misfit_part(way: Estimate) -> MisfitPart | None:
     distances = [step.photo[0] for step in steps if step.photo is not None]
     bends = [_bend(way.model, way.unknowns, step) for step in steps if step.photo is not None]
     by_block = {name: (float(value[b] @ value[b]), float(b.stop - b.start)) for name, b in blocks.items()}
-    data = {name: pair for name, pair in by_block.items() if name not in ("prior", "smoothness")}
+    data = {name: pair for name, pair in by_block.items() if name != "prior"}
     return MisfitPart(
         force_rmse_N=_rms(np.array(forces)),
         shape_rmse_m=_rms(np.concatenate(distances)) if distances else 0.0,

@@ -93,13 +93,7 @@ def identify_without(
 
 def inverse_options(settings: IdentifySettings) -> InverseOptions:
     """The settings as the options of the inverse problem."""
-    return InverseOptions(
-        elements=settings.elements,
-        blocks=settings.blocks,
-        knots=(settings.least_knots, max(settings.least_knots, settings.most_knots)),
-        spare=settings.spare_knots,
-        grid=settings.grid,
-    )
+    return InverseOptions(elements=settings.elements, blocks=settings.blocks, grid=settings.grid)
 
 
 def _branches(test: MeasuredTest, options: InverseOptions) -> dict[str, Estimate]:

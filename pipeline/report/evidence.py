@@ -252,8 +252,7 @@ def photos_note(result: Result, words: Words) -> str:
 def knot_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of the characteristic the report answers with: curvature, tangent.
 
-    The control points where the fitted simulation is the answer; any other way has none, or a law that is no longer
-    theirs, and is read at `POINTS` places over the visited range.
+    The fitted law where that is the answer; any other way is read at `POINTS` places over the visited range.
     """
     unit, curve, exact = figures.stiffness_unit(result, words), best(result), words("exact")
     if curve is None:
@@ -266,8 +265,6 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
 
 
 def knot_title(result: Result, words: Words) -> str:
-    """What `knot_rows` shows: the control points, or points of a way without any."""
+    """What `knot_rows` shows."""
     curve = best(result)
-    if curve is None or curve.method == "inverse":
-        return words("table_knots")
-    return words("table_points", way=words(f"way_{curve.method}"))
+    return "" if curve is None else words("table_points", way=words(f"way_{curve.method}"))

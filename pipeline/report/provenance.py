@@ -77,8 +77,6 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
         (words("fit_outcome"), words.said(part.advice or part.outcome).text),
         (words("fit_iterations"), f"{part.iterations} ({words('exact')})"),
     ]
-    if part.knots_chosen_by:
-        rows.append((words("fit_knots"), words.said(part.knots_chosen_by).text))
     if part.misfit is not None:
         misfit, force = part.misfit, force_unit(result, words)
         length = suited([misfit.shape_rmse_m], "m", decimal=words.decimal)

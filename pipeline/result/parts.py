@@ -117,6 +117,9 @@ class Curve(Part):
     tangent_factor_Nm2: list[Floats] = Field(
         [], description="F (n, r) with F F^T the covariance of tangent_Nm2 along the grid; empty if not known"
     )
+    pre_curvature_factor_per_m: Floats = Field(
+        [], description="g (r,) with F g the covariance of tangent_Nm2 with the pre-curvature; empty if not known"
+    )
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -124,8 +127,11 @@ class Curve(Part):
             raise ValueError("kappa_per_m does not increase")
         if len({len(row) for row in self.tangent_factor_Nm2}) > 1:
             raise ValueError("tangent_factor_Nm2 has rows of different lengths")
-        factor = "tangent_factor_Nm2"
-        check_one_length(self, tuple(name for name in Curve.model_fields if name != factor), (factor,))
+        factor, rest = "tangent_factor_Nm2", self.pre_curvature_factor_per_m
+        if rest and self.tangent_factor_Nm2 and len(rest) != len(self.tangent_factor_Nm2[0]):
+            raise ValueError("pre_curvature_factor_per_m has not the length of the rows of tangent_factor_Nm2")
+        along = set(Curve.model_fields) - {factor, "pre_curvature_factor_per_m"}
+        check_one_length(self, tuple(sorted(along)), (factor,))
         return self
 
 
@@ -160,7 +166,6 @@ class InversePart(Part):
     pre_curvature_std_per_m: Number | None = None
     supported_per_m: tuple[Number, Number] | None = None
     knots: list[KnotPart] = []
-    knots_chosen_by: str = ""
     curve: Curve | None = None
     misfit: MisfitPart | None = None
     nuisance: dict[str, tuple[Number, Number]] = Field({}, description="fitted value and std, e.g. scale, length")

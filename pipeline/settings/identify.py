@@ -35,19 +35,6 @@ class IdentifySettings(BaseModel):
     blocks: int = Field(
         160, ge=20, description="independent data per photo at most; one per correlation length of the midline's error"
     )
-    least_knots: int = Field(3, ge=3, description="control points; the paper's number, the fewest that show a bend")
-    most_knots: int = Field(
-        12,
-        ge=3,
-        description="control points; laws without a kink never ask for so many, on laws with one the band covered 84 % "
-        "with 8, 89 % with 12",
-    )
-    spare_knots: int = Field(
-        2,
-        ge=0,
-        description="control points beyond the best by evidence, at least; half as many as that where it is more: a "
-        "law that is no spline is then within its band",
-    )
     grid: int = Field(61, ge=11, description="points of a reported curve")
     agreement_level: float = Field(0.05, gt=0, lt=1, description="level of the test whether both ways agree")
     pre_curvature_sigma: float = Field(

@@ -11,7 +11,7 @@ Strategy: the paper differentiates m and K along s and divides (Eq. 14); that gr
 once over all photos and both halves. The moment is nearly free of error, so there is no attenuation; what error it has
 (force, bearing axes, scale, position) is carried into the covariance of the residual together with the joint covariance
 of the smooth curve. With that covariance the curvatures weigh as much as the positions behind them: no second
-derivative is taken. The compliance is a positive penalised spline (`rod.balance.compliance`), fitted in
+derivative is taken. The compliance is a positive spline (`rod.compliance_law`), fitted in
 `rod.balance.moment_regression`.
 
 Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; SI units.
@@ -26,7 +26,6 @@ from enum import Enum
 
 import numpy as np
 
-from rod.balance.compliance import compliance_basis
 from rod.balance.moment_points import CommonErrors, MomentPoints, moment_points
 from rod.balance.moment_regression import (
     BOW_TERMS,
@@ -36,6 +35,7 @@ from rod.balance.moment_regression import (
     regress,
     uniform_at_rest,
 )
+from rod.compliance_law import moment_basis
 from rod.measured_law import Array, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
@@ -66,14 +66,8 @@ class BalanceOptions:
     ----------
     points : int
         Points per photo: more than a curvature spline has parameters; further ones hold no new information.
-    coefficients : int
-        Splines of the compliance; the penalty decides the form. Ten can follow a law of stick and slip, but not one
-        that falls within a tenth of the range: with 16 the worst of 40 such cables is 3 % off instead of 20 %.
     floor : relative
         Curvature that no photo resolves, over the range met: the error of the smooth curve's own spline.
-    roughness : (low, high)
-        Range of the prior standard deviation of d^2 log c / dt^2 that is averaged over: from a straight line to a law
-        that changes its stiffness tenfold within a third of the range.
     grid : int
         Points of the reported curve.
     level : float
@@ -83,9 +77,7 @@ class BalanceOptions:
     """
 
     points: int = 60
-    coefficients: int = 16
     floor: float = 2e-4
-    roughness: tuple[float, float] = (0.1, 60.0)
     grid: int = 61
     level: float = 0.01
     iterations: int = 25
@@ -142,11 +134,11 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     slope, intercept = (float(v) for v in np.polyfit(m, kappa, 1))
     if not slope > 0.0:
         return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
-    basis = compliance_basis(float(m.min()), float(m.max()), unit=slope, coefficients=options.coefficients)
-    floor = options.floor * slope * (basis.high - basis.low)
+    basis = moment_basis(float(m.min()), float(m.max()), unit=slope)
+    floor = options.floor * slope * basis.span
     beside = test.axis_parallax_std * test.camera_foot_std
     common = CommonErrors(test.scale_std, test.axis_std, test.axis_std, beside, test.axis_parallax_std)
-    model = MomentModel(data, basis, common, floor, options.roughness, force_errors=test.common_force_errors)
+    model = MomentModel(data, basis, common, floor, force_errors=test.common_force_errors)
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa.mean())
     at_rest = 1.0 if rest is None else uniform_at_rest(rest, floor)
@@ -155,7 +147,7 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     if fitted is None:
         return BalanceGraph(BalanceOutcome.STALLED, points=data)
     blurred, found = fitted
-    checks = assumption_checks(model, found) | {"misfit_floor_per_m": blurred.floor}
+    checks = assumption_checks(replace(found.model, floor=model.floor), found) | {"misfit_floor_per_m": blurred.floor}
     if rest is not None:
         checks["uniform_at_rest_p"] = at_rest
     return _graph(blurred, found, checks, options.grid)
@@ -178,7 +170,7 @@ def _regress_in_spite_of_misfit(
             all_rows = model.floor > photos_noise
             rows = sum(float(row.value.size) if all_rows else row.informative for row in found.rows)
             if chi2 <= 4.0 * max(rows - model.size, 1.0):
-                return model, found
+                return found.model, found
         model = replace(model, floor=4.0 * model.floor)
     return None
 
@@ -188,16 +180,16 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     curve, p = found.curve, model.size
     K0, errors = float(found.unknowns[p]), model.errors(found.unknowns)
     met = np.concatenate([d.true_moment(errors) for d in model.data])
-    low, high = K0 + curve.excess(np.array([met.min(), met.max()]))
+    # the abscissa was laid along the regression before: beyond it, by a little at most, nothing is known of the law
+    ends = np.clip([met.min(), met.max()], curve.basis.moments[0], curve.basis.moments[-1])
+    low, high = K0 + curve.bend(ends)
     kappa = np.linspace(float(low), float(high), points)
-    m = curve.moment(kappa - K0)
-    f = 1.0 / curve.compliance(m)
-    # K = K0 + excess(m; a) at fixed K: dm = -f (dK0 + excess_a da), and log f = -log c(m; a) moves with a and m.
-    by_moment = np.zeros((m.size, found.unknowns.size))
-    by_moment[:, :p] = -f[:, None] * curve.excess_by_coefficients(m)
+    m, f = curve.bound(np.array([K0]))(kappa)
+    by_moment, by_log = np.zeros((2, m.size, found.unknowns.size))
+    by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)
     by_moment[:, p] = -f
-    by_log = -curve.log_slope(m)[:, None] * by_moment
-    by_log[:, :p] -= curve.basis.at(m)
+    by_log[:, :p] = curve.log_tangent_by_parameters(kappa, K0)
+    by_log[:, p] = curve.log_slope(m) * f
     by_forces = _moved_by_forces(model, found)
     law = propagated(
         kappa,

@@ -1,7 +1,7 @@
 """Curvature against moment on each photo, and what moves those points: the data of the balance way.
 
 One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
-(Eq. 13). The residual against a compliance curve, ``rho = K - K0 - excess(m)``, is moved by the parameters of the
+(Eq. 13). The residual against a compliance curve, ``rho = K - K0 - bend(m)``, is moved by the parameters of the
 smooth curve (through K and y together), by the force, and by what all photos have in common: their scale, the errors
 of the bearing axes across the chord, and that the axes are seen above the cable (`CommonErrors`). What each photo adds
 to the errors of the axes is part of the covariance of its curve: it shifts and turns the whole chord frame.
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.balance.compliance import ComplianceCurve
+from rod.compliance_law import ComplianceLaw
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
@@ -133,7 +133,7 @@ def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentP
 
 def residual(
     data: MomentPoints,
-    curve: ComplianceCurve,
+    curve: ComplianceLaw,
     pre_curvature: float,
     *,
     varying: Array,
@@ -157,7 +157,7 @@ def residual(
     """
     kappa, m = data.kappa / (1.0 + errors.scale), data.true_moment(errors)
     c = curve.compliance(m)
-    rho = kappa - pre_curvature - varying - curve.excess(m)
+    rho = kappa - pre_curvature - varying - curve.bend(m)
     stiff = (c * data.force)[:, None]
     by_source = {
         "curve": data.by_curve_kappa - stiff * data.by_curve_y,
@@ -169,7 +169,7 @@ def residual(
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     columns = np.column_stack(
         [
-            -curve.excess_by_coefficients(m),
+            -curve.bend_by_coefficients(m),
             -np.ones(m.size),
             -(kappa + c * data.moment),
             -stiff * (1.0 - data.along[:, None]),

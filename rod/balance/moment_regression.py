@@ -1,56 +1,32 @@
 """Regression of curvature on moment over all points of all photos: the numerical part of the balance way.
 
-Unknowns, in this order: coefficients of log c (see `rod.balance.compliance`), the pre-curvature K0, the errors common
-to all photos (`rod.balance.moment_points.CommonErrors`, each in units of its standard deviation), and Legendre
-coefficients 1 to 4 of K0(s) - K0. Gauss-Newton; the covariance of the residual depends on the compliance and is renewed
-in each iteration. The prior of the law's form is its roughness and its slope at rest (`rod.balance.smoothness`), log c
-being flat there for a cable that bends alike to both sides. The posterior is an average over what the law may be smooth
-along and over the sizes of both, weighted by their evidence (Laplace), so that the bands hold what the data do not know
-about the form of the law.
+Unknowns, in this order: coefficients of the law (`rod.compliance_law`), the pre-curvature K0, the errors common to all
+photos (`rod.balance.moment_points.CommonErrors`, each in units of its standard deviation), and Legendre coefficients 1
+to 4 of K0(s) - K0. Gauss-Newton toward the mean over all priors of the law's form (`rod.law_prior`), so that the bands
+hold what the data do not know about it; the covariance of the residual depends on the compliance and is renewed in each
+iteration. Once settled, the abscissa of the law is laid along the law found, and it is settled again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from rod.balance.compliance import ComplianceBasis, ComplianceCurve, compliance_curve
 from rod.balance.moment_points import CommonErrors, MomentPoints, Residual, residual
-from rod.balance.smoothness import smoothnesses
+from rod.compliance_law import ComplianceLaw, LawBasis, refreshed
+from rod.law_prior import Posterior, averaged, priors
 
 Array = NDArray[np.float64]
 
 BOW_TERMS = 4
 """Legendre terms of K0(s) - K0: a linear set from the spool, one and two bows, and a kink's rough place."""
 
-ROUGHNESS_STEPS = 15
-"""Values of the roughness averaged over: a factor 1.6 apart, over which the posterior hardly changes."""
-
-SLOPES, SLOPE_STEPS = (0.03, 3.0), 5
-"""Sizes of the prior of log c's slope at rest averaged over: from none that could be seen to a factor e^3."""
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """Average over what the law may be smooth along, and over the sizes of roughness and slope.
-
-    Attributes
-    ----------
-    mean : (q,)
-    covariance : (q, q)
-        Also the response: a change dr of the whitened residual moves the mean by -covariance J^T dr, the weights of the
-        sizes included, since d log(evidence) of each is -(J (its mean - mean))^T dr up to a common term.
-    shrinkage : (q, p)
-        By how much the mean falls short of a law with the coefficients a of log c, per unit of a.
-    """
-
-    mean: Array
-    covariance: Array
-    shrinkage: Array
+LAYINGS = 2
+"""Times that the abscissa is laid along the law found so far."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +35,9 @@ class Regression:
 
     Attributes
     ----------
-    curve : ComplianceCurve
+    model : MomentModel
+        With the basis on which the unknowns are.
+    curve : ComplianceLaw
     unknowns : (q,)
         See the module for their order; the rows were taken within a hundredth of a standard deviation of them.
     posterior : Posterior
@@ -69,7 +47,8 @@ class Regression:
         Whitened, of all rows.
     """
 
-    curve: ComplianceCurve
+    model: MomentModel
+    curve: ComplianceLaw
     unknowns: Array
     posterior: Posterior
     rows: tuple[Residual, ...]
@@ -83,13 +62,11 @@ class MomentModel:
     Attributes
     ----------
     data : tuple of MomentPoints
-    basis : ComplianceBasis
+    basis : LawBasis
     common_std : CommonErrors
         Standard deviations of what is wrong on all photos alike.
     floor : 1/m
         Curvature that no photo resolves.
-    roughness : (low, high)
-        Range of the prior standard deviation of d^2 log c / dt^2.
     varying : bool
         Whether K0(s) is free to vary.
     force_errors : tuple of mappings of step number -> N
@@ -97,17 +74,16 @@ class MomentModel:
     """
 
     data: tuple[MomentPoints, ...]
-    basis: ComplianceBasis
+    basis: LawBasis
     common_std: CommonErrors
     floor: float
-    roughness: tuple[float, float]
     varying: bool = False
     force_errors: tuple[Mapping[int, float], ...] = ()
 
-    def rows(self, unknowns: Array) -> tuple[ComplianceCurve, tuple[Residual, ...]]:
+    def rows(self, unknowns: Array) -> tuple[ComplianceLaw, tuple[Residual, ...]]:
         """Compliance curve and whitened residuals at the given unknowns."""
         curve, K0, errors = (
-            compliance_curve(self.basis, unknowns[: self.size]),
+            self.basis.law(unknowns[: self.size]),
             unknowns[self.size],
             self.errors(unknowns),
         )
@@ -120,7 +96,7 @@ class MomentModel:
     @property
     def size(self) -> int:
         """Number of coefficients of log c: the place of K0; the common errors and K0(s) follow."""
-        return int(self.basis.table.shape[1])
+        return self.basis.size
 
     @property
     def common(self) -> slice:
@@ -141,53 +117,15 @@ class MomentModel:
         columns[:, self.common] *= np.array(self.common_std)
         return columns
 
-    def posterior(self, unknowns: Array, value: Array, J: Array) -> Posterior:
-        """Mean and covariance of the unknowns, averaged over the priors with their evidence as the weight.
-
-        The priors act on the coefficients alone: all other unknowns are eliminated once, and follow.
-        """
-        p, size = self.size, J.shape[1]
-        prior = np.zeros(size)
-        prior[self.common] = 1.0
+    def posterior(self, unknowns: Array, value: Array, J: Array, *, smooth: bool = True) -> Posterior:
+        """Mean and covariance of the unknowns, averaged over the priors with their evidence as the weight."""
+        known = np.zeros(J.shape[1])
+        known[self.common] = 1.0
         if not self.varying:  # a prior far sharper than any photo switches them off
-            prior[self.common.stop :] = (1e6 / self.floor) ** 2
-        normal, pull = J.T @ J + np.diag(prior), J.T @ (J @ unknowns - value)
-        law, rest = slice(0, p), slice(p, size)
-        unit = 1.0 / np.sqrt(np.diag(normal)[rest])  # unknowns of very different size
-        inner = unit[:, None] * np.linalg.inv(unit[:, None] * normal[rest, rest] * unit) * unit
-        back = -inner @ normal[rest, law]
-        schur, force = normal[law, law] + normal[law, rest] @ back, pull[law] + back.T @ pull[rest]
-        precisions, norms = self._priors(compliance_curve(self.basis, unknowns[:p]))
-        A = schur + precisions
-        inverses = np.linalg.inv(A)
-        means = inverses @ force
-        evidence = norms + 0.5 * (means @ force - np.linalg.slogdet(A)[1])
-        weight = np.exp(evidence - evidence.max())
-        weight /= weight.sum()
-        mean = weight @ means
-        spread = means - mean
-        covariance = np.tensordot(weight, inverses, 1) + (weight[:, None] * spread).T @ spread
-        shrinkage = np.eye(p) - covariance @ schur
-        across = back @ covariance
-        return Posterior(
-            np.concatenate([mean, inner @ pull[rest] + back @ mean]),
-            np.block([[covariance, across.T], [across, inner + across @ back.T]]),
-            np.vstack([shrinkage, back @ shrinkage]),
-        )
-
-    def _priors(self, curve: ComplianceCurve) -> tuple[Array, Array]:
-        """All priors averaged over: their precisions of log c (n, p, p) and the logs of their norms (n,)."""
-        rough = np.linspace(np.log(self.roughness[0]), np.log(self.roughness[1]), ROUGHNESS_STEPS)
-        steep = np.linspace(np.log(SLOPES[0]), np.log(SLOPES[1]), SLOPE_STEPS)
-        log_tau, log_slope = (axis.ravel() for axis in np.meshgrid(rough, steep))
-        precisions, norms = [], []
-        for smooth in smoothnesses(curve):
-            flat = np.outer(smooth.first_slope, smooth.first_slope)
-            precision = np.exp(-2.0 * log_tau)[:, None, None] * smooth.roughness
-            precisions.append(precision + np.exp(-2.0 * log_slope)[:, None, None] * flat)
-            # Each prior counts as often as it has directions: the roughness leaves straight lines free.
-            norms.append(np.log(smooth.share) + smooth.log_volume - (self.size - 2) * log_tau - log_slope)
-        return np.concatenate(precisions), np.concatenate(norms)
+            known[self.common.stop :] = 1e6 / self.floor
+        rows = np.diag(known)[known > 0.0]
+        value, J = np.concatenate([value, rows @ unknowns]), np.vstack([J, rows])
+        return averaged(value, J, unknowns, priors(self.basis, smooth=smooth))
 
 
 def bow_terms(data: MomentPoints) -> Array:
@@ -198,18 +136,31 @@ def bow_terms(data: MomentPoints) -> Array:
 
 def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -> Regression | None:
     """Fit by Gauss-Newton from a straight line of compliance; None if it does not settle."""
+    unknowns = np.concatenate([np.zeros(model.size), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
+    found = _settled(model, unknowns, iterations, smooth=False)
+    for laid in range(LAYINGS):
+        if found is None:
+            return None
+        met = np.concatenate([d.true_moment(model.errors(found.unknowns)) for d in model.data])
+        basis = refreshed(found.curve, float(met.min()), float(met.max()))
+        unknowns = np.concatenate([basis.projected(found.curve), found.unknowns[model.size :]])
+        found = _settled(replace(model, basis=basis), unknowns, iterations, smooth=laid == LAYINGS - 1)
+    return found
+
+
+def _settled(model: MomentModel, unknowns: Array, iterations: int, *, smooth: bool) -> Regression | None:
+    """Gauss-Newton from given unknowns; see `rod.law_prior.priors` for `smooth`."""
     p = model.size
-    unknowns = np.concatenate([np.zeros(p), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
     for _ in range(iterations):
         rows = model.rows(unknowns)[1]
         value = np.concatenate([row.value for row in rows])
         J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
-        posterior = model.posterior(unknowns, value, J)
+        posterior = model.posterior(unknowns, value, J, smooth=smooth)
         move = posterior.mean - unknowns
-        # A hundredth of a standard deviation is nothing anyone could see.
-        if np.all(np.abs(move) <= 0.01 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
+        # A fiftieth of a standard deviation is nothing anyone could see.
+        if np.all(np.abs(move) <= 0.02 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
             mean = posterior.mean  # the last move is made, its rows are not taken again
-            return Regression(compliance_curve(model.basis, mean[:p]), mean, posterior, rows, J)
+            return Regression(model, model.basis.law(mean[:p]), mean, posterior, rows, J)
         # One unit of log c is a factor e in stiffness: longer steps leave the range of the linearisation.
         unknowns = unknowns + move * min(1.0, 1.0 / max(float(np.max(np.abs(move[:p]))), 1e-12))
     return None

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from rod.characteristic import Characteristic
+from rod.compliance_law import ComplianceLaw
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel
 from rod.inverse.options import InverseOptions
-from rod.inverse.smoothness import Averaged, averaged
+from rod.law_prior import Posterior, averaged, priors
 from rod.measured_law import Array, MeasuredLaw, Source, propagated
 
 
@@ -60,15 +61,12 @@ class Estimate:
     Attributes
     ----------
     outcome : InverseOutcome
-    characteristic : Characteristic or None
-        The fitted spline.
+    characteristic : ComplianceLaw or None
+        The fitted law.
     law : MeasuredLaw or None
         The same on a grid over the visited range, with bands; None where there is no characteristic.
-    ordinates_std : (k,) N m^2
-    law_covariance : (k, k)
-        Of log(tangent) at the knots by the smoothness prior alone, its level held at the first.
-    evidence : dict of int -> float
-        Log evidence of each number of control points tried, against the best.
+    law_forms : (n, p)
+        Forms of log(tangent) on the law's grid that the priors allow, one standard deviation each.
     model, evaluation, unknowns, covariance
         The fit itself: unknowns (q,) with covariance (q, q); residuals and jacobian whitened by the noise as stated,
         whatever ``model.blur`` the bands were made with.
@@ -79,11 +77,9 @@ class Estimate:
     """
 
     outcome: InverseOutcome
-    characteristic: Characteristic | None = None
+    characteristic: ComplianceLaw | None = None
     law: MeasuredLaw | None = None
-    ordinates_std: Array = field(default_factory=_none)
-    law_covariance: Array = field(default_factory=_none)
-    evidence: dict[int, float] = field(default_factory=dict)
+    law_forms: Array = field(default_factory=_none)
     model: FitModel | None = None
     evaluation: Evaluation | None = None
     unknowns: Array = field(default_factory=_none)
@@ -98,76 +94,98 @@ class Estimate:
 
 
 def read_off(
-    model: FitModel, found: Evaluation, posterior: Averaged, *, options: InverseOptions, outcome: InverseOutcome
+    model: FitModel, found: Evaluation, posterior: Posterior, *, options: InverseOptions, outcome: InverseOutcome
 ) -> Estimate:
     """Estimate from a settled fit: curves on the visited range with bands by propagation."""
-    k, u = model.knots.size, found.unknowns
+    p, u = model.basis.size, found.unknowns
     by_forces = _moved_by_forces(model, found, posterior.covariance)
     covariance = posterior.covariance + by_forces @ by_forces.T
-    spline, K0 = model.characteristic(u), model.pre_curvature(u)
+    curve, K0 = model.law(u), model.pre_curvature(u)
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
-    kappa = np.linspace(min(visited), max(visited), options.grid)
-    f = spline.tangent(kappa, K0)
-    if not np.all(f > 0.0):  # positive at the control points, but not between them
-        return Estimate(InverseOutcome.LIMIT_POINT)
+    # the abscissa was laid along the fit before the last: beyond it, by a little at most, nothing is known of the law
+    low, high = np.clip([min(visited), max(visited)], K0 + curve.bends[0], K0 + curve.bends[-1])
+    kappa = np.linspace(low, high, options.grid)
+    moment, f = curve.bound(np.array([K0]))(kappa)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
-    by_moment[:, :k] = spline.moment_by_ordinates(kappa, K0) * spline.ordinates
-    by_moment[:, k] = spline.moment_by_pre_curvature(kappa, K0) / model.length
-    by_log[:, :k] = spline.tangent_by_ordinates(kappa, K0) * spline.ordinates / f[:, None]
+    by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)
+    by_moment[:, p] = -f / model.length
+    by_log[:, :p] = curve.log_tangent_by_parameters(kappa, K0)
+    by_log[:, p] = curve.log_slope(moment) * f / model.length
+    scale = _unknown_scale(model, found, by_log @ covariance @ by_log.T)
     law = propagated(
         kappa,
         K0,
-        moment=spline.moment(kappa, K0),
+        moment=moment,
         tangent=f,
-        by_moment=by_moment,
-        by_log=by_log,
-        by_pre_curvature=np.eye(u.size)[k] / model.length,
-        covariance=covariance,
+        by_moment=np.column_stack([by_moment, scale * moment]),
+        by_log=np.column_stack([by_log, np.full(kappa.size, scale)]),
+        by_pre_curvature=np.eye(u.size + 1)[p] / model.length,
+        covariance=block_diag(covariance, 1.0),
     )
+    splines = model.basis.at(moment)
+    values, vectors = np.linalg.eigh(posterior.law_covariance)
     rest = tuple(name for name in found.blocks if _is_rest(model, name))
-    loaded = averaged(model, found, taus=options.tau, without=rest) if rest else replace(posterior, mean=u)
+    loaded = _without(model, found, rest) if rest else replace(posterior, mean=u)
     return Estimate(
         outcome=outcome,
-        characteristic=spline,
+        characteristic=curve,
         law=replace(
             law,
             gains=_gains(model, found, by_log @ posterior.covariance) | {("common_force", -1): by_log @ by_forces},
-            shortfall=-by_log @ posterior.shrinkage @ _at_knots(kappa, model.knots),
-            loaded_pre_curvature=float(loaded.mean[k]) / model.length,
-            loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[k, k])) / model.length,
+            # coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis
+            shortfall=by_log @ posterior.shrinkage @ np.linalg.pinv(splines),
+            loaded_pre_curvature=float(loaded.mean[p]) / model.length,
+            loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[p, p])) / model.length,
         ),
-        ordinates_std=spline.ordinates * np.sqrt(np.diag(covariance)[:k]),
-        law_covariance=posterior.law_covariance,
+        law_forms=splines @ vectors * np.sqrt(np.maximum(values, 0.0)),
         model=model,
-        evaluation=found if model.blur == (1.0, 1.0) else evaluate(replace(model, blur=(1.0, 1.0)), u),
+        evaluation=found if model.blur == (1.0, 1.0) else _as_stated(model, found),
         unknowns=u,
         covariance=covariance,
-        invisible=invisible_combinations(model, covariance, bound=options.invisible),
+        invisible=invisible_combinations(model, law, covariance, bound=options.invisible),
     )
 
 
-def invisible_combinations(model: FitModel, covariance: Array, *, bound: float) -> tuple[str, ...]:
-    """Combinations of control points and K0 whose std exceeds `bound` (log f_EI, K0 times length), in words."""
-    k = model.knots.size
-    values, vectors = np.linalg.eigh(covariance[: k + 1, : k + 1])
-    names = [f"f_EI at {knot:.3g} 1/m" for knot in model.knots] + ["K0"]
+def _unknown_scale(model: FitModel, found: Evaluation, log_covariance: Array) -> float:
+    """Standard deviation of a common factor of f by which the covariance (n, n) of log f falls short of the forces.
+
+    Only forces tell it, and no law knows it better. A prior of its form over an abscissa of moments holds it all the
+    same: by nothing where forces are good to a per cent, too sharply where they contradict each other by many.
+    """
+    known = [(s.simulated.force / (s.data.step.force_std * model.blur[1])) ** 2 for s in found.steps if s.force]
+    return float(np.sqrt(max(1.0 / sum(known) - float(log_covariance.mean()), 0.0)))
+
+
+def _as_stated(model: FitModel, found: Evaluation) -> Evaluation:
+    """The same evaluation with the noise as stated."""
+    return evaluate(replace(model, blur=(1.0, 1.0)), found.unknowns, starts=found.equilibria)
+
+
+def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Posterior:
+    """The posterior with some blocks of the data left out."""
+    keep = np.ones(found.value.size, dtype=bool)
+    for name in blocks:
+        keep[found.blocks[name]] = False
+    return averaged(found.value[keep], found.jacobian[keep], found.unknowns, priors(model.basis))
+
+
+def invisible_combinations(model: FitModel, law: MeasuredLaw, covariance: Array, *, bound: float) -> tuple[str, ...]:
+    """Parts of the law and K0 whose std exceeds `bound` (log f_EI, K0 times length), in words."""
     open_ones = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value > bound**2:
-            # What contributes less than a tenth of the variance is not worth a word.
-            members = [name for name, share in zip(names, vector, strict=True) if share**2 > 0.1]
-            open_ones.append(" with ".join(members) + f" (+- {np.sqrt(value):.2g} in the logarithm)")
-    return tuple(reversed(open_ones))
+    std = np.sqrt(np.diag(law.log_covariance))
+    for where in (slice(None, law.kappa.size // 3), slice(law.kappa.size // 3, None)):
+        worst = int(np.argmax(std[where])) + (where.start or 0)
+        if std[worst] > bound:
+            open_ones.append(f"f_EI at {law.kappa[worst]:.3g} 1/m (+- {std[worst]:.2g} in the logarithm)")
+    K0_std = float(np.sqrt(covariance[model.basis.size, model.basis.size]))
+    if K0_std > bound:
+        open_ones.append(f"K0 (+- {K0_std / model.length:.2g} 1/m)")
+    return tuple(open_ones)
 
 
 def _is_rest(model: FitModel, block: str) -> bool:
     kind, _, step = block.partition("/")
     return kind in ("shape", "chord") and any(d.at_rest and str(d.step.step) == step for d in model.data)
-
-
-def _at_knots(kappa: Array, knots: Array) -> Array:
-    """Values at the knots of a curve given on a grid, (k, n), by linear interpolation."""
-    return np.stack([np.interp(knots, kappa, column) for column in np.eye(kappa.size)], axis=1)
 
 
 def _moved_by_forces(model: FitModel, found: Evaluation, response: Array) -> Array:

@@ -1,8 +1,8 @@
 """One evaluation of the inverse problem: simulate all steps, hold them against the data, with exact derivatives.
 
 Residuals, each divided by its standard deviation: distance of the midline from the simulated shape along the normal
-(whitened, `rod.inverse.whitening`), force measured minus simulated, the prior of each nuisance, and that of the form of
-the law (`rod.inverse.law_prior`).
+(whitened, `rod.inverse.whitening`), force measured minus simulated, and the prior of each nuisance. What is known of
+the form of the law (`rod.law_prior`) comes in with the fit.
 
 The chord of a photo is imposed on the simulation as measured, the errors of the axes taken back:
 ``chord = measured (1 + scale) + left_along - right_along``. Steps without a photo are imposed by the displacement log,
@@ -31,7 +31,7 @@ PARAMETERS = ("ordinates", "pre_curvature", "length", "chord")
 """Of the simulated rod, in the order of the derivatives of `Simulated`."""
 
 LOG_RANGE = 60.0
-"""Of log f_EI over its unit: what lies beyond, 26 orders of magnitude either way, is a fit on its way to nowhere."""
+"""Of log c over its unit: what lies beyond, 26 orders of magnitude either way, is a fit on its way to nowhere."""
 
 CHORD_OF_ARC = 1e-2
 """How sharply the chord of a force-free photo is that of the arc, in standard deviations of an axis: almost exactly."""
@@ -75,7 +75,7 @@ class Evaluation:
         Infinite if an equilibrium does not exist.
     jacobian : (r, q)
     blocks : dict of name -> slice
-        ``shape/<step>``, ``force/<step>``, ``prior``, ``smoothness``.
+        ``shape/<step>``, ``force/<step>``, ``chord/<step>``, ``prior``.
     steps : tuple of StepFit
     equilibria : tuple of Equilibrium
         Of the loaded steps; warm starts for a neighbour.
@@ -100,7 +100,7 @@ class Evaluation:
 
 def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ()) -> Evaluation:
     """Residuals and jacobian at the unknowns `u`; `starts` are the equilibria of a neighbour."""
-    if np.any(np.abs(u[: model.knots.size]) > LOG_RANGE):
+    if np.any(np.abs(u[: model.basis.size]) > LOG_RANGE):
         return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=Outcome.LIMIT_POINT)
     imposed = [imposed_chord(model, u, d) for d in model.data]
     bent = [k for k, d in enumerate(model.data) if not d.at_rest]
@@ -153,10 +153,10 @@ def imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Arr
 
 
 def _chain(model: FitModel, u: Array, chord_by: Array) -> Array:
-    """Derivatives of ordinates, K0, length and chord by all unknowns, (k + 3, q)."""
-    k = model.knots.size
+    """Derivatives of coefficients, K0, length and chord by all unknowns, (k + 3, q)."""
+    k = model.basis.size
     chain = np.zeros((k + 3, model.size))
-    chain[np.arange(k), np.arange(k)] = model.ordinates(u)
+    chain[np.arange(k), np.arange(k)] = 1.0
     chain[k, k] = 1.0 / model.length
     chain[k + 1, model.index("length")] = model.nuisances["length"]
     chain[k + 2] = chord_by
@@ -178,7 +178,7 @@ def _arc(model: FitModel, u: Array) -> Simulated:
     theta, stretch, none = a - b, s / length, np.zeros_like(s)
 
     def by(pre_curvature: Array, cable_length: Array) -> Array:
-        return np.column_stack([np.zeros((s.size, model.knots.size)), pre_curvature, cable_length, none])
+        return np.column_stack([np.zeros((s.size, model.basis.size)), pre_curvature, cable_length, none])
 
     return Simulated(
         s,
@@ -190,7 +190,7 @@ def _arc(model: FitModel, u: Array) -> Simulated:
         by(x_K0, stretch * np.cos(theta) - 0.5 * K0 * s * np.sin(a) * sinc),
         by(y_K0, stretch * np.sin(theta) + 0.5 * K0 * s * np.cos(a) * sinc),
         by(0.5 * length - s, K0 * (0.5 - stretch)),
-        np.zeros(model.knots.size + 3),
+        np.zeros(model.basis.size + 3),
     )
 
 
@@ -237,8 +237,4 @@ def _whitened(model: FitModel, u: Array, fits: tuple[StepFit, ...], equilibria: 
     prior = np.zeros((len(model.nuisances), model.size))
     prior[:, model.laws :] = np.eye(len(model.nuisances))
     add("prior", u[model.laws :], prior)
-    root = model.prior.rows
-    smooth = np.zeros((root.shape[0], model.size))
-    smooth[:, : model.knots.size] = root
-    add("smoothness", root @ u[: model.knots.size], smooth)
     return Evaluation(u, np.concatenate(values), np.vstack(rows), blocks, fits, equilibria)

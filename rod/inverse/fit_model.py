@@ -2,7 +2,7 @@
 
 Unknowns u, all of order one:
 
-    z      log of f_EI (tangent reading) at the knots over a unit of the cable's size, so the stiffness is positive
+    a      coefficients of the law (`rod.compliance_law`): its stiffness is positive whatever they are
     k0     K0 times the length
     then, in units of their prior standard deviations, the nuisances: the cable's ``length``, the common ``scale`` of
     the photos, the ``zero`` of displacement (only where a step has no photo), and the position of both bearing axes,
@@ -15,14 +15,13 @@ Signs and units: `rod.measurement`; SI.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Characteristic
-from rod.inverse.law_prior import Along, LawPrior, first_prior, places_of
+from rod.compliance_law import ComplianceLaw, LawBasis
 from rod.inverse.whitening import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
 
@@ -78,11 +77,8 @@ class FitModel:
     data : tuple of StepData
     length : m
         As told.
-    knots : (k,) 1/m
-    prior : LawPrior
-        Of the form of the law.
-    unit : N m^2
-        Stiffness of z = 0: with one of the cable's own size, the fit of a cable a thousand times stiffer is the same.
+    basis : LawBasis
+        Of the law; with a unit of the cable's own size, the fit of a cable a thousand times stiffer is the same.
     elements : int
         Of the simulated rod.
     zero : m or None
@@ -98,9 +94,7 @@ class FitModel:
 
     data: tuple[StepData, ...]
     length: float
-    knots: Array
-    prior: LawPrior
-    unit: float
+    basis: LawBasis
     elements: int
     zero: float | None
     nuisances: dict[str, float]
@@ -110,12 +104,12 @@ class FitModel:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.knots.size + 1 + len(self.nuisances)
+        return self.laws + len(self.nuisances)
 
     @property
     def laws(self) -> int:
-        """Number of unknowns that are not nuisances: control points and K0."""
-        return self.knots.size + 1
+        """Number of unknowns that are not nuisances: coefficients and K0."""
+        return self.basis.size + 1
 
     def index(self, name: str) -> int:
         """Place of a nuisance among the unknowns."""
@@ -143,36 +137,27 @@ class FitModel:
 
     def pre_curvature(self, u: Array) -> float:
         """K0, 1/m."""
-        return float(u[self.knots.size]) / self.length
+        return float(u[self.basis.size]) / self.length
 
-    def characteristic(self, u: Array) -> Characteristic:
-        """f_EI through the control points, tangent reading."""
-        return Characteristic.from_ordinates(self.knots, self.ordinates(u), reading="tangent")
-
-    def ordinates(self, u: Array) -> Array:
-        """f_EI at the knots, (k,) N m^2."""
-        return np.asarray(self.unit * np.exp(u[: self.knots.size]))
-
-    def places(self, u: Array) -> tuple[Along, ...]:
-        """Places of the knots along which the law may be smooth; see `rod.inverse.law_prior`."""
-        return places_of(self.characteristic(u), self.knots, self.pre_curvature(u))
+    def law(self, u: Array) -> ComplianceLaw:
+        """The law."""
+        return self.basis.law(u[: self.basis.size])
 
     def bending_test(self, u: Array) -> BendingTest:
         """The simulated experiment."""
-        return BendingTest(self.cable_length(u), self.characteristic(u), self.pre_curvature(u), elements=self.elements)
+        return BendingTest(self.cable_length(u), self.law(u), self.pre_curvature(u), elements=self.elements)
 
-    def start(self, ordinates: Array, pre_curvature: float) -> Array:
-        """Unknowns of the given control points (k,) N m^2 and K0, nuisances at their prior means."""
+    def start(self, law: ComplianceLaw, pre_curvature: float) -> Array:
+        """Unknowns (q,) of a law and K0 (1/m), nuisances at their means."""
         u = np.zeros(self.size)
-        u[: self.knots.size] = np.log(ordinates / self.unit)
-        u[self.knots.size] = pre_curvature * self.length
+        u[: self.basis.size] = law.coefficients if law.basis is self.basis else self.basis.projected(law)
+        u[self.basis.size] = pre_curvature * self.length
         return u
 
-    def carried(self, u: Array, knots: Array) -> Array:
-        """Logarithms of the same law's f_EI at other knots (k,), the unknowns of a model that has those."""
-        # Outside its knots the law is a straight line, which must not start a control point below zero.
-        ordinates = np.maximum(self.characteristic(u).f(knots), 0.05 * self.ordinates(u).min())
-        return np.asarray(np.log(ordinates / self.unit))
+    def on(self, basis: LawBasis, u: Array) -> tuple[FitModel, Array]:
+        """The model with another basis, and the unknowns (q,) of the same law there."""
+        coefficients = basis.projected(self.law(u))
+        return replace(self, basis=basis), np.concatenate([coefficients, u[self.basis.size :]])
 
 
 def step_data(test: MeasuredTest, *, blocks: int = 160) -> tuple[StepData, ...]:
@@ -213,16 +198,8 @@ def zero_of_displacement(data: tuple[StepData, ...]) -> tuple[float, float] | No
     return float(zeros.mean()), float(np.hypot(spread, stds.max()))
 
 
-def fit_model(
-    test: MeasuredTest,
-    data: tuple[StepData, ...],
-    knots: Array,
-    *,
-    elements: int,
-    prior: LawPrior | None = None,
-    unit: float = 1.0,
-) -> FitModel:
-    """Model of the given steps with its nuisances; the prior is that of first fits if none is given."""
+def fit_model(test: MeasuredTest, data: tuple[StepData, ...], basis: LawBasis, *, elements: int) -> FitModel:
+    """Model of the given steps with its nuisances."""
     nuisances = {
         "length": max(test.length_std, NO_ERROR * test.length),
         "scale": max(test.scale_std, NO_ERROR),
@@ -240,13 +217,10 @@ def fit_model(
             nuisances |= {f"{name}/{d.step.step}": d.axis_std for name in POSE}
         elif d.step.displacement_std:
             nuisances[f"moved/{d.step.step}"] = d.step.displacement_std
-    prior = prior or first_prior(knots)
     return FitModel(
         data,
         test.length,
-        knots,
-        prior,
-        unit,
+        basis,
         elements,
         None if zero is None else zero[0],
         nuisances,

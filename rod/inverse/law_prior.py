@@ -24,7 +24,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rod.characteristic import Characteristic
 from rod.inverse.knots import first_slope, roughness
@@ -106,9 +105,3 @@ def places_of(law: Characteristic, knots: Array, pre_curvature: float) -> tuple[
 def log_volume(places: Array) -> float:
     """Half the log determinant of the roughness between fixed end knots: of the density's norm for sizes of one."""
     return 0.5 * float(np.linalg.slogdet(roughness(places)[1:-1, 1:-1])[1])
-
-
-def forms(knots: Array, covariance: Array, at: Array) -> Array:
-    """Forms of log f at the curvatures `at` (n,) 1/m, one standard deviation each, from the covariance of z, (n, k)."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(CubicSpline(knots, vectors * np.sqrt(np.maximum(values, 0.0)), bc_type="natural")(at))

@@ -3,12 +3,11 @@
 The discrete rod is fitted to the positions of the midlines and to the forces of all steps at once, each residual
 divided by its standard deviation (Eq. (7) with statistical weights in place of w; the paper's own objective is in
 `rod.paper_fit`). Unknowns and data: `rod.inverse.fit_model`; residuals and exact jacobian: `rod.inverse.evaluation`;
-scipy's trust-region reflective method.
+the law and what is known of its form: `rod.compliance_law`, `rod.law_prior`; the method: `rod.inverse.fit`.
 
-Strategy: (1) a fit with three control points from a straight line of K over P y; (2) a fit with many control points
-over the range that the cable visits, whose linearisation gives the evidence of every smaller number; (3) a fit with the
-chosen number, the smoothness of log f averaged over with its evidence as the weight, so the band holds the error of the
-spline itself; (4) bands by propagation, on the visited range only.
+Strategy: (1) a rough regression of K on P y gives a law and K0; (2) fits from there and, where K0 may have a
+second valley, from both sides of it; the best by its evidence; (3) where the simulation cannot follow the data within
+their noise, the misfit counts as noise; (4) bands by propagation, on the visited range only.
 
 Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; f_EI is the
 tangent reading dm/dK; SI units.
@@ -23,13 +22,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.equilibrium import Outcome
-from rod.inverse.control_points import FIRST_BLUR, START_PRECISION, Fit, chosen_knots, fit
 from rod.inverse.estimate import Estimate, InverseOutcome, read_off
 from rod.inverse.evaluation import Evaluation, evaluate, imposed_chord
+from rod.inverse.fit import Fit, fit
 from rod.inverse.fit_model import FitModel, StepData, fit_model, step_data
-from rod.inverse.knots import place_knots
 from rod.inverse.options import InverseOptions
+from rod.law_prior import averaged, priors
 from rod.measurement import MeasuredTest
 
 __all__ = ["Estimate", "InverseOptions", "InverseOutcome", "estimate"]
@@ -45,6 +45,17 @@ REACHING = 10
 REACH = 4.0
 """Standard deviations of what is stated by which chords may be shortened; a length that is wrong asks for more."""
 
+SIDE = 0.15
+"""Of the range of curvature: how far to both sides of K0 a second valley is looked for."""
+
+ROUGH, INDEPENDENT, REGRESSIONS = 0.02, 30.0, 12
+"""Of the regression that a fit starts from: curvatures are off by that share of their range, so many of them on their
+own, and so many iterations, which need not settle."""
+
+FITS = 1.14
+"""Root mean square of the whitened residuals of photos up to which a fit needs no other start: with hundreds of data
+noise alone stays below it."""
+
 
 def estimate(
     test: MeasuredTest, *, start: tuple[float, float] | None = None, options: InverseOptions | None = None
@@ -55,7 +66,7 @@ def estimate(
     ----------
     test : MeasuredTest
     start : (N m^2, 1/m) or None
-        Constant EI and K0 to start from; None takes both from a straight line of curvature over moment.
+        Constant EI and K0 to start from; None takes both from a regression of curvature on moment.
     options : InverseOptions or None
         None means the defaults.
 
@@ -71,26 +82,50 @@ def estimate(
     moments, curvatures = moments_and_curvatures(data)
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
-    line = straight_line(moments, curvatures)
-    fits: list[Fit] = []
-    for begin in [line if start is None else start, *_further_starts(line, test.length)]:
-        fits.append(first_fit(test, data, begin, line, options))
-        if fits[-1].settled and fits[-1].chi2 < fits[-1].evaluation.value.size:
-            break  # residuals of the size of the blurred noise: no other optimum can be much better
-    best = min(fits, key=lambda f: f.chi2)
-    if best.evaluation.failure is not None:
-        return Estimate(_refusal(best.evaluation.failure), iterations=sum(f.evaluations for f in fits))
-    chosen, evidence, evaluations = chosen_knots(best, options)
+    straight = straight_line(moments, curvatures) if start is None else start
+    basis = moment_basis(float(moments.min()), float(moments.max()), unit=1.0 / straight[0])
+    model = fit_model(test, data, basis, elements=options.elements)
+    line = basis.law(np.zeros(basis.size)), straight[1]
+    used = 0
+    for law, K0 in ([regressed(*line, moments, curvatures)] if start is None else []) + [line]:
+        best = _from(model, law, K0, options)
+        used += best.evaluations
+        if best.posterior is not None:
+            break
+    if best.posterior is None or not any(d.at_rest for d in data) or best.model.blur[0] * best.misfit[0] > FITS:
+        if best.posterior is not None:
+            law, K0 = best.model.law(best.evaluation.unknowns), best.model.pre_curvature(best.evaluation.unknowns)
+        apart = SIDE * float(np.ptp(curvatures))
+        for begin in (K0 - apart, K0 + apart):
+            found = _from(model, law, begin, options)
+            used += found.evaluations
+            if found.log_evidence > best.log_evidence:
+                best = found
+    if best.posterior is None:
+        return Estimate(_refusal(best.evaluation.failure), iterations=used)
     result = read_off(
-        chosen.model,
-        chosen.evaluation,
-        chosen.posterior(options.tau),
+        best.model,
+        best.evaluation,
+        best.posterior,
         options=options,
-        outcome=InverseOutcome.CONVERGED if chosen.settled else InverseOutcome.STALLED,
+        outcome=InverseOutcome.CONVERGED if best.settled else InverseOutcome.STALLED,
     )
     if result.converged and result.invisible:
         result = replace(result, outcome=InverseOutcome.NOT_VISIBLE)
-    return replace(result, evidence=evidence, iterations=evaluations + sum(f.evaluations for f in fits))
+    return replace(result, iterations=used)
+
+
+def _from(model: FitModel, law: ComplianceLaw, K0: float, options: InverseOptions) -> Fit:
+    """Fit from a law and K0 (1/m)."""
+    model = replace(model, basis=law.basis)
+    u = model.start(law, K0)
+    trial = evaluate(model, u)
+    if trial.failure is Outcome.UNREACHABLE:
+        u = within_reach(model, u)
+        trial = evaluate(model, u)
+    if trial.failure is None:
+        u = rescaled(model, trial)
+    return fit(model, u, evaluations=options.evaluations)
 
 
 def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:
@@ -106,38 +141,26 @@ def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:
 
 def straight_line(m: Array, K: Array) -> tuple[float, float]:
     """Constant EI (N m^2) and K0 (1/m) by a straight line of curvature over moment."""
-    slope, K0 = np.polyfit(m / np.abs(m).max(), K, 1)
+    slope, K0 = (float(v) for v in np.polyfit(m, K, 1))
     # Noise alone may turn the slope around; its size is still a start.
-    return float(np.abs(m).max() / max(abs(slope), 1e-3 * np.ptp(K))), float(K0)
+    return float(np.ptp(m)) / max(abs(slope) * float(np.ptp(m)), ROUGH * float(np.ptp(K))), K0
 
 
-def _further_starts(line: tuple[float, float], length: float) -> list[tuple[float, float]]:
-    """Starts for data on which the first one fails: the straight line, and K0 to both sides of it."""
-    EI, K0 = line
-    return [line, *((EI, K0 + turn / length) for turn in (-0.4, 0.4))]
+def regressed(law: ComplianceLaw, K0: float, m: Array, K: Array) -> tuple[ComplianceLaw, float]:
+    """Law and K0 (1/m) by a rough regression of curvature on moment from a straight line, all points of all photos.
 
-
-def first_fit(
-    test: MeasuredTest,
-    data: tuple[StepData, ...],
-    begin: tuple[float, float],
-    line: tuple[float, float],
-    options: InverseOptions,
-) -> Fit:
-    """Three control points over the measured range of curvature, from a constant EI and K0."""
-    EI, K0 = begin
-    seen = np.concatenate([d.step.shape.kappa[d.step.shape.seen] for d in data if d.step.shape is not None])
-    low, high = line[1], float(np.quantile(seen, 0.995))
-    knots = place_knots(min(low, high - 0.2 * abs(high)), high, 3)
-    model = replace(fit_model(test, data, knots, elements=options.elements, unit=line[0]), blur=FIRST_BLUR)
-    u = model.start(np.full(3, EI), K0)
-    trial = evaluate(model, u)
-    if trial.failure is Outcome.UNREACHABLE:
-        u = within_reach(model, u)
-        trial = evaluate(model, u)
-    if trial.failure is None:
-        u = rescaled(model, trial)
-    return fit(model, u, starts=trial.equilibria, evaluations=options.evaluations, precision=START_PRECISION)
+    The line would do for most cables. One that loses its stiffness early is bent along half of its length at nearly one
+    moment: a line through that lies far from its K0.
+    """
+    basis = law.basis
+    u = np.concatenate([law.coefficients, [K0]])
+    std = ROUGH * float(np.ptp(K)) * np.sqrt(K.size / INDEPENDENT)
+    for _ in range(REGRESSIONS):
+        law = basis.law(u[:-1])
+        J = np.column_stack([law.bend_by_coefficients(m), np.ones(m.size)]) / std
+        move = averaged((law.bend(m) + u[-1] - K) / std, J, u, priors(basis, smooth=False)).mean - u
+        u = u + move * min(1.0, 1.0 / max(float(np.abs(move[:-1]).max()), 1e-300))
+    return basis.law(u[:-1]), float(u[-1])
 
 
 def within_reach(model: FitModel, u: Array) -> Array:
@@ -166,9 +189,9 @@ def rescaled(model: FitModel, trial: Evaluation) -> Array:
     c = float(np.sum(measured * simulated / std**2) / np.sum((simulated / std) ** 2))
     u = trial.unknowns.copy()
     if c > 0.0:
-        u[: model.knots.size] += np.log(c)
+        u[: model.basis.size] -= np.log(c)
     return u
 
 
-def _refusal(failure: Outcome) -> InverseOutcome:
+def _refusal(failure: Outcome | None) -> InverseOutcome:
     return InverseOutcome.LIMIT_POINT if failure is Outcome.LIMIT_POINT else InverseOutcome.NO_EQUILIBRIUM

@@ -1,21 +1,17 @@
-"""Linearised posterior of the inverse problem, averaged over the priors of the law's form; evidence of fewer knots.
+"""Linearised posterior of a fit with a spline of log f, averaged over the priors of the law's form.
 
 Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every prior of the
 law's form (`rod.inverse.law_prior`: along what and how smooth, how steep at rest) follow from one normal matrix. What
 the data leave open about the prior widens the bands.
-The same matrix, projected on splines through fewer control points, gives the evidence of their number without a fit.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
-from rod.inverse.evaluation import Evaluation
-from rod.inverse.fit_model import FitModel
 from rod.inverse.knots import first_slope, roughness
 from rod.inverse.law_prior import Along, LawPrior, log_volume
 
@@ -26,10 +22,6 @@ TAU_STEPS = 15
 
 SLOPES, SLOPE_STEPS = (0.03, 3.0), 5
 """Sizes of the prior of the slope d log f / dt at K0: from none that could be seen to a factor e^3 over the range."""
-
-TOLD = 0.1
-"""Least singular value, relative to the largest, of the interpolation between two sets of knots by which one tells of
-the other: 0.5 or more between sets over the same range, nothing like it where they hardly overlap."""
 
 
 @dataclass(frozen=True)
@@ -58,36 +50,6 @@ class Averaged:
     prior: LawPrior
     law_covariance: Array
     log_evidence: float
-
-
-def averaged(
-    model: FitModel, found: Evaluation, *, taus: tuple[float, float], without: tuple[str, ...] = ()
-) -> Averaged:
-    """Posterior from the rows of an evaluation, the blocks named in `without` left out."""
-    J, value = _data_rows(found, without)
-    return average(value, J, found.unknowns, model.places(found.unknowns), taus)
-
-
-def evidence_of_knots(model: FitModel, found: Evaluation, knots: Array, *, taus: tuple[float, float]) -> float:
-    """Log evidence of other, fewer control points, from the linearisation of a fit with many."""
-    J, value = _data_rows(found, ())
-    k = model.knots.size
-    onto = np.asarray(CubicSpline(knots, np.eye(knots.size), bc_type="natural")(model.knots))
-    # what the fit's knots do not tell of a control point, where they lie elsewhere, stays as the fit's law has it
-    z = model.carried(found.unknowns, knots)
-    z += np.linalg.lstsq(onto, found.unknowns[:k] - onto @ z, rcond=TOLD)[0]
-    moved = value + J[:, :k] @ (onto @ z - found.unknowns[:k])
-    projected = np.hstack([J[:, :k] @ onto, J[:, k:]])
-    unknowns = np.concatenate([z, found.unknowns[k:]])
-    places = replace(model, knots=knots).places(unknowns)
-    return average(moved, projected, unknowns, places, taus).log_evidence
-
-
-def _data_rows(found: Evaluation, without: tuple[str, ...]) -> tuple[Array, Array]:
-    keep = np.ones(found.value.size, dtype=bool)
-    for name in ("smoothness", *without):
-        keep[found.blocks[name]] = False
-    return found.jacobian[keep], found.value[keep]
 
 
 def _priors(along: tuple[Along, ...], taus: tuple[float, float]) -> tuple[list[LawPrior], Array, Array]:

@@ -53,7 +53,7 @@ def test_every_function_is_the_derivative_of_the_next(reading: str, even: bool, 
     assert np.allclose(slope(law.energy), law.moment(K, K0), atol=1e-7 * size)
     assert np.allclose(slope(law.moment), law.tangent(K, K0), atol=1e-7 * size)
     assert np.allclose(slope(law.moment, by_rest=True), law.moment_by_pre_curvature(K, K0), atol=1e-7 * size)
-    assert np.allclose(law.moment_by_ordinates(K, K0) @ law.ordinates, law.moment(K, K0), atol=1e-12 * size)
+    assert np.allclose(law.moment_by_parameters(K, K0) @ law.ordinates, law.moment(K, K0), atol=1e-12 * size)
     assert np.allclose(law.tangent_by_ordinates(K, K0) @ law.ordinates, law.tangent(K, K0), atol=1e-12 * size)
     assert np.allclose(law.secant(K, K0) * (K - K0), law.moment(K, K0), atol=1e-12 * size)
     assert np.allclose(law.energy(K0, K0), 0.0, atol=1e-15)

@@ -10,7 +10,6 @@ from fixtures.hidden import LOOP, hidden_test
 from rod.characteristic import Characteristic
 from rod.inverse import InverseOutcome, estimate
 from rod.inverse.estimate import invisible_combinations
-from rod.inverse.law_prior import LawPrior
 from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
@@ -43,19 +42,11 @@ def test_sharp_photos_give_the_law_back():
     assert result.law.pre_curvature == pytest.approx(LAW.K0, abs=2e-3)
 
 
-def test_a_spline_law_is_found_with_its_knots_few():
+def test_a_law_that_is_a_spline_of_its_stiffness_is_found():
     law = SplineLaw(Characteristic.from_ordinates((0, 8, 16), (5e-3, 3e-3, 2e-3)), 2.0)
     result = estimate(measured(law=law))
     assert rms(result, law) < 0.012  # twice the standard deviation of a point, 0.6 %
     assert result.law.pre_curvature == pytest.approx(2.0, abs=0.01)
-    # Three control points suffice; more gain no evidence worth the name.
-    assert result.evidence[3] > -2.0
-
-
-def test_evidence_asks_for_more_control_points_where_the_law_bends():
-    chords = force_free(LAW, LENGTH).chord - np.arange(1, 7) * 4e-3
-    strong = replace(LAW, EI1=0.7e-3, kc=2.5)
-    assert estimate(measured(law=strong, chords=chords), options=QUICK).evidence[3] < -20.0
 
 
 @pytest.mark.parametrize(
@@ -85,13 +76,16 @@ def test_far_starts_find_the_same_optimum_of_any_cable(number):
     assert np.all(np.abs(far.tangent - near.tangent) < 0.05 * near.tangent_std)
 
 
-def test_results_scale_with_the_stiffness():
-    unit = law_of(measured(), options=QUICK)
-    other = law_of(measured(law=replace(LAW, EI0=1.0, EI1=0.3)), options=QUICK)
-    # The fit stops within a thousandth of a standard deviation, not at the last digit.
-    assert np.all(np.abs(other.tangent * 5e-3 - unit.tangent) < 0.01 * unit.tangent_std)
-    assert np.allclose(other.tangent_std * 5e-3, unit.tangent_std, rtol=1e-3)
-    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.01 * unit.pre_curvature_std)
+@pytest.mark.parametrize("stiffer", [1e-3, 200.0])
+def test_results_scale_with_the_stiffness(stiffer):
+    """The same photos with all forces larger by a factor: photos made anew differ by 1e-5 in the curvature."""
+    test = measured()
+    steps = tuple(replace(s, force=stiffer * s.force, force_std=stiffer * s.force_std) for s in test.steps)
+    unit, other = law_of(test, options=QUICK), law_of(replace(test, steps=steps), options=QUICK)
+    # The fit stops within a few thousandths of a standard deviation, not at the last digit.
+    assert np.all(np.abs(other.tangent / stiffer - unit.tangent) < 0.005 * unit.tangent_std)
+    assert np.allclose(other.tangent_std / stiffer, unit.tangent_std, rtol=5e-4)
+    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.005 * unit.pre_curvature_std)
 
 
 def test_finer_rods_change_nothing_beyond_a_tenth_of_the_band():
@@ -164,7 +158,10 @@ def test_axes_seen_too_far_apart_are_found_and_leave_the_law_alone(seed, foot):
     steps = tuple(replace(step, picture_centre=(0.1, 0.01)) for step in test.steps)  # not just above the camera's foot
     test = replace(test, steps=steps, axis_parallax_std=2.5e-3, camera_foot_std=0.05)
     result = estimate(test, options=QUICK)
-    assert result.model.nuisance(result.unknowns, "parallax") == pytest.approx(parallax, abs=0.1 * parallax)
+    place = result.model.index("parallax")
+    std = 2.5e-3 * np.sqrt(result.covariance[place, place])
+    assert std < 0.1 * parallax
+    assert result.model.nuisance(result.unknowns, "parallax") == pytest.approx(parallax, abs=3 * std)
     assert rms(result, LAW) < 0.02  # as without the error: 0.3 to 1.2 % by the seed
     assert result.evaluation.chi2("shape")[0] < 1.2 * result.evaluation.chi2("shape")[1]
 
@@ -202,7 +199,9 @@ def test_what_the_model_cannot_follow_widens_the_bands_and_bends_no_nuisance():
     good, bad = estimate(test), estimate(whole)
     assert bad.outcome is not InverseOutcome.NO_EQUILIBRIUM
     assert bad.model.blur[1] > 3.0
-    assert np.median(bad.law.tangent_std) > 3.0 * np.median(good.law.tangent_std)
+    # three forces 15 % too large for one law, three as much too small: their mean is known to 15 % over sqrt(6)
+    assert np.median(bad.law.tangent_std / bad.law.tangent) > 0.9 * 0.15 / np.sqrt(6)
+    assert np.median(bad.law.tangent_std) > 2.0 * np.median(good.law.tangent_std)
     assert all(abs(bad.unknowns[bad.model.index(name)]) < 3.0 for name in ("length", "scale"))
     # Residuals are reported in the noise as stated, not in the blurred one.
     assert bad.evaluation.chi2("force")[0] / 6 > 100.0
@@ -243,20 +242,15 @@ def test_one_photo_that_says_nothing_of_the_shape_ends_in_an_outcome(doubt_m):
     assert result.outcome is InverseOutcome.NOT_VISIBLE
 
 
-def test_a_prior_is_carried_to_knots_beyond_its_own():
-    knots = np.array([1.0, 2.0, 4.0])
-    prior = LawPrior(np.array([0.0, 3.0, 5.0]), 1.0, 1.0)
-    assert np.allclose(prior.carried(knots, np.array([0.0, 1.0, 3.0, 4.0, 4.5, 9.0])).places, [-3, 0, 4, 5, 5.5, 10])
-
-
-def test_invisible_combinations_are_named():
-    model = replace(estimate(measured(), options=QUICK).model, knots=np.array([2.0, 4.0, 9.0]))
-    blind = np.diag([1.0, 1e-4, 1e-4, 1e-4])
-    pair = np.zeros(4)
-    pair[[0, 3]] = np.sqrt(0.5)
-    assert invisible_combinations(model, blind, bound=0.5) == ("f_EI at 2 1/m (+- 1 in the logarithm)",)
-    (text,) = invisible_combinations(model, 4.0 * np.outer(pair, pair), bound=0.5)
-    assert text == "f_EI at 2 1/m with K0 (+- 2 in the logarithm)"
+def test_what_is_not_visible_is_named():
+    result = estimate(measured(), options=QUICK)
+    p, size = result.model.basis.size, result.model.size
+    blind = np.zeros((size, size))
+    blind[p, p] = 1.0
+    assert invisible_combinations(result.model, result.law, blind, bound=0.5) == ("K0 (+- 5 1/m)",)
+    wide = replace(result.law, log_covariance=np.diag(np.where(result.law.kappa > 8.0, 1.0, 1e-4)))
+    (text,) = invisible_combinations(result.model, wide, np.zeros((size, size)), bound=0.5)
+    assert text.startswith("f_EI at 8.")
 
 
 def test_step_numbers_are_unique():

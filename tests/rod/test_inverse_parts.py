@@ -1,4 +1,4 @@
-"""Parts of the inverse problem: jacobian, distances, knots, whitening, linearised posterior."""
+"""Parts of the inverse problem: jacobian, distances, whitening, and the spline of the diagnosis."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -8,12 +8,13 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from rod.inverse.control_points import fit
+from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.inverse.evaluation import evaluate
+from rod.inverse.fit import fit
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
 from rod.inverse.knots import first_slope, place_knots, roughness
 from rod.inverse.law_prior import Along
-from rod.inverse.smoothness import average, averaged, evidence_of_knots
+from rod.inverse.smoothness import average
 from rod.inverse.whitening import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
@@ -27,8 +28,17 @@ def measured(**kind):
     return bending_test(LAW, LENGTH, CHORDS, np.random.default_rng(2), **kind)[0]
 
 
-def model_of(test, count=5, **kind):
-    return replace(fit_model(test, step_data(test, blocks=60), place_knots(2.0, 9.2, count), elements=80), **kind)
+def model_of(test):
+    basis = moment_basis(0.0, 1.05 * float(LAW.moment(9.2)), unit=1.0 / LAW.EI0)
+    return fit_model(test, step_data(test, blocks=60), basis, elements=80)
+
+
+def start_of(model, law=LAW):
+    """Unknowns at a law's own compliance."""
+    kappa = np.linspace(law.K0, law.K0 + 8.0, 400)
+    compliance = np.interp(model.basis.moments, law.moment(kappa), 1.0 / law.tangent(kappa))
+    coefficients = np.linalg.lstsq(model.basis.at_ends, np.log(compliance / model.basis.unit), rcond=None)[0]
+    return model.start(ComplianceLaw(model.basis, coefficients), law.K0)
 
 
 @pytest.mark.parametrize(("blind", "scatter"), [(False, None), (True, None), (True, 1e-4)])
@@ -41,7 +51,7 @@ def test_jacobian_against_central_differences(blind, scatter):
     assert ("moved/3" in model.nuisances) == (scatter is not None)
     rng = np.random.default_rng(0)
     u = (
-        model.start(LAW.tangent(model.knots), LAW.K0)
+        start_of(model)
         + rng.normal(0, 1, model.size) * np.r_[np.full(model.laws, 0.01), np.ones(model.size - model.laws)]
     )
     here = evaluate(model, u)
@@ -51,13 +61,15 @@ def test_jacobian_against_central_differences(blind, scatter):
         h = np.eye(model.size)[place] * (1e-4 if place < model.laws else 1e-2)
         ahead, behind = (evaluate(model, u + sign * h, starts=here.equilibria).value for sign in (1, -1))
         slope = (ahead - behind) / (2 * h[place])
-        assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * np.abs(slope).max()), place
+        # what moves no residual by a hundredth of its standard deviation is a place of the law that no shape visits
+        largest = max(np.abs(slope).max(), 1e-2)
+        assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * largest), place
 
 
 def test_residuals_are_white_at_the_truth():
     test = measured(camera=Camera(axis_px=1e-6, scale=1e-9, length=1e-9))
-    model = model_of(test, count=8)
-    found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
+    model = model_of(test)
+    found = fit(model, start_of(model))
     chi2, count = found.evaluation.chi2("shape")
     # Five standard deviations of chi2.
     assert abs(chi2 - count) < 5 * np.sqrt(2 * count)
@@ -65,8 +77,8 @@ def test_residuals_are_white_at_the_truth():
 
 def test_infinite_residuals_where_no_equilibrium_exists():
     model = model_of(measured())
-    u = model.start(np.array([5e-3, 1e-6, 5e-3, 1e-6, 5e-3]), 2.0)
-    there = evaluate(model, u)
+    longer = 0.2 / model.nuisances["scale"]  # chords a fifth longer than measured: beyond the cable's length
+    there = evaluate(model, start_of(model) + np.eye(model.size)[model.index("scale")] * longer)
     assert there.failure is not None
     assert np.all(np.isinf(there.value))
 
@@ -129,50 +141,6 @@ def test_whitener_needs_sections():
     few = replace(shape, section_s=shape.section_s[:4], section_x=shape.section_x[:4], section_y=shape.section_y[:4])
     with pytest.raises(ValueError, match="do not make a shape"):
         midline(replace(few, section_std=shape.section_std[:4]))
-
-
-def test_evidence_by_projection_is_that_of_a_fit():
-    model = model_of(measured(), count=8)
-    rich = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
-    few = model_of(measured(), count=5)
-    fitted = fit(few, few.start(LAW.tangent(few.knots), LAW.K0))
-    told = evidence_of_knots(rich.model, rich.evaluation, few.knots, taus=(0.05, 60.0))
-    exact = averaged(fitted.model, fitted.evaluation, taus=(0.05, 60.0)).log_evidence
-    assert told == pytest.approx(exact, abs=1.0)  # of logarithms: less than one decides between no two numbers
-
-
-@pytest.mark.parametrize("low", [-3.0, 0.0])
-def test_evidence_where_the_knots_of_the_fit_lie_elsewhere(low):
-    # A fit that has not settled: some of its knots lie where no step is, so fewer than are asked for tell of the law.
-    model = replace(model_of(measured(), count=12), knots=place_knots(low, 9.2, 12))
-    rich = evaluate(model, model.start(LAW.tangent(np.maximum(model.knots, LAW.K0)), LAW.K0))
-    told = [evidence_of_knots(model, rich, place_knots(2.0, 9.2, n), taus=(0.05, 60.0)) for n in range(5, 13)]
-    assert np.ptp(told) < 1.0  # of logarithms, as of the fits themselves: each of these numbers follows the law
-
-
-def test_posterior_is_the_normal_equations_where_the_priors_are_weak():
-    model = model_of(measured(), count=4)
-    found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0))
-    keep = np.ones(found.evaluation.value.size, dtype=bool)
-    keep[found.evaluation.blocks["smoothness"]] = False
-    J = found.evaluation.jacobian[keep]
-    wide = averaged(model, found.evaluation, taus=(1e4, 1e5))
-    free = np.linalg.inv(J.T @ J)
-    # Only the prior of the slope at K0 is left, which sharpens the first control point.
-    assert np.allclose(np.diag(wide.covariance)[2:], np.diag(free)[2:], rtol=0.2)
-
-
-def test_mean_over_the_priors_answers_to_the_data_by_its_covariance():
-    """The weights of the priors move with the data too, which the mean of the normal equations would miss."""
-    model = model_of(measured())
-    found = fit(model, model.start(LAW.tangent(model.knots), LAW.K0)).evaluation
-    push = np.zeros(found.value.size)
-    push[found.blocks["force/2"]] = 0.01
-    before, after, behind = (
-        averaged(model, replace(found, value=found.value + sign * push), taus=(0.05, 60.0)) for sign in (0, 1, -1)
-    )
-    told = -before.covariance @ (found.jacobian.T @ push)
-    assert np.allclose(0.5 * (after.mean - behind.mean), told, rtol=1e-3, atol=1e-4 * np.abs(told).max())
 
 
 def test_zero_of_displacement_is_that_of_the_photos():

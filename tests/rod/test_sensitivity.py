@@ -315,7 +315,7 @@ def test_nonsense_is_refused(parameter: object, message: str) -> None:
 def test_missing_ingredients_are_named() -> None:
     test = BendingTest(0.2, StickSlip(6e-3, 3e-3, 4.0), 2.0)
     steps = simulate(test, [0.01])
-    with pytest.raises(ValueError, match="only a Characteristic"):
+    with pytest.raises(ValueError, match="only a law with parameters"):
         derivatives(test, steps, ["ordinates"])
     with pytest.raises(ValueError, match="internal friction"):
         derivatives(test, steps, ["hysteresis"])

@@ -62,18 +62,22 @@ def curve(
     own = base.law_directions(fitted.vector, law.knots)  # the parameters are logarithms
     by_tangent, by_moment = np.zeros((2, points, fitted.extension.size))
     by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own
-    by_moment[:, : own.shape[1]] = law.moment_by_ordinates(K, K0) @ own
+    by_moment[:, : own.shape[1]] = law.moment_by_parameters(K, K0) @ own
     if (bend := base.pre_curvature_index) is not None:
         by_tangent[:, bend] = -_slope(law, K, K0)
         by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
     used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
-    apart_f, apart_m = [by_tangent[:, used] @ root], [by_moment[:, used] @ root]
+    by_rest = np.zeros(fitted.extension.size)
+    if bend is not None:
+        by_rest[bend] = 1.0
+    apart_f, apart_m, apart_rest = [by_tangent[:, used] @ root], [by_moment[:, used] @ root], [by_rest[used] @ root]
     for rival, chance in rivals:
         other, rest = law_of(rival), rival.extension.base.pre_curvature(rival.vector)
         weight = max(np.sqrt(chance), WITHIN)
         apart_f.append(weight * (other.tangent(K, rest) - tangent)[:, None])
         apart_m.append(weight * (other.moment(K, rest) - moment)[:, None])
+        apart_rest.append(np.array([weight * (rest - K0)]))
     factor = np.hstack(apart_f)
     tangent_std, moment_std = (np.linalg.norm(columns, axis=1) for columns in (factor, np.hstack(apart_m)))
     excess = K - K0
@@ -90,6 +94,7 @@ def curve(
         secant_std_Nm2=secant_std.tolist(),
         supported=[True] * points,
         tangent_factor_Nm2=factor.tolist(),
+        pre_curvature_factor_per_m=np.concatenate(apart_rest).tolist(),
     )
 
 

@@ -28,10 +28,12 @@ from pipeline.diagnosis.fits.workbench import with_knots
 from pipeline.diagnosis.observations.observation import Observation, of_hold
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.law_prior import FIRST_SIZES, places_of
-from rod.inverse.options import InverseOptions
 from rod.inverse.smoothness import Averaged, average
 
 Array = NDArray[np.float64]
+
+TAUS = (0.05, 60.0)
+"""Range of the roughness of log f that is averaged over: from nearly straight to a change by a factor e^7."""
 
 FLOOR = 0.02
 """Share of the largest ordinate below which none starts: beyond its own control points a spline may fall to zero."""
@@ -202,7 +204,7 @@ def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = N
     law, K0 = base.characteristic(fitted.vector), base.pre_curvature(fitted.vector)
     value, J = _data_rows(observation, fitted, np.zeros((len(fitted.residual), 0)) if beside is None else beside)
     unknowns = np.r_[fitted.vector, np.zeros(J.shape[1] - len(fitted.vector))]
-    return average(value, J, unknowns, places_of(law, base.knots + K0, K0), InverseOptions().tau)
+    return average(value, J, unknowns, places_of(law, base.knots + K0, K0), TAUS)
 
 
 def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ from fixtures.photographed.trial import answer
 from fixtures.scores import fitted_base, observed
 from fixtures.trials import Trial, f_error, made
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.diagnose import chosen_knots
 from pipeline.diagnosis.fits import workbench
 from pipeline.diagnosis.fits.extended import curve as curve_of
 from pipeline.diagnosis.fits.extended import curve_change
@@ -96,7 +95,7 @@ def test_every_cause_leaves_a_trace_beside_a_base_model_at_its_limits():
     Without a trace the friction was never refitted, and a displacement offset named alone (probability 1).
     """
     trial = Trial(kind="hidden", protocol="three", seed=30000, names=("bearing_friction",), times=4.0)
-    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS, knots=chosen_knots(None, SETTINGS))
+    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS, knots=SETTINGS.knots)
     assert not isinstance(bench, str), bench
     suspicion = bench.suspicion
     for name in ("bearing_friction", "bearing_stiffness"):

@@ -58,7 +58,6 @@ class Case:
     inverse: Score
     balance: Score
     p_value: float
-    knots: int
     alarms: tuple[str, ...]
 
 
@@ -76,7 +75,6 @@ def case(seed, number, *, kind="stick-slip", axes=0.0):
         Score.of(found.inverse.law, law),
         Score.of(found.balance.law, law),
         found.agreement.p_value,
-        found.inverse.characteristic.knots.size,
         tuple(finding.code for finding in found.findings if finding.level != "info"),
     )
 

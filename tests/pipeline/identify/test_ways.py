@@ -10,7 +10,6 @@ from pipeline.identify.agreement import difference_covariance, log_curve, rest_c
 from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
 from pipeline.result import Result, SpecimenPart, from_json, to_json
 from rod.inverse import InverseOutcome
-from rod.inverse.law_prior import forms
 
 
 def with_steps(test, change):
@@ -49,7 +48,7 @@ def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     noise = sum(
         gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.law.gains.items()
     )
-    short = way.law.shortfall @ forms(way.model.knots, way.law_covariance, way.law.kappa)
+    short = way.law.shortfall @ way.law_forms
     ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.law.log_covariance))
     # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
     # mostly prior. What the midline knows beyond the smooth curve is missing: a sixth.

@@ -1,5 +1,7 @@
 """Equivalent stiffness, smallest radius and pooling against closed forms and repeated draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,9 @@ def straight(low, slope, std, factor=None):
     tangent = low + slope * kappa
     zeros = np.zeros(11)
     factor = np.zeros((11, 0)) if factor is None else factor
-    return Visited("inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor)
+    return Visited(
+        "inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor, np.zeros(factor.shape[1])
+    )
 
 
 def test_equivalent_stiffness_is_the_rise_of_the_moment(full_result):
@@ -38,10 +42,7 @@ def test_error_of_equivalent_stiffness_follows_the_covariance():
 def test_error_of_equivalent_stiffness_by_repetition():
     rng, factor = np.random.default_rng(3), np.column_stack([np.full(11, 0.3), np.linspace(0.0, 0.5, 11)])
     curve = straight(5.0, -0.2, 0.0, factor)
-    draws = [
-        equivalent(Visited(*([curve.method, curve.kappa] + [curve.tangent + factor @ rng.normal(size=2)] * 6), factor))
-        for _ in range(2000)
-    ]
+    draws = [equivalent(replace(curve, tangent=curve.tangent + factor @ rng.normal(size=2))) for _ in range(2000)]
     # standard error of a standard deviation from 2000 draws is 1.6 %; four of them
     assert np.std([d.stiffness for d in draws]) == pytest.approx(equivalent(curve).std, rel=0.064)
 
@@ -126,7 +127,7 @@ def test_pooling_false_alarms_by_repetition():
 
 def test_pooling_needs_two_specimens_and_a_common_range():
     one, other = straight(5.0, 0.0, 0.1), straight(5.0, 0.0, 0.1)
-    shifted = Visited(other.method, other.kappa + 20.0, *[other.tangent] * 6, other.factor)
+    shifted = replace(other, kappa=other.kappa + 20.0)
     assert pool([one]) is None
     assert pool([one, shifted]) is None
 

@@ -185,11 +185,11 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
     ("sentence", "told"),
     [
         (
-            "inverse problem: " + InverseOutcome.NOT_VISIBLE.value + "; open: f_EI at 3.4 1/m; "
-            "f_EI at 5.2 1/m (+- 0.3 in the logarithm)",
+            "inverse problem: " + InverseOutcome.NOT_VISIBLE.value + "; open: "
+            "f_EI at 3.4 1/m (+- 0.2 in the logarithm); f_EI at 5.2 1/m (+- 0.3 in the logarithm)",
             "inverses Problem: die Daten legen nicht jeden Parameter fest (die offenen Kombinationen stehen daneben); "
-            "weiter biegen, Schritte oder ein Foto des kraftfreien Kabels ergänzen; offen: f_EI bei 3,4 1/m; "
-            "f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
+            "weiter biegen, Schritte oder ein Foto des kraftfreien Kabels ergänzen; offen: "
+            "f_EI bei 3,4 1/m (± 0,2 im Logarithmus); f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
         ),
         (
             InputError("key 'lenght_mm' is not known in [specimen]", path="a b/specimen.toml", line=3, code="x",

@@ -69,7 +69,7 @@ def test_extended_model_answers_in_every_table(diagnosed, written):
 def test_control_points_where_the_fit_is_the_answer(full_result):
     words = Words("en")
     assert len(knot_rows(full_result, words)) == len(full_result.inverse.knots)
-    assert "Control points" in knot_title(full_result, words)
+    assert "Points of the characteristic" in knot_title(full_result, words)
 
 
 def test_failed_specimen_has_tables_with_heads_only(failed_result, tmp_path):

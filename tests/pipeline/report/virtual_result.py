@@ -188,7 +188,6 @@ def ways(rng):
         pre_curvature_std_per_m=0.013,
         supported_per_m=(2.0, 8.7),
         knots=knots,
-        knots_chosen_by="held-out error of the steps: 4 of 3 to 6",
         curve=curve,
         misfit=misfit,
         nuisance={"scale": (1.0002, 0.0004)},

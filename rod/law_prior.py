@@ -1,0 +1,236 @@
+"""What is known of the form of a law before its data, and the posterior averaged over what is not known of it.
+
+The unknowns of a law are the coefficients a of g = log c on a `rod.compliance_law.LawBasis`, over its abscissa t = xi
+from 0 to 1, or over the logarithm of its distance from rest. With g1, g2, g3 the derivatives of g by t, a prior of one
+form is one of
+
+    rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
+    smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
+
+with tau of `TAUS`, times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
+of rest. They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall
+smoothly are known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws
+that change most just beside rest, where covers hide the cable, by those over the logarithm. Nothing is chosen: the
+posterior is the average over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and
+the bands hold what the data leave open.
+
+Both ways to the characteristic read the law through this module; nothing else do they share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from rod.compliance_law import LawBasis, splines
+
+Array = NDArray[np.float64]
+
+REACH = 0.25
+"""Of the abscissa: so far apart the log compliance of a rough law has forgotten itself."""
+
+REST_SLOPES = (0.5, 3.0)
+"""Prior standard deviations of g1 at rest: of cables that bend alike to both sides, whose law is flat there, and of
+such as were set and are steepest there."""
+
+NEAR_REST = 0.02
+"""Of the abscissa: nearer to rest its logarithm is a straight line. So much lies under the covers of most photos."""
+
+TAUS = np.geomspace(0.05, 300.0, 12)
+"""From laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor of two apart,
+over which the posterior hardly changes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Priors of one form with all `TAUS`: precisions ``form / tau^2 + fixed`` of the coefficients.
+
+    Attributes
+    ----------
+    form, fixed : (p, p)
+    log_norms : (t,)
+        Logarithms of the densities' norms, the level left out.
+    """
+
+    form: Array
+    fixed: Array
+    log_norms: Array
+
+
+def family(form: Array, fixed: Array) -> Family:
+    """Family with its norms."""
+    size = len(form)
+    level = np.full((size, size), 1.0 / size)  # B-splines of equal coefficients are the level, which has no prior
+    precisions = form / TAUS[:, None, None] ** 2 + fixed + level
+    return Family(form, fixed, 0.5 * np.linalg.slogdet(precisions)[1])
+
+
+def forms(squares: list[Array], *, smooth: bool) -> list[Array]:
+    """Rough form, and the smooth one if asked for, of the integrals (p, p) of g1^2, g2^2, g3^2."""
+    first, second, third = squares
+    return [second + first / REACH**2, third + second + first][: 1 + smooth]
+
+
+def integrals(spline: BSpline, rest: float | None = None) -> list[Array]:
+    """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or over its logarithm from `rest` on."""
+    edges = np.unique(spline.t if rest is None else np.append(spline.t, rest))
+    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
+    half = 0.5 * np.diff(edges)[:, None]
+    at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
+    # dt, d^2t, d^3t by xi
+    pace, bend, turn = np.ones_like(at), np.zeros_like(at), np.zeros_like(at)
+    if rest is not None:
+        reach = max(rest, 1.0 - rest)
+        apart = np.abs(at - rest) / reach + NEAR_REST
+        pace = 1.0 / (reach * np.log((1.0 + NEAR_REST) / NEAR_REST) * apart)
+        bend, turn = -np.sign(at - rest) * pace / (reach * apart), 2.0 * pace / (reach * apart) ** 2
+    first, second, third = (np.asarray(spline(at, order)).T for order in (1, 2, 3))
+    first = first / pace
+    second = (second - first * bend) / pace**2
+    third = (third - 3.0 * second * pace * bend - first * turn) / pace**3
+    return [(d * weight * pace) @ d.T for d in (first, second, third)]
+
+
+@lru_cache(maxsize=64)
+def _families(size: int, rest: float, *, smooth: bool) -> tuple[Family, ...]:
+    """Priors of `size` coefficients, rest at the abscissa `rest`."""
+    spline = splines(size)
+    rise = np.asarray(spline(rest, 1))
+    return tuple(
+        family(form, np.outer(rise, rise) / slope**2)
+        for squares in (integrals(spline), integrals(spline, rest))
+        for slope in REST_SLOPES
+        for form in forms(squares, smooth=smooth)
+    )
+
+
+def priors(basis: LawBasis, *, smooth: bool = True) -> tuple[Family, ...]:
+    """All priors of a law's form, or those of rough laws alone.
+
+    With few data or much noise a smooth law is always the likeliest; a fit that is on its way takes the rough ones.
+    """
+    return _families(basis.size, float(basis.xi[2 * basis.rest]), smooth=smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Posterior of all unknowns of a fit, averaged over the priors of its law's form.
+
+    Attributes
+    ----------
+    mean : (q,)
+    covariance : (q, q)
+        Also the response: a change dr of the whitened residual moves the mean by -covariance J^T dr, priors whose
+        weight it changes included, since d log(evidence) of each is -(J (its mean - mean))^T dr up to a common term.
+    shrinkage : (q, p)
+        By how much the mean falls short of a law with the coefficients a, per unit of a.
+    weights : (f, t)
+        Of the priors.
+    log_evidence : float
+        Of the model, up to a constant of the data.
+    information : (p, p)
+        Of the data on the coefficients.
+    """
+
+    mean: Array
+    covariance: Array
+    shrinkage: Array
+    weights: Array
+    log_evidence: float
+    information: Array
+
+    @property
+    def law_covariance(self) -> Array:
+        """Covariance (p, p) of the one normal prior that would have made of the same data the same posterior.
+
+        Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says
+        nothing.
+        """
+        p = len(self.information)
+        prior = np.linalg.inv(self.covariance[:p, :p]) - self.information
+        precisions, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
+        known = precisions > 1e-9 * precisions[-1]
+        return np.asarray((vectors[:, known] / precisions[known]) @ vectors[:, known].T)
+
+
+def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ...]) -> Posterior:
+    """Average over the priors of the law's form, from the linearisation of a fit.
+
+    Parameters
+    ----------
+    value : (n,)
+        Whitened residuals of data and of all prior knowledge but that on the law's form.
+    J : (n, q)
+        Their derivatives by the unknowns.
+    unknowns : (q,)
+        Where they were taken: coefficients of the law first, then all others.
+    families : tuple of Family
+
+    Strategy: what is no coefficient is eliminated once, by orthogonal factors (in a difference of squares what data
+    that agree with each other tell would be lost); every prior acts on what is left, and mean, covariance and response
+    of all unknowns are linear in what is found there.
+    """
+    p = len(families[0].form)
+    Q, R = np.linalg.qr(J[:, p:])
+    solved = np.linalg.inv(R)
+    inner, back, offset = solved @ solved.T, -solved @ (Q.T @ J[:, :p]), -solved @ (Q.T @ value)
+    beside, left = J[:, :p] - Q @ (Q.T @ J[:, :p]), value - Q @ (Q.T @ value)
+    schur, pull = beside.T @ beside, -beside.T @ left
+    ended = [_conditioned(schur, pull, unknowns[:p], one) for one in families]
+    # what all have in common: the misfit of the data and what the unknowns eliminated fill of it
+    common = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(R)))))
+    evidence = common + np.array([one.evidence for one in ended])
+    top = float(evidence.max())
+    weights = np.exp(evidence - top)
+    log_evidence = top + float(np.log(weights.mean()))
+    weights /= weights.sum()
+    move = np.sum([one.vectors @ (w @ one.moves) for one, w in zip(ended, weights, strict=True)], axis=0)
+    covariance = np.zeros((p, p))
+    for one, w in zip(ended, weights, strict=True):
+        spread = one.moves @ one.vectors.T - move
+        covariance += (one.vectors * (w @ (1.0 / one.precisions))) @ one.vectors.T + (w[:, None] * spread).T @ spread
+    shrinkage = np.eye(p) - covariance @ schur
+    across = back @ covariance
+    return Posterior(
+        unknowns + np.concatenate([move, offset + back @ move]),
+        np.block([[covariance, across.T], [across, inner + across @ back.T]]),
+        np.vstack([shrinkage, back @ shrinkage]),
+        weights,
+        log_evidence,
+        schur,
+    )
+
+
+class _Conditioned(NamedTuple):
+    """One family given the data, in coordinates `vectors` (p, p) in which all its precisions are diagonal.
+
+    Precisions and moves are (t, p); the logarithm of the evidence (t,) lacks what all families have in common.
+    """
+
+    vectors: Array
+    precisions: Array
+    moves: Array
+    evidence: Array
+
+
+def _conditioned(schur: Array, pull: Array, a: Array, one: Family) -> _Conditioned:
+    """Posterior for all tau at once: data and form are diagonal in one and the same coordinates."""
+    scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
+    # where rounding is all that data and prior tell, it must not become a negative variance
+    scales = np.maximum(scales, scales.size * np.finfo(float).eps * scales[-1])
+    root = axes / np.sqrt(scales)
+    share, turned = np.linalg.eigh(root.T @ one.form @ root)
+    vectors = root @ turned
+    share = np.clip(share, 0.0, 1.0)
+    precisions = (1.0 - share) + share / TAUS[:, None] ** 2
+    fixed, form = vectors.T @ (one.fixed @ a), vectors.T @ (one.form @ a)
+    toward = vectors.T @ pull - fixed - form / TAUS[:, None] ** 2
+    prior = a @ (one.fixed @ a) + (a @ (one.form @ a)) / TAUS**2
+    gained = np.sum(toward**2 / precisions, axis=1) - prior
+    log_det = np.sum(np.log(precisions), axis=1) + np.sum(np.log(scales))
+    return _Conditioned(vectors, precisions, toward / precisions, one.log_norms + 0.5 * (gained - log_det))
