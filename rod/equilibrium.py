@@ -15,16 +15,17 @@ Source: Secs. 2.1 and 2.2 of the paper ("equilibria are minima of Eq. (4) under 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rod.branch import Branch, Start, bow, bow_side, bowed_start
+from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import Outcome, Trial, followed, judged, newton
+from rod.newton import Outcome, Start, Trial, descended, judged, newton
+from rod.path import TURN_LIMIT, followed
 from rod.reduction import Hold, System
-from rod.section import Memory
+from rod.section import Memory, Section
 
 __all__ = ["Branch", "Equilibrium", "Outcome", "Start", "solve"]
 
@@ -103,10 +104,11 @@ def solve(
         At the start of the step; None for the mounted cable.
     start : Start or Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape.
-    branch : {"natural", "opposite", "up", "down"}
+    branch : {"natural", "opposite", "up", "down", "jump"}
+        Side of the bow, see `rod.branch`.
     patient : bool
-        Else, with a warm start, no path is followed where neither that nor a bowed guess leads to the equilibrium: most
-        often there is none then, and to follow a path to its end costs fifty equilibria.
+        Else, with a warm start, no path is followed where neither that nor the force-free shape leads to the
+        equilibrium at once: most often there is none then, and to follow a path to its end costs fifty equilibria.
 
     Returns
     -------
@@ -115,9 +117,9 @@ def solve(
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
-    side = bow_side(rod, branch)
+    first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, start, side, branch, patient=patient):
+    for attempt in _attempts(system, first, branch, patient=patient):
         verdicts.append(attempt)
         if attempt.found:
             break
@@ -127,34 +129,52 @@ def solve(
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
-def _attempts(
-    system: System, start: Start | Equilibrium | None, side: int, branch: Branch, *, patient: bool
-) -> Iterator[Trial]:
-    """Ways to the equilibrium, the cheapest first: warm start, bowed guess, path from the force-free shape or guess."""
-    first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
+def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
+    """Ways to the equilibrium, the nearest first: warm start, path from it, path from the force-free shape, others."""
+    rod = system.rod
+    side = bow_side(rod, branch)
+    mounted = Start(rod.mounted.angles, np.zeros(2))
     if first is not None:
-        # Where only the path can tell the side, a warm start may keep the one it has; otherwise it is followed.
-        yield judged(system, newton(system, first), side or int(np.sign(bow(system.rod, first.angles))))
-    bowed = bowed_start(system, side) if side and system.hold.tip is None else None
-    if bowed is not None:
-        yield judged(system, newton(system, bowed), side)
-        if first is not None and not patient:
+        # Where only the path can tell the side, a warm start keeps the one it has.
+        kept = side or int(np.sign(bow(rod, first.angles)))
+        warm = newton(system, first)
+        near = float(np.abs(warm.angles - first.angles).max()) < TURN_LIMIT
+        verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
+        yield verdict
+        if warm.found and verdict.outcome is Outcome.LIMIT_POINT and system.excess_negatives(warm.balance) == 0:
+            return  # stable, but for a moment that falls: no other way leads to a better one
+        if not patient:
+            yield judged(system, newton(system, mounted), side)
             return
-    if first is not None:
-        yield judged(system, followed(system, first), side)
-    straight = not np.any(system.rod.section.pre_curvature)
-    if bowed is None or (branch == "natural" and not straight):
-        # Every state on this path is a proven minimum: it is the natural branch, to whichever side it bows.
-        yield judged(system, followed(system, Start(system.rod.mounted.angles, np.zeros(2))), 0)
-    else:
-        yield judged(system, followed(system, bowed), side)
+        verdict = judged(system, followed(system, first, side=side), kept)
+        yield verdict
+        if verdict.outcome is Outcome.LIMIT_POINT:
+            return
+    lost = judged(system, followed(system, side=side or 1), side if branch in ("up", "down", "opposite") else 0)
+    yield lost
+    if branch == "natural" or lost.outcome is Outcome.LIMIT_POINT:
+        return
+    if branch != "jump":
+        yield judged(system, _from_straight(system, side), side)
+    yield judged(system, descended(system, Start(lost.angles, lost.R)), side)
+
+
+def _from_straight(system: System, side: int) -> Trial:
+    """The path from a straight cable without load that bows to the side asked for: its bend and loads fade in."""
+    rod, hold = system.rod, system.hold
+    section = Section(rod.section.law, np.zeros_like(rod.section.pre_curvature), rod.section.profile)
+    straight = replace(rod, section=section, load=(0.0, 0.0))
+    bowed = followed(System(straight, replace(hold, from_zero=False), straight.virgin), side=side)
+    trial = followed(system, Start(bowed.angles, bowed.R), side=side)
+    return trial._replace(steps=trial.steps + bowed.steps)
 
 
 def _admissible(rod: Rod, hold: Hold) -> bool:
     """Whether the chord asked for can exist: positive, and not beyond the length of a cable that hardly stretches."""
     if hold.chord is None or hold.compliance:
         return True
-    return hold.chord > 0.0 and (hold.chord < rod.length or rod.axial_stiffness is not None)
+    straight = abs(hold.chord - rod.mounted.chord) <= 1e-12 * rod.length
+    return hold.chord > 0.0 and (hold.chord < rod.length or straight or rod.axial_stiffness is not None)
 
 
 def _force_free(system: System) -> Trial:

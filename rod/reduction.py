@@ -22,6 +22,7 @@ Signs and units as in `rod.discretisation`; P = -R_x is the force along the chor
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from scipy.linalg.lapack import dgesv, dgtsv, dpttrf
 from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.section import Memory
+from rod.support import Support
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,17 @@ class EdgeState(NamedTuple):
     across: Array
 
 
+class _End(NamedTuple):
+    """An end of the cable: its place among the angles, what holds it, its angles, friction's memory, sign of a moment."""
+
+    place: int
+    support: Support
+    mounted: float
+    rest: float
+    slip: float
+    sign: float
+
+
 class System:
     """Residuals and Newton steps of one rod, hold and memory; built once per equilibrium, immutable afterwards."""
 
@@ -115,27 +128,42 @@ class System:
         self._difference = self._axial - self._shear
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
+        self._ends = self._acting_ends()
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
+
+    @cached_property
+    def mass(self) -> Array:
+        """Weight of every angle (n + 2,) N m in sums of squares of turns: its share of the length, times EI/L."""
+        return np.asarray(self.rod.edges * (self.moment_scale / self.rod.length))
+
+    def misfit(self, balance: Balance) -> float:
+        """Largest residual, relative to EI/L and L."""
+        g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
+        moment = max(float(g.max()), -float(g.min())) / self.moment_scale
+        return max(moment, abs(gap_x) / self.rod.length, abs(gap_y) / self.rod.length)
 
     def section(self, K: Array) -> tuple[Array, Array]:
         """Moment and tangent (n,) of the cross-section at curvatures (n,), with the memory at the start of the step."""
         return self._response(K)
 
-    def edge_state(self, angles: Array, R: Array) -> EdgeState:
+    def edge_state(self, angles: Array, R: Array, share: float = 1.0) -> EdgeState:
         """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
         cos, sin = np.cos(angles), np.sin(angles)
         beyond = self.rod.load_beyond
-        fx, fy = R.tolist() if beyond is None else R[:, None] + beyond
+        fx, fy = R.tolist() if beyond is None else R[:, None] + share * beyond
         return EdgeState(cos, sin, fx * cos + fy * sin, fy * cos - fx * sin)
 
-    def balance(self, angles: Array, R: Array) -> Balance:
-        """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
+    def balance(self, angles: Array, R: Array, share: float = 1.0) -> Balance:
+        """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,).
+
+        Of loads, end moments, clamps turned and the chord's change from the mounted one, ``share`` is acting.
+        """
         h = self.rod.edges
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
-        edge = self.edge_state(angles, R)
+        edge = self.edge_state(angles, R, share)
         gradient = -h * self.turning(edge)
         gradient[:-1] += m
         gradient[1:] -= m
@@ -145,9 +173,14 @@ class System:
         diagonal[1:] -= off
         border = self.border(edge)
         gap = -(self.directions(edge) @ h)
-        gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
+        if (chord := self.hold.chord) is not None:
+            chord = chord if share == 1.0 else chord + (share - 1.0) * (chord - self.rod.mounted.chord)
+            gap[0] += chord - self.hold.compliance * R[0]
+        else:
+            gap[0] = 0.0
         gap[1] *= self.hold.tip is None
-        self._hold_ends(angles, gradient, diagonal, off, border)
+        for end in self._ends:
+            self._hold_end(end, share, angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
 
     def directions(self, edge: EdgeState) -> Array:
@@ -187,18 +220,46 @@ class System:
     def _restoring(self, edge: EdgeState) -> Array:
         return edge.along + (edge.along**2 - edge.across**2) * self._difference
 
-    def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
-        """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
-        rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
-        ends = ((0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0))
-        for end, support, rest_angle, slip, sign in ends:
-            if support.kind == "clamp":
-                gradient[end] = self.moment_scale * (angles[end] - rest_angle)
-                diagonal[end], off[end], border[:, end] = self.moment_scale, 0.0, 0.0
-            elif support.stiffness or support.friction_moment or support.moment:
-                moment, slope = support.moment_at(float(angles[end]), rest_angle, slip)
-                gradient[end] += moment + sign * support.moment
-                diagonal[end] += slope
+    def _acting_ends(self) -> list[_End]:
+        """Ends where a clamp, a spring, friction or a moment acts; ideal bearings and free ends are left out."""
+        rod, memory, rest, mounted = self.rod, self.memory, self.rod.rest_angles, self.rod.mounted.angles
+        ends = (
+            _End(0, rod.left, float(mounted[0]), rest[0], memory.left_angle, -1.0),
+            _End(-1, rod.right, float(mounted[-1]), rest[1], memory.right_angle, 1.0),
+        )
+        return [
+            end
+            for end in ends
+            if end.support.kind == "clamp"
+            or end.support.stiffness
+            or end.support.friction_moment
+            or end.support.moment
+        ]
+
+    def _hold_end(
+        self, end: _End, share: float, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array
+    ) -> None:
+        """Spring, friction and moment on an end angle; a clamped angle keeps its value."""
+        at, support = end.place, end.support
+        rest = end.mounted + share * (end.rest - end.mounted)
+        if support.kind == "clamp":
+            gradient[at] = self.moment_scale * (angles[at] - rest)
+            diagonal[at], off[at], border[:, at] = self.moment_scale, 0.0, 0.0
+            return
+        moment, slope = support.moment_at(float(angles[at]), rest, end.slip)
+        gradient[at] += moment + share * end.sign * support.moment
+        diagonal[at] += slope
+
+    def clamps_turning(self, angles: Array, R: Array, tangent: Array) -> tuple[Array, Array]:
+        """Change of gradient (n + 2,) and gap (2,) per share by clamps that turn; the Hessian holds them at rest."""
+        gradient, gap = np.zeros(angles.size), np.zeros(2)
+        for end in self._ends:
+            turn = end.rest - end.mounted
+            if end.support.kind == "clamp" and turn:
+                near, joint = (1, 0) if end.place == 0 else (-2, -1)
+                gradient[near] -= tangent[joint] * self._inverse_weights[joint] * turn
+                gap += self.border(self.edge_state(angles, R))[:, end.place] * turn
+        return gradient, gap
 
     def solve(self, balance: Balance, rhs: Array, gap: Array) -> tuple[Array, Array]:
         """Solve the bordered system for several right-hand sides.

@@ -18,6 +18,7 @@ ROD = [
     ("energy", "reduction"),
     ("branch",),
     ("newton",),
+    ("path",),
     ("equilibrium",),
     ("iteration", "bending_test"),
     ("parameters",),
