@@ -12,9 +12,87 @@ Symbols, the same in every module, SI units throughout:
     f_EI       N m^2   bending stiffness characteristic, read as tangent dm/dK unless a name says secant
     d          m       displacement of the pushed bearing, positive where the bearings approach
 
-Where to begin: `characteristic` (what f_EI is), `bending_test` (the experiment simulated), `inverse` and `balance` (the
-two ways from a measured test to f_EI), `paper` (the source paper's own numbers).
+Three examples. A column under its own weight, in units of EI/L^3: Greenhill (1881) says that it buckles at 7.837.
+
+>>> from rod import CLAMP, FREE, bend
+>>> column = {"left": CLAMP, "right": FREE, "tip": (0.0, 0.0)}
+>>> [bool(bend(1.0, 1.0, load=(-q, 0.0), **column).y[-1] > 1e-3) for q in (7.82, 7.85)]
+[False, True]
+
+A pinned cable of 200 mm whose moment is an own function of the bend, or a table of it, pushed together by 5 mm:
+
+>>> import numpy as np
+>>> def moment(bend_per_m):
+...     return 2e-3 * bend_per_m + 0.012 * np.tanh(bend_per_m / 4.0)
+>>> own = bend(0.2, moment, displacement=5e-3, pre_curvature=2.0)
+>>> rows = [(D, moment(D)) for D in np.linspace(0.0, 20.0, 81)]
+>>> table = bend(0.2, rows, displacement=5e-3, pre_curvature=2.0)
+>>> print(own.outcome.name, f"{own.force:.3f} N, {table.force:.3f} N")
+CONVERGED 0.634 N, 0.634 N
+
+The inverse problem on own arrays (displacements, forces, curvatures at the joints), as the paper states it:
+
+>>> from rod import BendingTest, Characteristic, Virtual, fit_characteristic, simulate
+>>> knots, steps = [0.0, 5.0, 10.0], np.array([5e-3, 10e-3, 15e-3])
+>>> cable = BendingTest(0.2, Characteristic.from_ordinates(knots, [5e-3, 3e-3, 2e-3]), 2.0)
+>>> bent = simulate(cable, steps)
+>>> data = Virtual(0.2, steps, np.array([b.force for b in bent]), np.array([b.kappa for b in bent]))
+>>> fit = fit_characteristic(data, knots, reading="tangent")
+>>> print(fit.converged, np.round(1e3 * fit.characteristic.ordinates, 3), round(fit.pre_curvature, 3))
+True [5. 3. 2.] 2.0
+
+An equilibrium says in ``outcome`` how far to trust it, and ``outcome.advice`` what to do. Exported here: what these
+examples use, laws (`StickSlip`, `as_law`), supports (`Support`, `BEARING`), `solve` with `Hold` for single rods.
+
+Where to read on: `characteristic` (what f_EI is), `bending_test` (the experiment simulated), `inverse` and `balance`
+(the two ways from a measured test to f_EI), `path` (stability, jumps), `paper` (the source paper's own numbers).
 
 Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulation*; modules cite its equations as
 "Eq. (n) of the paper" and say where they depart from it.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rod.bending_test import BendingTest as BendingTest
+    from rod.bending_test import bend as bend
+    from rod.bending_test import simulate as simulate
+    from rod.characteristic import Characteristic as Characteristic
+    from rod.equilibrium import Equilibrium as Equilibrium
+    from rod.equilibrium import Outcome as Outcome
+    from rod.equilibrium import solve as solve
+    from rod.laws import StickSlip as StickSlip
+    from rod.laws import as_law as as_law
+    from rod.paper_fit import Virtual as Virtual
+    from rod.paper_fit import paper_fit as fit_characteristic  # noqa: F401
+    from rod.reduction import Hold as Hold
+    from rod.support import BEARING as BEARING
+    from rod.support import CLAMP as CLAMP
+    from rod.support import FREE as FREE
+    from rod.support import Support as Support
+
+#: Where each exported name is; it is loaded when it is asked for, so that `import rod` alone costs nothing.
+_HOMES = {
+    "bending_test": ("BendingTest", "bend", "simulate"),
+    "characteristic": ("Characteristic",),
+    "equilibrium": ("Equilibrium", "Outcome", "solve"),
+    "laws": ("StickSlip", "as_law"),
+    "paper_fit": ("Virtual", "fit_characteristic"),
+    "reduction": ("Hold",),
+    "support": ("BEARING", "CLAMP", "FREE", "Support"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"rod exports no {name!r}; it exports {', '.join(sorted(_HOME))}")
+    # `rod.paper_fit` is the module, so its function goes by another name
+    return getattr(import_module(f"rod.{_HOME[name]}"), "paper_fit" if name == "fit_characteristic" else name)
+
+
+def __dir__() -> list[str]:
+    return sorted(_HOME)

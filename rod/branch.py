@@ -21,9 +21,7 @@ Branch = Literal["natural", "opposite", "up", "down", "jump"]
 
 def bow(rod: Rod, angles: Array) -> float:
     """Mean height of a shape over its chord, relative to the length: positive if it bows toward +y."""
-    h = rod.edges
-    y = np.cumsum(h * np.sin(angles))
-    return float(h @ y / rod.length**2)
+    return float(rod.lever @ np.sin(angles)) / rod.length**2
 
 
 def bow_side(rod: Rod, branch: Branch) -> int:
@@ -32,13 +30,9 @@ def bow_side(rod: Rod, branch: Branch) -> int:
         return 1 if branch == "up" else -1
     if branch == "opposite":
         return -natural_side(rod)
-    K0 = rod.section.pre_curvature
-    turned = (support.moment or support.angle for support in (rod.left, rod.right))
-    mixed = float(K0.min()) < 0.0 < float(K0.max())
-    driven = not np.any(K0) and (rod.load[1] != 0.0 or any(turned))
-    return 0 if branch == "jump" or mixed or driven else natural_side(rod)
+    return 0 if branch == "jump" or rod.open_side else natural_side(rod)
 
 
 def natural_side(rod: Rod) -> int:
     """Side to which the force-free shape is bowed; a straight one counts as up."""
-    return 1 if bow(rod, rod.mounted.angles) >= 0.0 else -1
+    return 1 if float(rod.lever @ np.sin(rod.mounted.angles)) >= 0.0 else -1

@@ -22,7 +22,7 @@ import numpy as np
 from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import Outcome, Start, Trial, descended, judged, newton
+from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import TURN_LIMIT, followed
 from rod.reduction import Hold, System
 from rod.section import Memory, Section
@@ -124,8 +124,10 @@ def solve(
         if attempt.found:
             break
     last = verdicts[-1]
-    if not last.found and any(trial.outcome is Outcome.LIMIT_POINT for trial in verdicts):
-        last = last._replace(outcome=Outcome.LIMIT_POINT)
+    falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
+    if not last.found and falling:  # rather the state that has what was asked for, but for a moment that falls
+        met = next((trial for trial in falling if trial.negatives is not None), last)
+        last = met._replace(outcome=Outcome.LIMIT_POINT)
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
@@ -141,8 +143,11 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         near = float(np.abs(warm.angles - first.angles).max()) < TURN_LIMIT
         verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
         yield verdict
-        if warm.found and verdict.outcome is Outcome.LIMIT_POINT and system.excess_negatives(warm.balance) == 0:
-            return  # stable, but for a moment that falls: no other way leads to a better one
+        if warm.found and verdict.outcome is Outcome.LIMIT_POINT:
+            # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
+            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length) if warm.negatives else []:
+                yield judged(system, descended(system, beside), kept)
+            return
         if not patient:
             yield judged(system, newton(system, mounted), side)
             return
@@ -156,7 +161,8 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         return
     if branch != "jump":
         yield judged(system, _from_straight(system, side), side)
-    yield judged(system, descended(system, Start(lost.angles, lost.R)), side)
+    for beside in tilted(system, lost):
+        yield judged(system, descended(system, beside), side)
 
 
 def _from_straight(system: System, side: int) -> Trial:
@@ -185,24 +191,22 @@ def _force_free(system: System) -> Trial:
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     """Shape at the vertices from the edge angles; the bearing axes join in where rigid pieces are."""
     rod, memory, angles, R = system.rod, system.memory, trial.angles, trial.R
-    h = rod.edges
-    path = np.concatenate(
-        (np.zeros((2, 1)), np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1)), axis=1
-    )
-    inner = h[1:-1]
-    theta = np.empty(h.size - 1)
-    theta[1:-1] = (angles[1:-2] * inner[1:] + angles[2:-1] * inner[:-1]) / (inner[:-1] + inner[1:])
-    theta[0], theta[-1] = angles[0], angles[-1]
-    K, m = trial.balance.K, trial.balance.m
-    keep = slice(0 if h[0] else 1, h.size + 1 if h[-1] else h.size)
+    h, n = rod.edges, rod.edges.size
+    path, (theta, kappa, moment) = np.zeros((2, n + 1)), np.zeros((3, n + 1))
+    np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1, out=path[:, 1:])
+    theta[2:-2] = (angles[1:-2] * h[2:-1] + angles[2:-1] * h[1:-2]) / (h[1:-2] + h[2:-1])
+    theta[:2], theta[-2:] = angles[0], angles[-1]
+    kappa[1:-1], moment[1:-1] = trial.balance.K, trial.balance.m
+    moment[0], moment[-1] = moment[1], moment[-2]
+    keep = slice(0 if h[0] else 1, n + 1 if h[-1] else n)
     load = rod.vertex_load
     return Equilibrium(
-        s=np.concatenate(([0.0], np.cumsum(h)))[keep],
+        s=rod.joints[keep],
         x=path[0, keep],
         y=path[1, keep],
-        theta=np.concatenate((angles[:1], theta, angles[-1:]))[keep],
-        kappa=np.concatenate(([0.0], K, [0.0]))[keep],
-        moment=np.concatenate((m[:1], m, m[-1:]))[keep],
+        theta=theta[keep],
+        kappa=kappa[keep],
+        moment=moment[keep],
         force=-float(R[0]),
         chord=float(path[0, -1]),
         outcome=trial.outcome,

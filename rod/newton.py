@@ -12,6 +12,7 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.blas import idamax
 
 from rod.branch import bow
 from rod.characteristic import Array
@@ -26,6 +27,8 @@ STEP_LIMIT = 0.8
 ITERATIONS = 25
 #: Largest turn of an edge in a step downhill, rad, and how many such steps a cable takes at most to come to rest.
 DESCENT_LIMIT, DESCENT_STEPS = 0.3, 300
+#: How far beside an unstable equilibrium the way down begins, rad (root mean square).
+TILT = 1e-2
 
 
 class Outcome(Enum):
@@ -78,13 +81,17 @@ class Start(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """A state, its residuals, the steps of Newton's method that led there, and how that ended."""
+    """A state, its residuals, the steps of Newton's method that led there, and how that ended.
+
+    ``negatives``: directions in which it is unstable, where the last step tells (it turned no edge by more than 1e-7).
+    """
 
     angles: Array
     R: Array
     balance: Balance
     steps: int
     outcome: Outcome
+    negatives: int | None = None
 
     @property
     def found(self) -> bool:
@@ -98,8 +105,9 @@ def newton(system: System, start: Start, *, most: int = ITERATIONS) -> Trial:
     balance = system.balance(angles, R)
     norm = system.misfit(balance)
     for count in range(1, most + 1):
-        dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
-        step = float(np.abs(dalpha).max())
+        made = system.eliminated(balance, -balance.gradient[:, None])
+        dalpha, dR = system.substituted(made, -balance.gap[:, None])
+        step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
         if not np.isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
         share = min(1.0, STEP_LIMIT / step) if step else 1.0
@@ -115,9 +123,18 @@ def newton(system: System, start: Start, *, most: int = ITERATIONS) -> Trial:
         if not np.isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
-            return Trial(angles, R, balance, count, Outcome.CONVERGED)
+            return Trial(angles, R, balance, count, Outcome.CONVERGED, system.negatives(made))
     localised = bool(np.any(balance.tangent <= 0.0))
     return Trial(angles, R, balance, count, Outcome.LIMIT_POINT if localised else Outcome.STALLED)
+
+
+def tilted(system: System, trial: Trial, mode: Array | None = None) -> list[Start]:
+    """Where to go downhill from an unstable equilibrium: beside it along its softest mode, to either side.
+
+    ``mode`` picks one of several that are equally soft, the one most like it.
+    """
+    mode = softest(system, trial.balance, mode)[1]
+    return [Start(trial.angles + sign * TILT * mode, trial.R) for sign in (1.0, -1.0)]
 
 
 def descended(system: System, start: Start) -> Trial:
@@ -148,16 +165,35 @@ def descended(system: System, start: Start) -> Trial:
     return Trial(angles, R, system.balance(angles, R), DESCENT_STEPS, Outcome.STALLED)
 
 
+def softest(system: System, balance: Balance, mode: Array | None = None) -> tuple[float, Array]:
+    """Smallest stiffness in absolute value, relative to EI/L, and its mode (n + 2,), by inverse iteration.
+
+    The mode has the root mean square 1 rad over the length.
+    """
+    mass = system.mass / system.moment_scale
+    mode = np.random.default_rng(0).standard_normal(mass.size) if mode is None else mode
+    stiffness = np.inf
+    for _ in range(12):
+        turn = system.solve(balance, (system.mass * mode)[:, None], np.zeros((2, 1)))[0][:, 0]
+        before, stiffness = stiffness, float(mass @ (mode * mode) / (mass @ (mode * turn)))
+        mode = turn / np.sqrt(mass @ (turn * turn))
+        if abs(stiffness - before) <= 1e-4 * abs(stiffness):
+            break
+    return stiffness, np.asarray(mode)
+
+
 def judged(system: System, trial: Trial, side: int) -> Trial:
     """The trial with its outcome after the checks: falling moment, minimum, side of the bow (0: either)."""
     if not trial.found:
         return trial
     outcome = Outcome.CONVERGED
     K = trial.balance.K
-    between = system.section(np.concatenate((K[:1], 0.5 * (K[1:] + K[:-1]))))[1]
+    middle = K.copy()
+    middle[1:] = 0.5 * (K[1:] + K[:-1])
+    between = system.section(middle)[1]
     if min(float(trial.balance.tangent.min()), float(between.min())) <= 0.0:
         outcome = Outcome.LIMIT_POINT
-    elif system.excess_negatives(trial.balance) != 0:
+    elif (system.excess_negatives(trial.balance) if trial.negatives is None else trial.negatives) != 0:
         outcome = Outcome.UNSTABLE
     elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH

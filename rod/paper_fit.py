@@ -10,7 +10,10 @@ trust-region form of the method: MINPACK's cannot be told that a trial has no eq
 it ends at the limit point half-way.
 
 w has a unit and its sum depends on the number of vertices: the default of `rod.inverse` weights every residual by its
-standard deviation instead, and fits positions rather than curvatures. Nothing here keeps the stiffness positive: with
+standard deviation instead, and fits positions rather than curvatures. A method that stops has not converged for that:
+from half of all starts (EI = 0.03 N m^2, say) it ends at the edge of what has an equilibrium, far from any minimum. So
+the gradient decides, and further starts whose stiffness is scaled to the forces: the best end of all is the result, and
+`PaperFit.starts` tells how each of them ended. Nothing here keeps the stiffness positive: with
 K0 forced to zero the fit runs into negative stiffness at low curvature, which is the paper's Fig. 6. Trials whose
 moment falls anywhere but in the two end joints (curvature K0, no moment) have no shape that means anything and are
 refused.
@@ -37,6 +40,10 @@ Array = NDArray[np.float64]
 
 PAPER_WEIGHT = 1e-3
 PAPER_START = (0.01, 1.0)
+#: Turns K0 L at which further starts are bent; the arch of Table 1 has 0.4.
+FURTHER_TURNS = (0.1, 0.4, 0.8)
+#: Residuals below this, relative to the data, are rounding; gradients (cosines) below the other are at a minimum.
+EXACT, STATIONARY = 1e-8, 1e-4
 
 
 @dataclass(frozen=True)
@@ -59,8 +66,36 @@ class PaperIteration:
 
 
 @dataclass(frozen=True)
+class PaperStart:
+    """How the fit from one start ended.
+
+    Attributes
+    ----------
+    bending_stiffness : N m^2
+    pre_curvature : 1/m
+    objective : N^2
+        Infinite where the end has no equilibrium.
+    gradient : float
+        Largest cosine between the residuals and a column of their Jacobian: 0 at a minimum.
+    exact : bool
+        Whether the data are met to rounding: the gradient then says nothing.
+    """
+
+    bending_stiffness: float
+    pre_curvature: float
+    objective: float
+    gradient: float
+    exact: bool
+
+    @property
+    def at_minimum(self) -> bool:
+        """Whether this end is a minimum: by its gradient, or because nothing is left to fit."""
+        return bool(np.isfinite(self.objective)) and (self.exact or self.gradient < STATIONARY)
+
+
+@dataclass(frozen=True)
 class PaperFit:
-    """Result of the paper's fit.
+    """Result of the paper's fit: the best end of all starts.
 
     Attributes
     ----------
@@ -68,12 +103,13 @@ class PaperFit:
     pre_curvature : 1/m
     objective : N^2
     history : tuple of PaperIteration
-        From the start to the result.
+        From the start that led there to the result.
     steps : tuple of Equilibrium
         At the result.
     outcome : Outcome or None
         Of the first simulated step that is not a stable equilibrium; None if all are.
-    converged : bool
+    starts : tuple of PaperStart
+        The start asked for, then others; none of these where the first met the data exactly.
     """
 
     characteristic: Characteristic
@@ -82,7 +118,12 @@ class PaperFit:
     history: tuple[PaperIteration, ...]
     steps: tuple[Equilibrium, ...]
     outcome: Outcome | None
-    converged: bool
+    starts: tuple[PaperStart, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the result is a minimum; with several starts also the best that was found."""
+        return min(self.starts, key=lambda start: start.objective).at_minimum
 
     @property
     def iterations(self) -> int:
@@ -129,14 +170,39 @@ def paper_fit(
     """
     at = np.asarray(knots, float)
     problem = _Problem(data, at, reading, weight, pre_curvature, zero, elements)
-    begin = np.ones(at.size) if pre_curvature is not None else np.r_[np.ones(at.size), 1.0]
-    unit = np.r_[np.full(at.size, start[0]), [start[1] if start[1] else 1.0] * (pre_curvature is None)]
-    count = data.forces.size * (1 if data.curvatures is None else 1 + data.curvatures.shape[1])
-    if count < begin.size:
-        raise ValueError(f"{count} data do not determine {begin.size} parameters")
+    size = at.size + (pre_curvature is None)
+    if (count := data.forces.size * (1 if data.curvatures is None else 1 + data.curvatures.shape[1])) < size:
+        raise ValueError(f"{count} data do not determine {size} parameters: give more steps, or fix pre_curvature")
+    first = _from_start(problem, start, tolerance)
+    if first is None:
+        raise ValueError(
+            f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m: give a start nearer to the cable"
+        )
+    ends = [first]
+    if not first[1].exact:
+        turns = (0.0,) if pre_curvature is not None else FURTHER_TURNS
+        others = (_from_start(problem, problem.scaled_start(turn / data.length), tolerance) for turn in turns)
+        ends += [end for end in others if end is not None]
+    (history, end), _ = min(ends, key=lambda found: found[1].objective)
+    outcome = next((step.outcome for step in end.steps if not step.good), None)
+    last = history[-1]
+    law = Characteristic.from_ordinates(at, last.ordinates, reading=reading)
+    starts = tuple(told for _, told in ends)
+    return PaperFit(law, last.pre_curvature, last.objective, tuple(history), end.steps, outcome, starts)
+
+
+def _from_start(
+    problem: _Problem, start: tuple[float, float], tolerance: float
+) -> tuple[tuple[list[PaperIteration], _Simulation], PaperStart] | None:
+    """The fit from one start: states on the way, last simulation, and how it ended; None without an equilibrium."""
+    k, fixed = problem.knots.size, problem.fixed is not None
+    begin = np.ones(k + (not fixed))
+    unit = np.r_[np.full(k, start[0]), [start[1] or 1.0] * (not fixed)]
     history: list[PaperIteration] = []
     accepted = problem.simulate(begin * unit, None)
     trial = accepted
+    if not np.all(np.isfinite(accepted.residual)):
+        return None
 
     def residual(p: Array) -> Array:
         nonlocal trial
@@ -145,7 +211,7 @@ def paper_fit(
         elif np.all(np.isfinite(p)):
             trial = problem.simulate(p * unit, accepted.steps)
         else:  # scipy's trust region, shrunk to nothing at a limit point
-            return np.full(count, np.inf)
+            return np.full(accepted.residual.size, np.inf)
         return trial.residual
 
     def jacobian(p: Array) -> Array:  # called where a trial was accepted, right after it
@@ -154,19 +220,18 @@ def paper_fit(
         history.append(problem.iteration(p * unit, accepted))
         return np.asarray(problem.jacobian(accepted) * unit)
 
-    if not np.all(np.isfinite(accepted.residual)):
-        raise ValueError(f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m")
     with np.errstate(all="ignore"):  # at a limit point scipy's trust region shrinks until its own ratios overflow
         found = least_squares(
             residual, begin, jacobian, x_scale="jac", xtol=tolerance, ftol=tolerance, gtol=tolerance, max_nfev=100
         )
     end = problem.simulate(found.x * unit, accepted.steps)
     history.append(problem.iteration(found.x * unit, end))
-    outcome = next((step.outcome for step in end.steps if not step.good), None)
-    law, K0 = problem.split(found.x * unit)
-    return PaperFit(
-        law, K0, float(end.residual @ end.residual), tuple(history), end.steps, outcome, bool(found.status > 0)
-    )
+    size = float(np.linalg.norm(end.residual))
+    gradient, exact = np.inf, size < EXACT * problem.data_norm
+    if np.isfinite(size) and not exact:
+        J = problem.jacobian(end)
+        gradient = float(np.max(np.abs(J.T @ end.residual) / np.linalg.norm(J, axis=0))) / size
+    return (history, end), PaperStart(*start, history[-1].objective, gradient, exact)
 
 
 def _means_something(test: BendingTest, step: Equilibrium) -> bool:
@@ -186,6 +251,11 @@ class _Simulation:
     steps: tuple[Equilibrium, ...]
     residual: Array
 
+    @property
+    def forces(self) -> Array:
+        """P of all steps, (n,) N."""
+        return np.array([step.force for step in self.steps])
+
 
 @dataclass(frozen=True)
 class _Problem:
@@ -203,6 +273,18 @@ class _Problem:
         k = self.knots.size
         law = Characteristic.from_ordinates(self.knots, parameters[:k], reading=self.reading)
         return law, float(parameters[k]) if self.fixed is None else self.fixed
+
+    @property
+    def data_norm(self) -> float:
+        """Size of the data in the objective, N."""
+        bends = 0.0 if self.data.curvatures is None else self.weight * float(np.sum(self.data.curvatures**2))
+        return float(np.sqrt(np.sum(self.data.forces**2) + bends))
+
+    def scaled_start(self, K0: float) -> tuple[float, float]:
+        """The constant stiffness that meets the forces best with this pre-curvature, N m^2; and that, 1/m."""
+        forces = self.simulate(np.r_[np.ones(self.knots.size), [K0] * (self.fixed is None)], None).forces
+        scale = float(forces @ self.data.forces / (forces @ forces))
+        return (abs(scale) if np.isfinite(scale) and scale else PAPER_START[0]), K0
 
     def simulate(self, parameters: Array, warm: Sequence[Equilibrium] | None) -> _Simulation:
         law, K0 = self.split(parameters)

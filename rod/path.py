@@ -1,4 +1,4 @@
-"""The path of equilibria from the force-free cable (or a warm start) to what is asked for: where it leads, where it ends.
+"""The path of equilibria from the force-free cable (or a warm start) to what is asked for, and where it ends.
 
 Everything imposed grows with one number, the share: 0 is the mounted cable without force, 1 what is asked for. Chord,
 force, loads, end moments and turned clamps grow in proportion; what else a start has in residuals fades in proportion.
@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 
 from rod.branch import bow
 from rod.characteristic import Array
-from rod.newton import RESIDUAL_TOLERANCE, STEP_TOLERANCE, Outcome, Start, Trial, newton
+from rod.newton import RESIDUAL_TOLERANCE, STEP_TOLERANCE, Outcome, Start, Trial, newton, softest
 from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, and the largest turn of an edge in one step, rad.
@@ -117,7 +117,9 @@ class Ramp:
         """Newton's step at a fixed share, and what the state changes by per share."""
         rate, gap_rate = self.rate(point)
         here = point.balance
-        angles, R = self.system.solve(here, -np.column_stack((here.gradient, rate)), -np.column_stack((here.gap, gap_rate)))
+        angles, R = self.system.solve(
+            here, -np.column_stack((here.gradient, rate)), -np.column_stack((here.gap, gap_rate))
+        )
         return Move(angles[:, 0], R[:, 0], 0.0), Move(angles[:, 1], R[:, 1] + self.pull, 1.0)
 
     def moved(self, point: Point, way: Move, by: float = 1.0) -> Point:
@@ -250,7 +252,7 @@ def _leap(ramp: Ramp, here: Point, way: Move) -> tuple[Point | None, int]:
     far = LEAP / largest
     if beyond(0.0) * beyond(far) >= 0.0:
         return None, 0
-    angles = here.angles + brentq(beyond, 0.0, far, rtol=1e-4) * way.angles
+    angles = here.angles + float(brentq(beyond, 0.0, far, rtol=1e-4)) * way.angles
     still = system.balance(angles, np.zeros(2))
     R = np.linalg.lstsq(still.border.T / system.rod.length, -still.gradient / system.rod.length, rcond=None)[0]
     trial = newton(system, Start(angles, R), most=8)
@@ -258,20 +260,6 @@ def _leap(ramp: Ramp, here: Point, way: Move) -> tuple[Point | None, int]:
     guess = here._replace(angles=angles)
     good = trial.found and _near(ramp, here, guess, there) and not ramp.negatives(there)
     return (there if good else None), trial.steps
-
-
-def softest(ramp: Ramp, balance: Balance, mode: Array | None = None) -> tuple[float, Array]:
-    """Smallest stiffness in absolute value, relative to EI/L, and its mode (n + 2,), by inverse iteration."""
-    system, mass = ramp.system, ramp.mass
-    mode = np.random.default_rng(0).standard_normal(mass.size) if mode is None else mode
-    stiffness = np.inf
-    for _ in range(12):
-        turn = system.solve(balance, (system.mass * mode)[:, None], np.zeros((2, 1)))[0][:, 0]
-        before, stiffness = stiffness, float(mass @ (mode * mode) / (mass @ (mode * turn)))
-        mode = turn / np.sqrt(mass @ (turn * turn))
-        if abs(stiffness - before) <= 1e-4 * abs(stiffness):
-            break
-    return stiffness, mode
 
 
 def _critical(ramp: Ramp, here: Point, way: Move, there: Point) -> tuple[Critical | None, int]:
@@ -282,8 +270,8 @@ def _critical(ramp: Ramp, here: Point, way: Move, there: Point) -> tuple[Critica
     low, steps = here, 0
     span = Move(there.angles - here.angles, there.R - here.R, there.share - here.share)
     low_at, high_at = 0.0, 1.0
-    low_value, mode = softest(ramp, low.balance)
-    high_value: float | None = softest(ramp, there.balance)[0] if ramp.negatives(there) == 1 else None
+    low_value, mode = softest(ramp.system, low.balance)
+    high_value: float | None = softest(ramp.system, there.balance)[0] if ramp.negatives(there) == 1 else None
     high, normal = there, ramp.unit(way, here.R)
     for _ in range(LOCATING):
         if low_value <= CRITICAL:
@@ -298,10 +286,10 @@ def _critical(ramp: Ramp, here: Point, way: Move, there: Point) -> tuple[Critica
             break
         if (negatives := ramp.negatives(middle)) == 0:
             low, low_at = middle, at
-            low_value, mode = softest(ramp, low.balance, mode)
+            low_value, mode = softest(ramp.system, low.balance, mode)
         else:
             high, high_at = middle, at
-            high_value = softest(ramp, high.balance, mode)[0] if negatives == 1 else None
+            high_value = softest(ramp.system, high.balance, mode)[0] if negatives == 1 else None
     if low_value > 1e3 * CRITICAL:
         return None, steps
     turned = ramp.tangent(high, way).share < 0.0

@@ -23,10 +23,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dgtsv, dpttrf
+from scipy.linalg.blas import idamax
+from scipy.linalg.lapack import dgesv, dgtsv, dpttrf, dstebz
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -95,6 +98,19 @@ class Balance(NamedTuple):
     tangent: Array
 
 
+class Elimination(NamedTuple):
+    """Angles eliminated: border columns and right-hand sides solved by the stiffened H, what is left, and that H.
+
+    ``solved`` (n + 2, k + 1 + p); ``schur`` (k + 1, k + 1) scaled; ``low`` (k + 1, p); ``diagonal``, ``off`` of H.
+    """
+
+    solved: Array
+    schur: Array
+    low: Array
+    diagonal: Array
+    off: Array
+
+
 class EdgeState(NamedTuple):
     """Directions of the edges and the force in them along and across, (n + 2,) each; N."""
 
@@ -105,7 +121,7 @@ class EdgeState(NamedTuple):
 
 
 class _End(NamedTuple):
-    """An end of the cable: its place among the angles, what holds it, its angles, friction's memory, sign of a moment."""
+    """An end: its place among the angles, what holds it, its angles, the memory of friction, the sign of a moment."""
 
     place: int
     support: Support
@@ -123,25 +139,31 @@ class System:
         self.moment_scale = rod.stiffness_scale / rod.length
         self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
-        self._inverse_weights = 1.0 / rod.weights
+        self._inverse_weights = rod.inverse_weights
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
         self._ends = self._acting_ends()
+        self._equal_softness = self._axial * rod.length * np.eye(2)
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
 
     @cached_property
     def mass(self) -> Array:
-        """Weight of every angle (n + 2,) N m in sums of squares of turns: its share of the length, times EI/L."""
-        return np.asarray(self.rod.edges * (self.moment_scale / self.rod.length))
+        """Weight of every angle (n + 2,) N m in sums of squares of turns: its share of the length, times EI/L.
+
+        A bearing without a rigid piece turns with half an element: without a weight it could not be held.
+        """
+        share = np.array(self.rod.edges)
+        share[[0, -1]] = np.maximum(share[[0, -1]], self.rod.weights[[0, -1]])
+        return np.asarray(share * (self.moment_scale / self.rod.length))
 
     def misfit(self, balance: Balance) -> float:
         """Largest residual, relative to EI/L and L."""
         g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
-        moment = max(float(g.max()), -float(g.min())) / self.moment_scale
+        moment: float = float(abs(g[idamax(g)])) / self.moment_scale
         return max(moment, abs(gap_x) / self.rod.length, abs(gap_y) / self.rod.length)
 
     def section(self, K: Array) -> tuple[Array, Array]:
@@ -163,16 +185,21 @@ class System:
         h = self.rod.edges
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
-        edge = self.edge_state(angles, R, share)
-        gradient = -h * self.turning(edge)
+        if self._difference == 0.0:  # strains do not depend on direction: sums over the edges take a dot product each
+            border = np.empty((2, h.size))
+            np.multiply(h, np.sin(angles), out=border[0])
+            np.multiply(-h, np.cos(angles), out=border[1])
+            gradient, diagonal, gap = self._rigid(border, R, share)
+            softness = self._equal_softness
+        else:
+            edge = self.edge_state(angles, R, share)
+            gradient, diagonal = -h * self.turning(edge), h * self._restoring(edge)
+            border, gap, softness = self.border(edge), -(self.directions(edge) @ h), self._softness(edge)
         gradient[:-1] += m
         gradient[1:] -= m
         off = -tangent * self._inverse_weights
-        diagonal = h * (edge.along if self._difference == 0.0 else self._restoring(edge))
         diagonal[:-1] -= off
         diagonal[1:] -= off
-        border = self.border(edge)
-        gap = -(self.directions(edge) @ h)
         if (chord := self.hold.chord) is not None:
             chord = chord if share == 1.0 else chord + (share - 1.0) * (chord - self.rod.mounted.chord)
             gap[0] += chord - self.hold.compliance * R[0]
@@ -181,7 +208,17 @@ class System:
         gap[1] *= self.hold.tip is None
         for end in self._ends:
             self._hold_end(end, share, angles, gradient, diagonal, off, border)
-        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
+        return Balance(gradient, diagonal, off, border, softness, gap, K, m, tangent)
+
+    def _rigid(self, border: Array, R: Array, share: float) -> tuple[Array, Array, Array]:
+        """Turning moments and their slopes (n + 2,), and minus the extent of the chain (2,), for EA = GA."""
+        gap = np.array((border[1].sum(), -border[0].sum())) - self._axial * self.rod.length * R
+        beyond = self.rod.load_beyond
+        if beyond is None:
+            return R @ border, R[1] * border[0] - R[0] * border[1], gap
+        force = R[:, None] + share * beyond
+        gap -= self._axial * share * (beyond @ self.rod.edges)
+        return (force * border).sum(axis=0), force[1] * border[0] - force[0] * border[1], gap
 
     def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
@@ -212,9 +249,6 @@ class System:
         return np.array((h * (cos * along - sin * across), h * (sin * along + cos * across)))
 
     def _softness(self, edge: EdgeState) -> Array:
-        if self._difference == 0.0:
-            soft = self._axial * self.rod.length
-            return np.array(((soft, 0.0), (0.0, soft)))
         return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
 
     def _restoring(self, edge: EdgeState) -> Array:
@@ -230,10 +264,7 @@ class System:
         return [
             end
             for end in ends
-            if end.support.kind == "clamp"
-            or end.support.stiffness
-            or end.support.friction_moment
-            or end.support.moment
+            if end.support.kind == "clamp" or end.support.stiffness or end.support.friction_moment or end.support.moment
         ]
 
     def _hold_end(
@@ -276,28 +307,10 @@ class System:
         dalpha : (n + 2, p) rad, dR : (2, p) N
             Not a number if the matrix is singular.
         """
-        columns, solved, schur = self._eliminated(balance, rhs)
-        k, p = len(self._imposed), rhs.shape[1]
-        low = columns[:, : k + 1].T @ -solved[:, k + 1 :]
-        low[:k] += gap if k == 2 else gap[self._imposed]
-        _, _, multipliers, info = dgesv(schur, self._scale * low)
-        multipliers = self._scale * multipliers if info == 0 else np.full((k + 1, p), np.nan)
-        dR = np.zeros((2, p))
-        dR[self._imposed] = multipliers[:k]
-        return (solved.T[k + 1 :] - multipliers.T @ solved.T[: k + 1]).T, dR
+        return self.substituted(self.eliminated(balance, rhs), gap)
 
-    def excess_negatives(self, balance: Balance) -> int:
-        """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
-        _, _, schur = self._eliminated(balance, np.zeros((balance.gradient.size, 0)))
-        if not np.all(np.isfinite(schur)):
-            return 1
-        diagonal = balance.diagonal.copy()
-        diagonal[self._middle] += self._spring
-        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
-        return count - len(self._imposed)
-
-    def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
-        """Border columns and right-hand sides, both solved by the stiffened H, and the scaled Schur complement."""
+    def eliminated(self, balance: Balance, rhs: Array) -> Elimination:
+        """The angles eliminated from the bordered system: what `substituted` and `negatives` go on from."""
         k, p = len(self._imposed), rhs.shape[1]
         columns = np.zeros((rhs.shape[0], k + 1 + p), order="F")
         columns[:, :k] = balance.border.T if k == 2 else balance.border[self._imposed].T
@@ -308,25 +321,61 @@ class System:
         *_, solved, info = dgtsv(balance.off, diagonal, balance.off, columns)
         if info != 0:
             solved = np.full_like(columns, np.nan)
-        schur = columns[:, : k + 1].T @ -solved[:, : k + 1]
-        softness = balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
-        schur[:k, :k] -= softness
+        low = columns[:, : k + 1].T @ solved
+        schur = -low[:, : k + 1]
+        schur[:k, :k] -= balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
         if self.hold.compliance:
             schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
-        return columns, solved, schur * self._scales
+        return Elimination(solved, schur * self._scales, low[:, k + 1 :], diagonal, balance.off)
+
+    def substituted(self, made: Elimination, gap: Array) -> tuple[Array, Array]:
+        """Solution of the bordered system for (2, p) gaps, as `solve` returns it."""
+        k = len(self._imposed)
+        low = -made.low
+        low[:k] += gap if k == 2 else gap[self._imposed]
+        _, _, multipliers, info = dgesv(made.schur, self._scale * low)
+        multipliers = self._scale * multipliers if info == 0 else np.full(low.shape, np.nan)
+        dR = np.zeros((2, low.shape[1]))
+        dR[self._imposed] = multipliers[:k]
+        return made.solved[:, k + 1 :] - made.solved[:, : k + 1] @ multipliers, dR
+
+    def negatives(self, made: Elimination) -> int:
+        """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
+        low = negative_roots(made.schur)
+        return 1 if low is None else negative_pivots(made.diagonal, made.off) + low - len(self._imposed)
+
+    def excess_negatives(self, balance: Balance) -> int:
+        """As `negatives`, for a state that was not solved for."""
+        return self.negatives(self.eliminated(balance, np.zeros((balance.gradient.size, 0))))
+
+
+def negative_roots(matrix: Array) -> int | None:
+    """Number of negative eigenvalues of a symmetric matrix of 1 to 3 rows; None if it is not finite.
+
+    All eigenvalues are real, so Descartes' rule of signs is exact: they are as many as the coefficients of the
+    characteristic polynomial at -lambda change their sign.
+    """
+    rows: list[list[float]] = matrix.tolist()
+    coefficients: tuple[float, ...]
+    if len(rows) == 1:
+        return int(rows[0][0] < 0.0) if isfinite(rows[0][0]) else None
+    (a, b, *c), (_, d, *e), *f = rows
+    if not f:
+        coefficients = (1.0, a + d, a * d - b * b)
+    else:
+        p, q, r = c[0], e[0], f[0][2]
+        minors = a * d - b * b, a * r - p * p, d * r - q * q
+        coefficients = (1.0, a + d + r, sum(minors), a * minors[2] - b * (b * r - p * q) + p * (b * q - d * p))
+    if not isfinite(coefficients[-1]):
+        return None
+    signs = [value > 0.0 for value in coefficients if value != 0.0]
+    return sum(left is not right for left, right in pairwise(signs))
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
     """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
-    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist, as on nearly every state a fit meets
+    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist: none
         return 0
-    count, pivot = 0, 1.0
-    squares = np.concatenate(([0.0], off**2)).tolist()
-    smallest = float(np.finfo(float).tiny) * max(1.0, *squares)  # a pivot of 0 is moved so far that nothing overflows
-    for d, b2 in zip(diagonal.tolist(), squares, strict=True):
-        pivot = d - b2 / pivot
-        if abs(pivot) < smallest:
-            pivot = smallest
-        count += int(pivot < 0.0)
-    return count
+    bound = 4.0 * float(np.abs(diagonal).max() + np.abs(off).max())  # Gershgorin: no eigenvalue lies below minus this
+    return int(dstebz(diagonal, off, 1, -bound, 0.0, 1, 1, bound, "E")[0])

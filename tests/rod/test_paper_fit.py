@@ -1,5 +1,6 @@
 """The paper's inverse problem on its own virtual experiment (Table 1), and what goes wrong with K0 = 0 (Fig. 6)."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES, simulate, table_1
 from rod.elastica import uniform_equilibrium
-from rod.paper_fit import Virtual, paper_fit
+from rod.paper_fit import PaperStart, Virtual, paper_fit
 
 STEPS = 5e-3 * np.arange(1, 4)
 TRUTH = np.r_[TABLE_1_ORDINATES, TABLE_1["pre_curvature"]]
@@ -82,3 +83,39 @@ def test_too_few_data_are_a_mistake():
     one = virtual("secant", curvatures=False)
     with pytest.raises(ValueError, match="do not determine"):
         paper_fit(one, TABLE_1_KNOTS)
+
+
+@pytest.mark.parametrize("reading", ["secant", "tangent"])
+@pytest.mark.parametrize("start", [(0.03, 3.0), (0.1, 1.0), (0.1, 3.0), (0.01, 3.0)])
+def test_starts_that_lead_nowhere_are_told_and_others_find_table_1(reading, start):
+    """A method that stops has not converged for that; from these starts it stops anywhere."""
+    fitted = paper_fit(virtual(reading), TABLE_1_KNOTS, reading=reading, start=start)
+    assert fitted.converged
+    assert np.r_[fitted.characteristic.ordinates, fitted.pre_curvature] == pytest.approx(TRUTH, rel=1e-6)
+    asked = fitted.starts[0]
+    assert (asked.bending_stiffness, asked.pre_curvature) == start
+    assert asked.at_minimum == (asked.objective < 1e-20)
+
+
+def test_forced_straight_is_a_minimum_from_any_start():
+    """Physics notes, item 12: (-0.61, 1.71, 1.62) mN m^2 with 101 nodes, objective 0.028, by two other solvers."""
+    steps = simulate(table_1("secant"), STEPS)
+    travel = np.array([0.2 - step.chord for step in steps])
+    data = Virtual(0.2, travel, np.array([s.force for s in steps]), np.array([s.kappa for s in steps]))
+    for stiffness in (0.01, 0.03):
+        fitted = paper_fit(data, TABLE_1_KNOTS, start=(stiffness, 1.0), zero="length", pre_curvature=0.0)
+        assert fitted.converged
+        assert fitted.outcome is None
+        assert 1e3 * fitted.characteristic.ordinates == pytest.approx([-0.61, 1.71, 1.62], abs=6e-3)
+        assert fitted.objective == pytest.approx(0.028, abs=5e-4)
+        force_errors = np.array([step.force for step in fitted.steps]) - data.forces
+        assert 1e3 * force_errors == pytest.approx([-36.0, 14.0, 16.0], abs=0.6)
+
+
+def test_an_end_that_is_no_minimum_is_not_converged():
+    ends = [PaperStart(0.01, 1.0, 2.0, 0.3, False), PaperStart(0.02, 1.0, 5.0, 1e-7, False)]
+    fitted = replace(paper_fit(virtual("tangent"), TABLE_1_KNOTS, reading="tangent"), starts=tuple(ends))
+    assert not fitted.converged
+    assert [end.at_minimum for end in ends] == [False, True]
+    assert not PaperStart(0.01, 1.0, np.inf, 0.0, False).at_minimum
+    assert PaperStart(0.01, 1.0, 1e-25, np.inf, True).at_minimum
