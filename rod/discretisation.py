@@ -186,6 +186,11 @@ class Rod:
         return Mounted(relative - np.arctan2(Y, X), float(np.hypot(X, Y)))
 
     @cached_property
+    def turn(self) -> float:
+        """Angle by which the force-free rod turns from end to end, rad; beyond pi it is a coil."""
+        return float(self.weights @ self.section.pre_curvature)
+
+    @cached_property
     def rest_angles(self) -> tuple[float, float]:
         """Rest angle of the springs, or the angle of a clamp, left and right, rad."""
         angles = self.mounted.angles

@@ -22,6 +22,7 @@ import numpy as np
 from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
+from rod.energy import Potential
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import TURN_LIMIT, followed
 from rod.reduction import Hold, System
@@ -79,6 +80,16 @@ class Equilibrium:
     iterations: int
 
     @property
+    def energy(self) -> float:
+        """Potential energy, J: that of Eq. (4), less imposed forces at the right end times its place."""
+        V = Potential(self.rod, self.before)
+        work = sum(
+            0.0 if imposed else float(R * place[-1])
+            for imposed, R, place in zip(self.hold.imposed, self.right_reaction, (self.x, self.y), strict=True)
+        )
+        return V.value(V.unknowns(self.angles, self.x, self.y)) - work
+
+    @property
     def good(self) -> bool:
         """Whether the outcome is CONVERGED."""
         return self.outcome is Outcome.CONVERGED
@@ -128,7 +139,12 @@ def solve(
     if not last.found and falling:  # rather the state that has what was asked for, but for a moment that falls
         met = next((trial for trial in falling if trial.negatives is not None), last)
         last = met._replace(outcome=Outcome.LIMIT_POINT)
-    return _record(system, last, sum(trial.steps for trial in verdicts))
+    found = _record(system, last, sum(trial.steps for trial in verdicts))
+    if first is None or branch != "natural" or not patient or abs(rod.turn) < np.pi:
+        return found
+    # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
+    other = solve(rod, hold, memory=memory)
+    return other if other.good and not (found.good and found.energy <= other.energy) else found
 
 
 def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:

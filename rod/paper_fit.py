@@ -58,11 +58,16 @@ class Virtual:
 
 @dataclass(frozen=True)
 class PaperIteration:
-    """State of the fit at one iteration: control points (k,) N m^2, K0 1/m, objective N^2."""
+    """State of the fit at one iteration: control points (k,) N m^2, K0 1/m, objective N^2.
+
+    ``forces`` (steps,) N and ``curvatures`` (steps, elements + 1) 1/m are those simulated.
+    """
 
     ordinates: Array
     pre_curvature: float
     objective: float
+    forces: Array
+    curvatures: Array
 
 
 @dataclass(frozen=True)
@@ -322,4 +327,5 @@ class _Problem:
 
     def iteration(self, parameters: Array, here: _Simulation) -> PaperIteration:
         law, K0 = self.split(parameters)
-        return PaperIteration(law.ordinates, K0, float(here.residual @ here.residual))
+        bends = np.array([step.kappa for step in here.steps])
+        return PaperIteration(law.ordinates, K0, float(here.residual @ here.residual), here.forces, bends)

@@ -252,10 +252,10 @@ def _leap(ramp: Ramp, here: Point, way: Move) -> tuple[Point | None, int]:
     far = LEAP / largest
     if beyond(0.0) * beyond(far) >= 0.0:
         return None, 0
-    angles = here.angles + float(brentq(beyond, 0.0, far, rtol=1e-4)) * way.angles
+    angles = np.asarray(here.angles + brentq(beyond, 0.0, far, rtol=1e-4) * way.angles, float)
     still = system.balance(angles, np.zeros(2))
     R = np.linalg.lstsq(still.border.T / system.rod.length, -still.gradient / system.rod.length, rcond=None)[0]
-    trial = newton(system, Start(angles, R), most=8)
+    trial = newton(system, Start(angles, np.asarray(R, float)), most=8)
     there = Point(trial.angles, trial.R, 1.0, trial.balance)
     guess = here._replace(angles=angles)
     good = trial.found and _near(ramp, here, guess, there) and not ramp.negatives(there)

@@ -163,8 +163,8 @@ class System:
     def misfit(self, balance: Balance) -> float:
         """Largest residual, relative to EI/L and L."""
         g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
-        moment: float = float(abs(g[idamax(g)])) / self.moment_scale
-        return max(moment, abs(gap_x) / self.rod.length, abs(gap_y) / self.rod.length)
+        moment = abs(g[idamax(g)]) / self.moment_scale
+        return float(max(moment, abs(gap_x) / self.rod.length, abs(gap_y) / self.rod.length))
 
     def section(self, K: Array) -> tuple[Array, Array]:
         """Moment and tangent (n,) of the cross-section at curvatures (n,), with the memory at the start of the step."""

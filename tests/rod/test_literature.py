@@ -19,7 +19,7 @@ from rod.branch import natural_side
 from rod.characteristic import Characteristic
 from rod.energy import Potential
 from rod.equilibrium import Equilibrium, Outcome, Start, solve
-from rod.newton import descended, softest
+from rod.newton import descended, newton, softest
 from rod.path import Ramp, followed
 from rod.reduction import Hold, System
 from rod.support import Support
@@ -287,6 +287,31 @@ def test_coils_are_as_soft_as_castigliano_says(turn):
         assert step.good
         assert step.force == pytest.approx(expected, rel=3e-3)  # d is finite: terms of order d / chord
         assert proven(step)
+
+
+def test_a_coil_is_not_left_on_a_start_of_far_more_energy():
+    coil = BendingTest(LENGTH, LINEAR, 7.0 / LENGTH)
+    hold = coil.hold("displacements", 1e-3)
+    truth = solve(coil.rod, hold)
+    system = System(coil.rod, hold, coil.rod.virgin)
+    bowed = 2.3 * np.cos(np.pi * (np.cumsum(coil.rod.edges) - 0.5 * coil.rod.edges) / LENGTH)
+    wrong = newton(system, Start(bowed, np.array([-5.0, 0.0])))
+    assert wrong.found
+    assert wrong.negatives == 0
+    assert abs(wrong.R[0]) > 20.0 * truth.force
+    step = solve(coil.rod, hold, start=Start(wrong.angles, wrong.R))
+    assert step.good
+    assert step.force == pytest.approx(truth.force, rel=1e-6)
+    assert step.energy == pytest.approx(truth.energy, rel=1e-9)
+    assert truth.energy < 0.1 * EI * (7.0 / LENGTH) ** 2 * LENGTH
+
+
+def test_energy_of_a_dead_force_is_that_of_castigliano():
+    # d(energy)/d(force) = the place where it acts: chord for P in compression, minus the tip's place for its force
+    low, mid, high = (simulate(arch(0.0), forces=[f])[0] for f in (0.2999, 0.3, 0.3001))
+    assert (high.energy - low.energy) / 2e-4 == pytest.approx(mid.chord, rel=1e-6)
+    low, mid, high = (tip_load(CANTILEVER, 0.0, f * UNIT) for f in (1.999, 2.0, 2.001))
+    assert (high.energy - low.energy) / (2e-3 * UNIT) == pytest.approx(-mid.y[-1], rel=1e-5)
 
 
 def arch(load: float) -> BendingTest:
