@@ -15,12 +15,10 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from rod.bending_test import BendingTest, simulate
-from rod.branch import natural_side
 from rod.characteristic import Characteristic
 from rod.energy import Potential
 from rod.equilibrium import Equilibrium, Outcome, Start, solve
-from rod.newton import descended, newton, softest
-from rod.path import Ramp, followed
+from rod.newton import newton
 from rod.reduction import Hold, System
 from rod.support import Support
 from tests.rod.minimum import is_minimum
@@ -331,72 +329,3 @@ def test_arch_past_its_limit_jumps_to_the_shape_below():
     held = simulate(arch(5.0), chords=[test.zero_chord], branch="jump")[0]
     assert held.y[50] > 0.0  # nothing jumps below the limit
     assert simulate(test, chords=[test.zero_chord], branch="up")[0].outcome is Outcome.WRONG_BRANCH
-
-
-# The path itself ------------------------------------------------------------------------------------------------------
-
-DRIVEN = {
-    "force and spring": (replace(arch(1.0), left=Support(stiffness=0.01, angle=0.3)), Hold(force=0.4)),
-    "chord and moment": (replace(arch(2.0), right=Support(moment=1e-3), compliance=1e-3), Hold(chord=0.19)),
-    "clamps that turn": (replace(arch(2.0), left=Support("clamp", angle=0.5, rigid_length=0.01)), Hold(chord=0.18)),
-    "tip of a soft rod": (replace(CANTILEVER, axial_stiffness=3.0, shear_stiffness=2.0), Hold(tip=(-0.2, 0.3))),
-}
-
-
-@pytest.mark.parametrize("case", DRIVEN)
-def test_states_along_the_path_are_equilibria_and_their_rate_is_that_of_neighbours(case):
-    test, hold = DRIVEN[case]
-    ramp = Ramp(System(test.rod, hold, test.rod.virgin), None)
-    assert ramp.system.misfit(ramp.begin.balance) < 1e-12
-    point, way = ramp.begin, None
-    for _ in range(3):
-        way = ramp.tangent(point, way)
-        assert ramp.product(way, way, point.R) == pytest.approx(1.0)
-        found, _ = ramp.corrected(ramp.moved(point, way, 0.05), way)
-        assert found is not None
-        point = found
-    assert point.share > 0.0
-    near, _ = ramp.corrected(ramp.moved(point, ramp.tangent(point, way), 1e-5), ramp.tangent(point, way))
-    rate = ramp.solve(point)[1]
-    by = near.share - point.share
-    assert np.allclose((near.angles - point.angles) / by, rate.angles, rtol=1e-3, atol=1e-3 * np.abs(rate.angles).max())
-    assert np.allclose((near.R - point.R) / by, rate.R, rtol=1e-3, atol=1e-3 * np.abs(rate.R).max())
-    end = followed(ramp.system)
-    assert end.outcome is Outcome.CONVERGED
-    # the whole share is what was asked for: the same as without a path, from the end itself
-    again = solve(test.rod, hold, start=Start(end.angles, end.R))
-    assert np.allclose(again.angles, end.angles, atol=1e-9)
-    assert again.iterations <= 2
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_softest_stiffness_vanishes_at_the_critical_load(case):
-    test, factor = CASES[case]
-    ramp = Ramp(System(test.rod, Hold(force=factor * EULER), test.rod.virgin), None)
-    values = []
-    for share in (0.5, 0.9, 1.1):
-        R = np.array([-share * factor * EULER, 0.0])
-        stiffness, mode = softest(ramp.system, ramp.balance(np.zeros(test.rod.edges.size), R, share))
-        values.append(stiffness)
-        assert ramp.mass @ mode**2 == pytest.approx(1.0, abs=0.03)  # bearings count half an element
-    # linear in the load, zero at the critical one: pi^2 (1 - share) for pinned ends (Rayleigh)
-    assert values[2] < 0.0 < values[1] < values[0]
-    assert values[1] == pytest.approx(-values[2], rel=0.02)
-    if case == "pinned":
-        assert values == pytest.approx(np.pi**2 * np.array([0.5, 0.1, -0.1]), rel=0.03)  # as above
-
-
-def test_descent_ends_at_a_minimum_and_goes_downhill():
-    test = STRAIGHT
-    system = System(test.rod, Hold(force=1.5 * EULER), test.rod.virgin)
-    slope = 1e-3 * np.cos(np.pi * np.cumsum(test.rod.edges) / LENGTH)
-    rest = descended(system, Start(slope, np.array([-1.5 * EULER, 0.0])))
-    truth = simulate(test, forces=[1.5 * EULER])[0]
-    assert rest.found
-    assert np.allclose(rest.angles, truth.angles, atol=1e-7)
-
-
-def test_natural_side_of_a_straight_cable_is_up():
-    assert natural_side(STRAIGHT.rod) == 1
-    assert natural_side(arch(0.0).rod) == 1
-    assert natural_side(replace(STRAIGHT, pre_curvature=-1.0).rod) == -1
