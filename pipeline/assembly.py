@@ -33,7 +33,7 @@ from pipeline.result import (
 )
 from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
-from pipeline.visited import leading, refuted, visited
+from pipeline.visited import decided, leading, refuted, visited
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
@@ -53,9 +53,9 @@ def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str
         "python": platform.python_version(),
         "libraries": {name: importlib.metadata.version(name) for name in LIBRARIES},
         "inputs_sha256": specimen.hashes,
-        # the language of a report changes no result: the same numbers are the same bytes in every one
-        "settings": settings.model_dump(mode="json", exclude={"report": {"language"}}),
-        "command": command or f"{PROGRAM} run {specimen.folder} -o OUT",
+        # neither workers nor the language of a report change a result: the same numbers are the same bytes
+        "settings": settings.model_dump(mode="json", exclude={"batch": True, "report": {"language"}}),
+        "command": command or f"{PROGRAM} run {specimen.folder.absolute()} -o OUT",
         "clock": {"created_utc": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")},
     }
 
@@ -88,9 +88,8 @@ def assemble(
     photos = photo_parts(specimen, traces, parts)
     measured = parts.inverse.converged or parts.balance.curve is not None
     told = _gathered(specimen, traces, parts, list(findings))
-    return Result(
+    result = Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
-        headline=headline(parts, diagnosis, photos, leading(told)),
         specimen=_specimen_part(specimen),
         scale=ScalePart(
             px_per_mm=traces.scale.px_per_m / 1e3,
@@ -107,6 +106,12 @@ def assemble(
         findings=told,
         provenance=provenance(specimen, settings, command),
     )
+    answer = decided(result)
+    fault = leading(told)
+    if fault is None and answer.method is not None and not answer.usable:
+        fault = FindingPart(code="answer/unusable", level="error", message=answer.reason)
+    said = headline(parts, diagnosis, photos, fault)
+    return result.model_copy(update={"answer": answer, "headline": said})
 
 
 def _gathered(

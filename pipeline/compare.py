@@ -28,7 +28,7 @@ from pipeline.result import Result
 from pipeline.rounding import p_value as p_text
 from pipeline.rounding import plain, rounded
 from pipeline.settings.compare import CompareSettings
-from pipeline.visited import Visited, best, leading, pre_curvature
+from pipeline.visited import Visited, answer, best, leading, pre_curvature
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     Returns
     -------
     Comparison
-        ``not comparable`` where a characteristic is missing or no curvature was visited by both.
+        ``not comparable`` where a characteristic is missing or not usable, or no curvature was visited by both.
     """
     settings = settings or CompareSettings()
     one, two = best(a), best(b)
@@ -118,6 +118,12 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
         lacking = " and ".join(r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None)
         return _not_comparable(a, b, ("", ""), f"No characteristic was measured on {lacking}.", settings)
     methods = (one.method, two.method)
+    faults = [
+        f"{r.specimen.id} is not usable: {said.reason.rstrip('.')}." for r in (a, b) if not (said := answer(r)).usable
+    ]
+    faults += [f"f_EI of {r.specimen.id} is not positive." for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
+    if faults:
+        return _not_comparable(a, b, methods, " ".join(faults), settings)
     first, second = _log_curve(one), _log_curve(two)
     grid = first.common_grid(second)
     if grid is None:

@@ -6,7 +6,11 @@ nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a 
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
+
+# Letters of a message or a remedy. Both quote files, where a line may have a million; what is cut is their middle.
+LONGEST = 600
 
 
 class InputError(Exception):
@@ -34,12 +38,21 @@ class InputError(Exception):
 
     @property
     def sentence(self) -> str:
-        """One readable sentence: place, trouble, remedy."""
+        """One readable sentence: place, trouble, remedy; a single line, and nothing in it that a terminal obeys."""
         place = "" if self.path is None else f"{self.path}{'' if self.line is None else f', line {self.line}'}: "
-        return f"{place}{self.message}; {self.remedy}."
+        return _printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
         return (_rebuild, (self.message, self.path, self.line, self.code, self.remedy))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 100]} ... {text[-95:]}"
+
+
+def _printable(text: str) -> str:
+    """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
 
 
 def _rebuild(message: str, path: Path | str | None, line: int | None, code: str, remedy: str) -> InputError:

@@ -31,7 +31,9 @@ from pipeline.diagnosis.words import spoken
 from pipeline.identified_model import IdentifiedModel, Zero, identified_model
 from pipeline.records import Finding
 from pipeline.result import CausePart, Result
+from pipeline.rounding import plain
 from pipeline.settings.predict import PredictSettings
+from pipeline.visited import answer
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
@@ -153,7 +155,8 @@ def predict(
     Raises
     ------
     ValueError
-        For no displacement, one that is not finite, or a length that is not positive.
+        For no displacement, one that is not finite or as long as the cable, a length of no cable, or a result whose
+        numbers are none of a cable.
     """
     settings = settings or PredictSettings()
     length = result.specimen.length_m if length_m is None else length_m
@@ -164,6 +167,7 @@ def predict(
         return None
     if length is None or not (np.isfinite(length) and length > 0.0):
         raise ValueError(f"a cable cannot be {length} m long")
+    _check_sizes(length, displacements_m, model)
     test = model.bending_test(length, zero=zero, elements=settings.elements)
     steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate, settings)
     limit = reachable(test, model) if any(step.status != "predicted" for step in steps) else None
@@ -179,6 +183,25 @@ def predict(
         steps=tuple(_explained(step, limit) for step in steps),
         findings=tuple(_findings(result, model)),
     )
+
+
+LENGTHS_M = (1e-3, 1e3)
+"""No rig holds a cable that is shorter or longer."""
+
+
+def _check_sizes(length: float, displacements: Sequence[float], model: IdentifiedModel) -> None:
+    """Refuse numbers that are of no test; `ValueError` says which."""
+    low, high = LENGTHS_M
+    if not low <= length <= high:
+        raise ValueError(f"a cable of {plain(1e3 * length)} mm is in no test: give its length in mm")
+    largest = max(displacements, key=abs)
+    if abs(largest) >= length:
+        raise ValueError(
+            f"a displacement of {plain(1e3 * largest)} mm is none of a cable of {plain(1e3 * length)} mm: the bearings "
+            "would meet before; give it in mm"
+        )
+    if np.mean(model.characteristic.ordinates) <= 0.0:
+        raise ValueError("the stiffness that the result holds is not positive, as that of no cable")
 
 
 def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:
@@ -320,6 +343,10 @@ def _difference(here: Equilibrium, there: Equilibrium, by: float) -> dict[str, A
 def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
     """What a reader of the prediction must know about the model it was made with."""
     found = []
+    told = answer(result)
+    if not told.usable:
+        message = f"The result is not usable, and so is what follows from it: {told.reason.rstrip('.')}."
+        found.append(Finding("predict/unusable", "error", message))
     if model.method == "balance":
         message = "The fit did not converge; the prediction rests on the balance equations, whose bands are wider."
         found.append(Finding("predict/balance", "warning", message))

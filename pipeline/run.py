@@ -64,7 +64,7 @@ def _diagnosed(identification: Identification, settings: Settings) -> tuple[Diag
     """The diagnosis; where numbers nobody foresaw break it, both ways still stand and the reader is told."""
     try:
         return diagnose(identification.test, identification, settings.diagnosis)
-    except (ArithmeticError, LookupError, ValueError) as error:
+    except (ArithmeticError, LookupError, MemoryError, ValueError) as error:
         told = " ".join(str(error).split())[:200]
         message = (
             f"the diagnosis failed ({type(error).__name__}: {told}); f_EI and K0 stand without it; please report it"

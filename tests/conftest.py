@@ -1,15 +1,21 @@
-"""Where the shared specimens lie, and what becomes of the tests that read them on a machine without them.
+"""What becomes of the tests that need what a machine may lack: the shared specimens, and a browser.
 
-They are looked for in ``$CABLEBEND_SHARED``, then in ``shared`` beside the checkout. Without them the tests marked
-``shared`` are left out, and the head of the report says so and how to get them in.
+The shared specimens are looked for in ``$CABLEBEND_SHARED``, then in ``shared`` beside the checkout. Without them the
+tests marked ``shared`` are left out, and the head of the report says so and how to get them in.
+
+Tests marked ``browser`` open a report in Chromium. Without it they do not run, and the last lines say how many and what
+installs it; with ``CABLEBEND_BROWSER=required`` they fail instead.
 """
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 SHARED = Path(os.environ.get("CABLEBEND_SHARED", Path(__file__).resolve().parents[2] / "shared")) / "data"
+BROWSER = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
+INSTALL = "apt-get install chromium chromium-driver (Debian)"
 
 
 def pytest_report_header() -> str:
@@ -19,11 +25,25 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(config, items):
-    if SHARED.is_dir():
-        return
-    left_out = [item for item in items if item.get_closest_marker("shared")]
-    config.hook.pytest_deselected(items=left_out)
-    items[:] = [item for item in items if item not in left_out]
+    if not SHARED.is_dir():
+        left_out = [item for item in items if item.get_closest_marker("shared")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def pytest_runtest_setup(item):
+    missing = [name for name, path in BROWSER.items() if path is None]
+    if missing and item.get_closest_marker("browser"):
+        end = pytest.fail if os.environ.get("CABLEBEND_BROWSER") == "required" else pytest.skip
+        end(f"{' and '.join(missing)} missing: {INSTALL}")
+
+
+def pytest_terminal_summary(terminalreporter):
+    without = sum("browser" in report.keywords for report in terminalreporter.stats.get("skipped", ()))
+    if without:
+        terminalreporter.section("browser")
+        terminalreporter.line(f"{without} browser tests did not run: no Chromium with its driver was found;")
+        terminalreporter.line(f"{INSTALL} lets them run")
 
 
 @pytest.fixture(scope="session")

@@ -9,12 +9,14 @@ import subprocess
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import pipeline.run
 from pipeline.result import Result
+from pipeline.settings import Settings
 from tests.test_cli import HEAVY
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -93,3 +95,14 @@ def test_a_diagnosis_that_breaks_costs_neither_way_nor_report(tmp_path, monkeypa
     assert len(told) == 1 and "LinAlgError: Singular matrix" in told[0]
     pipeline.write(result, tmp_path)
     assert "Singular matrix" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_diagnosis_that_wants_more_memory_than_there_is_costs_nothing_else(monkeypatch):
+    def broken(*_):
+        raise MemoryError("Unable to allocate 298. GiB")  # 200,000 samples in one hold asked for it
+
+    monkeypatch.setattr(pipeline.run, "diagnose", broken)
+    part, findings = pipeline.run._diagnosed(SimpleNamespace(test=None), Settings())
+    assert part is None
+    assert [finding.code for finding in findings] == ["diagnosis/program-error"]
+    assert "298. GiB" in findings[0].message

@@ -54,14 +54,14 @@ INSIDE = {
         ("linearised",),
     ],
     "pipeline.diagnosis.statistics": [
-        ("score", "twins", "verdict", "pairs", "gain"),
-        ("smooth_fields", "photo_table", "variance_component"),
+        ("score", "twins", "verdict", "gain"),
+        ("pairs", "smooth_fields", "photo_table", "variance_component"),
         ("leftover",),
     ],
     "pipeline.diagnosis.fits": [
         ("base",),
         ("extension",),
-        ("bending",),
+        ("bending", "step"),
         ("sensitivities",),
         ("fit",),
         ("search", "extended", "stuck_forces", "maps"),
@@ -89,7 +89,9 @@ INSIDE = {
     "pipeline.diagnosis.presentation": [("leftover", "named", "table", "findings"), ("part",)],
     "pipeline.diagnosis.plans": [("plan",), ("next_experiment",), ("design",)],
     "pipeline.vision": [
-        ("guard", "median", "photo", "rough", "render"),
+        ("guard",),
+        ("photo_file",),
+        ("median", "photo", "rough", "render"),
         ("scale", "search"),
         ("bearings", "centerline", "preview", "wholeness"),
         ("judgement",),
@@ -125,7 +127,7 @@ INSIDE = {
     ],
 }
 PIPELINE = [
-    ("errors",),
+    ("errors", "threads"),
     ("rounding",),
     ("units",),
     ("records",),

@@ -1,12 +1,15 @@
 """Report and index in a real Chromium: what a reader sees, presses and types.
 
-No network, no errors on the console, no sideways scrolling. Chromium and its driver are Debian's packages ``chromium``
-and ``chromium-driver``; without them these tests fail and say so.
+No network, no errors on the console, no sideways scrolling. What becomes of these tests on a machine without Chromium
+is said in ``tests/conftest.py``.
 """
 
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import urlparse
 
 import pytest
 from selenium import webdriver
@@ -18,10 +21,13 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from pipeline.report.document import write_report
-from pipeline.report.index import write_index
+from pipeline.report.index import write_index, write_rows
+from pipeline.report.row import index_row
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
+
+pytestmark = pytest.mark.browser
 
 FLAGS = (
     "--headless",
@@ -36,19 +42,17 @@ FLAGS = (
 )
 PHONE, DESK = 380, 1280
 ROWS = 2000
+MANY = 5000
 
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory):
-    programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
-    missing = [name for name, path in programs.items() if path is None]
-    assert not missing, f"{' and '.join(missing)} missing: apt-get install chromium chromium-driver"
     options = Options()
-    options.binary_location = programs["chromium"]
+    options.binary_location = shutil.which("chromium")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
         options.add_argument(flag)
-    driver = webdriver.Chrome(options=options, service=Service(programs["chromedriver"]))
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     yield driver
     driver.quit()
 
@@ -67,6 +71,16 @@ def batch(result, count):
         yield result.model_copy(update={"specimen": specimen, "photos": result.photos[3:4], **changes})
 
 
+def many_rows(result):
+    """Rows of 5,000 specimens, stiffness falling with their number; every hundredth has its forces in mN."""
+    row = index_row(result, ReportSettings())
+    hostile = "<img src=x onerror=alert(1)></script>"
+    for number in range(MANY):
+        faulty = {"usable": False, "fault": f"the forces of {hostile} are in mN"} if number % 100 == 50 else {}
+        low = (row.low[0], (2.0 - number / MANY) * row.low[1], row.low[2])
+        yield replace(row, id=f"cable-{number}", type="HV", low=low, report=f"cable-{number}/report.html", **faulty)
+
+
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
     """Address of a batch: reports in both languages, a small index and one of 2,000 rows."""
@@ -77,6 +91,7 @@ def site(tmp_path_factory):
     write_report(result, folder / "de", ReportSettings(language="de"))
     write_index(batch(result, 20), folder)
     write_index(batch(result, ROWS), folder / "large")
+    write_rows(list(many_rows(result)), folder / "huge", ReportSettings())
     return folder.as_uri()
 
 
@@ -306,3 +321,50 @@ def test_rows_follow_as_the_reader_scrolls(show, site):
     driver.execute_script("const f = document.getElementById('specimens'); f.scrollTop = f.scrollHeight")
     WebDriverWait(driver, 5).until(lambda d: len(visible_names(d)) == 200)
     assert one(driver, "#shown").text == f"{ROWS} of {ROWS} shown."
+
+
+def test_five_thousand_rows_are_searched_and_sorted(show, site):
+    driver = show(f"{site}/huge/index.html")
+    assert len(visible_names(driver)) == 100
+    one(driver, "#search").send_keys("cable-4999")
+    assert visible_names(driver) == ["cable-4999"]
+    assert one(driver, "#shown").text == f"1 of {MANY} shown."
+    one(driver, "#search").clear()
+    one(driver, "#search").send_keys(" ")
+    driver.find_element(By.XPATH, "//th/button[starts-with(., 'f_EI, low')]").click()
+    assert visible_names(driver)[:2] == ["cable-4999", "cable-4998"]
+    Select(one(driver, "#status")).select_by_value("unusable")
+    assert visible_names(driver) == [f"cable-{number}" for number in range(4950, 0, -100)]
+    assert "<img src=x onerror=alert(1)></script>" in one(driver, "#specimens .why").text
+    assert "data are at fault: 50." in one(driver, ".fault").text
+
+
+def test_five_thousand_rows_are_drawn_where_the_reader_is(show, site):
+    driver = show(f"{site}/huge/index.html")
+    place = "const f = document.getElementById('specimens'); f.scrollTop = {} * f.scrollHeight"
+    for share, seen in ((1.0, "cable-4999"), (0.5, "cable-2500"), (0.0, "cable-0")):
+        driver.execute_script(place.format(share))
+        WebDriverWait(driver, 20).until(lambda d, seen=seen: seen in visible_names(d))
+    for share in range(20):
+        driver.execute_script(place.format(share / 20))
+        WebDriverWait(driver, 20).until(lambda d, seen=f"cable-{250 * share}": seen in visible_names(d))
+    assert len(visible_names(driver)) <= 1500  # far rows are not kept
+
+
+def test_a_tick_is_kept_where_its_row_is_drawn_again(show, site):
+    driver = show(f"{site}/huge/index.html")
+    one(driver, "#specimens tbody input").click()
+    one(driver, "#search").send_keys("cable-7")
+    assert one(driver, "#overlay .key").text == "cable-0"
+    one(driver, "#search").clear()
+    one(driver, "#search").send_keys(" ")
+    assert one(driver, "#specimens tbody input").is_selected()
+
+
+def test_first_rows_are_the_same_with_scripts_and_without(show, site):
+    driver = show(f"{site}/huge/index.html")
+    drawn = driver.execute_script("return document.querySelector('#specimens tbody tr').outerHTML")
+    fetched = "const d = new DOMParser().parseFromString(arguments[0], 'text/html');"
+    page = (Path(urlparse(site).path) / "huge/index.html").read_text(encoding="utf-8")
+    before = driver.execute_script(f"{fetched} return d.querySelector('#specimens tbody tr').outerHTML", page)
+    assert drawn.replace(' xmlns="http://www.w3.org/2000/svg"', "") == before

@@ -1,7 +1,8 @@
 """Many specimens: `pipeline.run` around each folder, in processes of this machine or on a cluster.
 
 `orders` says what is measured and under which name, `specimen` measures one folder and stores it, `engine` hands
-specimens to processes, `store` owns the folder of results, `batch` puts them together.
+specimens to `processes` of this machine or to a dask `cluster`, `store` owns the folder of results, `batch` puts them
+together.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from typing import Any
 from pipeline.batch.orders import make_orders
 from pipeline.batch.specimen import Outcome, Stages, draw_again, stored_result
 from pipeline.batch.store import Store
+from pipeline.errors import InputError
 from pipeline.settings import Settings
 
 LOG_NAME = "cablebend.log"
@@ -19,7 +20,7 @@ LOG_NAME = "cablebend.log"
 
 @dataclass(frozen=True)
 class Tally:
-    """Counts of a batch.
+    """Counts of a batch; what is not usable was measured all the same.
 
     ``unstored`` holds the entries, by name, of failures that could not be written; ``trouble`` sentences for the user.
     """
@@ -28,6 +29,7 @@ class Tally:
     names: tuple[str, ...]
     measured: int = 0
     failed: int = 0
+    unusable: int = 0
     reused: int = 0
     interrupted: bool = False
     unstored: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -45,6 +47,7 @@ class Tally:
             self,
             measured=self.measured + (not outcome.failed),
             failed=self.failed + outcome.failed,
+            unusable=self.unusable + (not outcome.failed and not outcome.usable),
             reused=self.reused + outcome.reused,
             unstored=unstored,
         )
@@ -85,7 +88,7 @@ def run_batch(
     InputError
         ``out/busy``, ``out/unwritable``, ``batch/no-scheduler``.
     """
-    from pipeline.batch.engine import measure_all  # dask takes half a second to load
+    from pipeline.batch.engine import measure_all
 
     store, stages = Store(out.absolute()), stages or Stages.of_pipeline()
     with store.locked(), _log(store) as log:
@@ -126,10 +129,15 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
         for name in store.names():
             try:
                 result = stored_result(store, name)
-            except (OSError, ValueError) as error:
-                yield name, f"result.json cannot be read ({type(error).__name__}); run the specimen again"
+            except InputError as error:
+                store.forget_row(name)
+                yield name, f"result.json cannot be read: it {error.message}; run the specimen again"
                 continue
-            draw_again(store, name, result, stages, settings)
+            try:
+                draw_again(store, name, result, stages, settings)
+            except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # values that no measurement gives
+                yield name, f"result.json cannot be drawn ({type(error).__name__}: {error}); run the specimen again"
+                continue
             yield name, None
         stages.write_index(store.out, settings)
 
@@ -137,10 +145,10 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
 def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
     """Write the index over everything stored; a folder that takes no more files is a trouble of the tally."""
     try:
-        stages.write_index(store.out, settings)
+        told = tuple(stages.write_index(store.out, settings) or ())
     except OSError as error:
-        return replace(tally, trouble=(*tally.trouble, store.unwritable(error).sentence))
-    return tally
+        told = (store.unwritable(error).sentence,)
+    return replace(tally, trouble=(*tally.trouble, *told))
 
 
 class _LogFile(logging.FileHandler):

@@ -1,8 +1,9 @@
 """What a batch is to do: specimen folders -> orders, each with the name of its result and everything a worker needs.
 
 A result is named after the specimen's id. Where two specimens share an id, in whatever capitals, the folder's name
-is added, and the names of the folders above it as far as needed: nothing is overwritten and names stay the same when
-the batch runs again.
+is added, and the names of the folders above it as far as needed, and where even these do not tell two apart, or make
+the name longer than a file system takes, a digest of the whole path: nothing is overwritten and names stay the same
+when the batch runs again.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
 import shlex
 from collections import Counter
 from collections.abc import Sequence
@@ -18,10 +20,14 @@ from pathlib import Path
 
 from pipeline import __version__
 from pipeline.batch.store import OWN_FILES
-from pipeline.errors import InputError
 from pipeline.intake.specimenfile import folder_name, plain_name, read_specimen_file
 from pipeline.records import Specimen
 from pipeline.settings import Settings
+
+LONGEST_NAME = 200
+"""Bytes of a result's name: file systems take 255, and notes are named after results, with something added."""
+DIGITS = 12
+"""Of a digest in a name; of a million results two share one with a chance of 1 in 500."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,8 @@ class Order:
 
 def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, options: str = "") -> list[Order]:
     """Orders for a batch, in the order of the folders.
+
+    The command in a result names the specimen from anywhere, and no folder of results: the same bytes go into any.
 
     Parameters
     ----------
@@ -57,7 +65,7 @@ def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, optio
             out=where,
             settings=settings,
             version=version,
-            command=" ".join(filter(None, ("cablebend run", quoted(folder), "-o", quoted(out), options))),
+            command=" ".join(filter(None, ("cablebend run", quoted(folder.absolute()), "-o OUT", options))),
         )
         for folder, name in zip(folders, result_names(folders, settings), strict=True)
     ]
@@ -79,17 +87,30 @@ def result_names(folders: Sequence[Path], settings: Settings) -> list[str]:
             part[:depth] if count[_key(name)] > 1 or _key(name) in OWN_FILES else name
             for name, part in zip(names, parts, strict=True)
         ]
-    return ["--".join(name) for name in names]
+    count = Counter(_key(name) for name in names)
+    whole = ["--".join(name) for name in names]
+    return [
+        _digested(told, folder) if count[_key(name)] > 1 or len(told.encode()) > LONGEST_NAME else told
+        for name, told, folder in zip(names, whole, folders, strict=True)
+    ]
 
 
 def _key(name: tuple[str, ...]) -> str:
     return "--".join(name).casefold()
 
 
+def _digested(name: str, folder: Path) -> str:
+    """The begin of a name, and a digest of the path that it does not tell whole."""
+    digest = hashlib.sha256(os.fsencode(folder.absolute())).hexdigest()[:DIGITS]
+    begin = name.encode()[: LONGEST_NAME - DIGITS - 2].decode(errors="ignore")
+    return f"{begin}--{digest}"
+
+
 def _id(folder: Path, settings: Settings) -> str:
+    """Id of a specimen, or its folder's name where the id cannot be read: what measures it says why."""
     try:
         return read_specimen_file(folder, settings.intake).id
-    except InputError:
+    except Exception:  # before any work is handed out: whatever breaks here would cost the batch
         return folder_name(folder)
 
 

@@ -13,7 +13,7 @@ import os
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -22,16 +22,14 @@ from pipeline.batch.orders import Order, fingerprint
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.result import FindingPart, Result, SpecimenPart, from_json, schema, to_json
+from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.settings import Settings
+from pipeline.threads import one_thread
 
 Measure = Callable[..., Result]
 Write = Callable[..., None]
-WriteIndex = Callable[[Path, Settings], None]
+WriteIndex = Callable[[Path, Settings], Iterable[str] | None]  # sentences on specimens that contradict each other
 ENTRY_SCHEMA = "cablebend/entry/1"
-# One thread a worker: processes fill the cores, and threads of libraries beside them only wait for each other.
-THREAD_LIMITS = ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
-ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in THREAD_LIMITS} | {"OPENCV_FOR_THREADS_NUM": "1"}
 
 
 @dataclass(frozen=True)
@@ -60,17 +58,22 @@ def _pipeline_write(result: Result, folder: Path, settings: Settings) -> None:
     write(result, folder, settings)
 
 
-def _pipeline_write_index(out: Path, settings: Settings) -> None:
+def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[str]:
     from pipeline.report.files import write_atomic
-    from pipeline.report.index import write_index
+    from pipeline.report.index import index_rows, write_rows
 
-    write_index(out, out, settings.report)
+    rows = index_rows(out, out, settings.report)
+    write_rows(rows, out, settings.report)
     write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
+    return [f"{row.id}: {row.fault}." for row in rows if row.outlying]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an order. ``entry`` is None if it is stored, else what could not be stored."""
+    """What became of an order. ``entry`` is None if it is stored, else what could not be stored.
+
+    ``usable`` is false where a fault of the data makes what was measured none of the cable's.
+    """
 
     name: str
     status: Literal["measured", "partial", "failed"]
@@ -78,6 +81,7 @@ class Outcome:
     reused: bool
     seconds: float
     entry: dict[str, Any] | None = None
+    usable: bool = True
 
     @property
     def failed(self) -> bool:
@@ -109,14 +113,15 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
             return outcome
         return _measured(store, order, stages, started)
     except InputError as error:
-        finding = FindingPart(code=error.code, level="error", message=error.sentence)
-        return store_failure(order, finding, started)
+        return store_failure(order, refusal(error), started)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
-        return store_failure(order, _refusal(error), started, trace=traceback.format_exc())
+        return store_failure(order, refusal(error), started, trace=traceback.format_exc())
 
 
-def _refusal(error: Exception) -> FindingPart:
-    """What a reader of the index is told about an error nobody foresaw."""
+def refusal(error: Exception) -> FindingPart:
+    """What is told about an error that costs a specimen: a file of the user, or what nobody foresaw."""
+    if isinstance(error, InputError):
+        return FindingPart(code=error.code, level="error", message=error.sentence)
     told = " ".join(str(error).split())[:300]
     code, message = "specimen/program-error", f"the program failed ({type(error).__name__}: {told}); please report it"
     if isinstance(error, MemoryError):
@@ -129,12 +134,17 @@ def _refusal(error: Exception) -> FindingPart:
 def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
     """Why a specimen is not tried (again); None if it may be."""
     if store.overdue(order.name).exists():
-        message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
-        return FindingPart(code="specimen/timeout", level="error", message=message)
+        return overdue(timeout_s)
     if store.begin(order.name) >= attempts:
         message = f"its process died {attempts} times (out of memory, or a crash in a library); photos may be damaged"
         return FindingPart(code="specimen/worker-died", level="error", message=message)
     return None
+
+
+def overdue(timeout_s: float) -> FindingPart:
+    """What is told of a specimen that took longer than it may."""
+    message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
+    return FindingPart(code="specimen/timeout", level="error", message=message)
 
 
 @contextlib.contextmanager
@@ -157,38 +167,48 @@ def _deadline(seconds: float, note: Path) -> Iterator[None]:
 
 def _measured(store: Store, order: Order, stages: Stages, started: float) -> Outcome:
     """Read, compare with what is stored, measure, store."""
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)  # for workers that were started by others; before the libraries load
+    one_thread()  # for workers that were started by others
     store.place(order.name)  # refuses before the work, not after it
     specimen = read_specimen(order.folder, order.settings.intake)
     mark = fingerprint(specimen, order)
     stored = store.entry(order.name)
     if stored is not None and stored.get("fingerprint") == mark:
-        with contextlib.suppress(OSError, ValueError):  # a stored result that cannot be read is measured anew
+        with contextlib.suppress(OSError, ValueError, InputError):  # a stored result that is none is measured anew
             if order.settings.batch.reports and not stored.get("reports", True):
                 draw_again(store, order.name, stored_result(store, order.name), stages, order.settings)
             told = str(stored.get("headline", ""))
-            return Outcome(order.name, stored["status"], told, True, time.monotonic() - started)
+            usable = stored.get("state") != "unusable"
+            return Outcome(order.name, stored["status"], told, True, time.monotonic() - started, usable=usable)
     result = stages.measure(order.folder, order.settings, command=order.command)
     entry = _entry(order, result, mark)
     with store.staging() as staged:
         stages.write(result, staged, order.settings)
         write_entry(entry, staged)
         store.install(staged, order.name)
-    return Outcome(order.name, result.status, entry["headline"], False, time.monotonic() - started)
+    usable, took = entry["state"] != "unusable", time.monotonic() - started
+    return Outcome(order.name, result.status, entry["headline"], False, took, usable=usable)
 
 
 def stored_result(store: Store, name: str) -> Result:
-    """A stored result; raises OSError or ValueError if its ``result.json`` cannot be read."""
-    return from_json((store.out / name / "result.json").read_text(encoding="utf-8"))
+    """A stored result; raises `InputError` if its ``result.json`` cannot be read."""
+    return read_result(store.out / name / "result.json")
 
 
 def draw_again(store: Store, name: str, result: Result, stages: Stages, settings: Settings) -> None:
     """Write tables and reports of a stored result again, without measuring."""
     with store.staging() as staged:
         stages.write(result, staged, settings)
-        write_entry((store.entry(name) or {}) | {"reports": settings.batch.reports}, staged)
+        told = {"reports": settings.batch.reports, **_in_index(result, settings)}
+        write_entry((store.entry(name) or {}) | told, staged)
         store.install(staged, name)
+
+
+def _in_index(result: Result, settings: Settings) -> dict[str, Any]:
+    """What the index and the next run read in place of a result."""
+    from pipeline.report.row import as_entry, index_row
+
+    row = index_row(result, settings.report)
+    return {"state": row.state, "row": as_entry(row)}
 
 
 def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
@@ -202,6 +222,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "headline": result.headline or (reasons[0].message if reasons else ""),
         "code": reasons[0].code if reasons else None,
         "reports": order.settings.batch.reports,
+        **_in_index(result, order.settings),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
 
@@ -227,6 +248,12 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
         store.end(order.name)
         unstored = None
     return Outcome(order.name, "failed", finding.message, False, time.monotonic() - started, unstored)
+
+
+def store_death(order: Order, told: str, started: float) -> Outcome:
+    """Store a specimen whose worker ended without an outcome, and not by its fault as far as its notes tell."""
+    finding = FindingPart(code="specimen/worker-died", level="error", message=f"its worker failed ({told})")
+    return store_failure(order, finding, started)
 
 
 def failed_result(order: Order, finding: FindingPart, trace: str | None = None) -> Result:

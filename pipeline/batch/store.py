@@ -1,9 +1,12 @@
 """The folder of results: one folder a specimen, put in place whole or not at all.
 
-A specimen's files are written into a staging folder beside the others and renamed into place, so a reader, a second
-command or the next one after a power cut never sees half a result. ``entry.json`` in each folder says in a few lines
-what is there and from which inputs (its fingerprint): the index and the next run read it instead of ``result.json``.
-One run at a time writes into a folder; the lock is the operating system's and dies with its process.
+A specimen's files are written into a staging folder beside the others and renamed into place once they are on the disk,
+so a reader, a second command or the next one after a power cut never sees half a result. Where there is an earlier
+result, one rename cannot replace it: the new one first becomes ``ready``, which is a promise on the disk, and only then
+does the old one go. A run that ends in between leaves the promise to the next, which keeps it before anything else.
+``entry.json`` in each folder says in a few lines what is there and from which inputs (its fingerprint): the index and
+the next run read it instead of ``result.json``. One run at a time writes into a folder; the lock is the operating
+system's and dies with its process.
 """
 
 from __future__ import annotations
@@ -22,9 +25,10 @@ import locket
 
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
+from pipeline.report.files import synced, write_atomic
 
 ENTRY = "entry.json"
-WORK = ".cablebend"  # staging, attempts and lock
+WORK = ".cablebend"  # staging, ready, attempts and lock
 OWN_FILES = ("index.html", "summary.csv", "result.schema.json", "cablebend.log")
 
 
@@ -36,7 +40,7 @@ class Store:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the folder for one run; what an earlier, killed run left half done is removed.
+        """Hold the folder for one run; what an earlier, killed run left ready is put in place, half done is removed.
 
         Raises
         ------
@@ -44,7 +48,7 @@ class Store:
             ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
         """
         try:
-            self._work("staging").mkdir(parents=True, exist_ok=True)
+            self._work("ready").mkdir(parents=True, exist_ok=True)
             lock = locket.lock_file(str(self.out / WORK / "lock"), timeout=0)
             lock.acquire()
         except locket.LockError as error:
@@ -57,12 +61,26 @@ class Store:
         except OSError as error:
             raise self.unwritable(error) from error
         try:
-            for name in ("staging", "attempts"):
-                shutil.rmtree(self._work(name), ignore_errors=True)
-                self._work(name).mkdir(parents=True, exist_ok=True)
+            try:
+                self._resume()
+            except OSError as error:
+                raise self.unwritable(error) from error
             yield
         finally:
             lock.release()
+
+    def _resume(self) -> None:
+        """Put in place what is ready, then begin with empty folders of work."""
+        for ready in self._work("ready").iterdir():
+            if not self._foreign(self.out / ready.name):
+                self._put(ready)
+        for name in ("staging", "attempts"):
+            shutil.rmtree(self._work(name), ignore_errors=True)
+            self._work(name).mkdir(parents=True, exist_ok=True)
+        for folder in (self.out / WORK, self.out):
+            synced(folder)
+        with contextlib.suppress(PermissionError):  # a folder that may be entered, not read
+            synced(self.out.parent)
 
     def unwritable(self, error: OSError) -> InputError:
         """The error for an output folder that refuses to be written."""
@@ -86,6 +104,10 @@ class Store:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
+    def _foreign(self, place: Path) -> bool:
+        """Whether a place holds something that is no result."""
+        return os.path.lexists(place) and not (place / ENTRY).is_file()
+
     def place(self, name: str) -> Path:
         """Where a result goes.
 
@@ -95,7 +117,7 @@ class Store:
             ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
         """
         place = self.out / name
-        if os.path.lexists(place) and not (place / ENTRY).is_file():
+        if self._foreign(place):
             raise InputError(
                 "is in the way of a result and none itself",
                 path=place,
@@ -107,13 +129,26 @@ class Store:
     def install(self, staged: Path, name: str) -> None:
         """Put a finished folder into its place; an earlier result there is replaced. Raises as `place` does."""
         place = self.place(name)
+        for path in (*staged.rglob("*"), staged):
+            synced(path)
         if place.exists():
-            old = self._work("staging") / uuid.uuid4().hex
-            place.rename(old)
-            staged.rename(place)
-            shutil.rmtree(old, ignore_errors=True)
+            ready = self._work("ready") / name
+            staged.rename(ready)
+            synced(ready.parent)
+            self._put(ready)
         else:
             staged.rename(place)
+            synced(self.out)
+
+    def _put(self, ready: Path) -> None:
+        """Move what is ready into its place, and what was there before away."""
+        place, old = self.out / ready.name, self._work("staging") / uuid.uuid4().hex
+        if place.exists():
+            old.parent.mkdir(exist_ok=True)
+            place.rename(old)
+        ready.rename(place)
+        synced(self.out)
+        shutil.rmtree(old, ignore_errors=True)
 
     def entry(self, name: str) -> dict[str, Any] | None:
         """What is stored under a name; None if nothing readable is."""
@@ -122,6 +157,12 @@ class Store:
         except (OSError, ValueError):
             return None
         return entry if isinstance(entry, dict) else None
+
+    def forget_row(self, name: str) -> None:
+        """Take the row of the index out of an entry: its result is not what it was."""
+        entry = self.entry(name)
+        if entry is not None and entry.pop("row", None) is not None:
+            write_entry(entry, self.out / name)
 
     def names(self) -> list[str]:
         """Names of all stored specimens in natural order."""
@@ -147,6 +188,5 @@ class Store:
 
 
 def write_entry(entry: dict[str, Any], folder: Path) -> None:
-    """Write ``entry.json`` into a staged folder."""
-    text = json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True)
-    (folder / ENTRY).write_text(text + "\n", encoding="utf-8")
+    """Write ``entry.json`` into a folder, at once or not at all: one that is in place already may be read meanwhile."""
+    write_atomic(folder / ENTRY, json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True) + "\n")

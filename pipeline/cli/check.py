@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import POSITIVE, settings_options
 from pipeline.cli.run import found, nothing_found
-from pipeline.errors import InputError
 
 if TYPE_CHECKING:
-    from pipeline.settings import IntakeSettings
+    from pipeline.result import FindingPart
+    from pipeline.settings import IntakeSettings, Settings
 
 
 @click.command(short_help="What would run and what is wrong.")
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
+@click.option("--timeout", type=POSITIVE, metavar="SECONDS", help="Limit per specimen.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
 @settings_options
 @click.pass_context
 def check(
     ctx: click.Context,
     folders: tuple[Path, ...],
+    timeout: float | None,
     as_json: bool,
     settings_file: Path | None,
     assignments: tuple[str, ...],
@@ -31,11 +35,12 @@ def check(
     """Read specimens without measuring them; print what would run and what is wrong, with file and line."""
     from pipeline.cli.configuration import read_settings
 
-    settings = read_settings(settings_file, assignments)
+    limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
+    settings = read_settings(settings_file, (*assignments, *limit))
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))
-    rows = [checked(folder, settings.intake) for folder in specimens]
+    rows = list(checked_all(specimens, settings))
     failed = sum(row["status"] == "error" for row in rows)
     if as_json:
         click.echo(json.dumps({"specimens": rows, "runs": len(rows) - failed, "errors": failed}, indent=1))
@@ -45,15 +50,30 @@ def check(
     ctx.exit(3 if failed == len(rows) else 1 if failed or refused else 0)
 
 
+def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, Any]]:
+    """What a run would find in each folder, each within the time that a specimen has.
+
+    In this process where there is only one and no limit was asked for, as a run does it.
+    """
+    from pipeline.batch.apart import apart
+
+    limit = settings.batch
+    work = partial(checked, settings=settings.intake)
+    if limit.in_process or (len(folders) == 1 and "timeout_s" not in limit.model_fields_set):
+        return map(work, folders)
+    lost = partial(without_answer, seconds=limit.timeout_s)
+    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.intake.folder")
+
+
 def checked(folder: Path, settings: IntakeSettings) -> dict[str, Any]:
-    """What a run would find in one folder."""
+    """What a run would find in one folder; whatever breaks in it is told as the run would tell it."""
+    from pipeline.batch.specimen import refusal
     from pipeline.intake.folder import read_specimen
 
     try:
         specimen = read_specimen(folder, settings)
-    except InputError as error:
-        trouble = {"code": error.code, "level": "error", "message": error.sentence}
-        return {"folder": str(folder), "id": None, "status": "error", "steps": 0, "photos": 0, "findings": [trouble]}
+    except Exception as error:  # one folder never costs the others
+        return _failed(folder, refusal(error))
     findings = [{"code": f.code, "level": f.level, "message": f.message} for f in specimen.findings]
     status = "warning" if any(finding["level"] != "info" for finding in findings) else "ok"
     return {
@@ -64,6 +84,21 @@ def checked(folder: Path, settings: IntakeSettings) -> dict[str, Any]:
         "photos": len(specimen.images),
         "findings": findings,
     }
+
+
+def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any]:
+    """The row of a folder whose reading did not come to an end, because its time was over or its process died."""
+    from pipeline.batch.specimen import overdue
+    from pipeline.result import FindingPart
+
+    died = "its process died (out of memory, or a crash in a library)"
+    told = overdue(seconds) if over else FindingPart(code="specimen/worker-died", level="error", message=died)
+    return _failed(folder, told)
+
+
+def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
+    trouble = {"code": told.code, "level": "error", "message": told.message}
+    return {"folder": str(folder), "id": None, "status": "error", "steps": 0, "photos": 0, "findings": [trouble]}
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:

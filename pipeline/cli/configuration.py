@@ -108,8 +108,8 @@ def _merged(tables: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
 
 
 def as_options(file: Path | None, assignments: Sequence[str]) -> str:
-    """The options as they are typed, for the command that reproduces a result."""
-    options = [] if file is None else [("--settings", str(file))]
+    """The options for the command that reproduces a result, from whichever folder it is run."""
+    options = [] if file is None else [("--settings", str(file.absolute()))]
     options += [("--set", assignment) for assignment in assignments]
     return shlex.join(itertools.chain.from_iterable(options))
 

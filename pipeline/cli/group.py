@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import signal
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from pipeline import __version__
 from pipeline.errors import InputError
+from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
 COMMANDS = ("run", "check", "init", "report", "predict", "compare", "demo", "simulate", "design", "explain", "paper")
@@ -32,7 +36,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; say what a user's file or setting did wrong without a traceback."""
         try:
-            return super().invoke(ctx)
+            with _ended_alike():
+                return super().invoke(ctx)
         except InputError as error:
             click.echo(f"cablebend: {error.sentence}", err=True)
             ctx.exit(2)
@@ -47,6 +52,16 @@ class Commands(click.Group):
             ctx.exit(2)
 
 
+@contextlib.contextmanager
+def _ended_alike() -> Iterator[None]:
+    """SIGTERM (`kill`, a shutdown, the time limit of a cluster) ends a command as Ctrl-C does."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="cablebend")
 def main() -> None:
@@ -57,3 +72,4 @@ def main() -> None:
     Exit codes: 0 all measured; 1 finished, but a specimen failed; 2 usage or configuration; 3 nothing could be
     measured; 130 interrupted, the same command resumes.
     """
+    one_thread()

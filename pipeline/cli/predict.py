@@ -79,6 +79,8 @@ def predict(
         )
     except ValueError as error:
         raise click.UsageError(f"{error}.") from error
+    except ArithmeticError as error:
+        raise click.UsageError(f"the numbers of {result} are none of a cable ({error}).") from error
     if prediction is None:
         click.echo(f"cablebend: {measured.specimen.id} holds no characteristic to predict with", err=True)
         ctx.exit(MISSING)

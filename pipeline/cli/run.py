@@ -76,6 +76,7 @@ def run(
 def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Path], list[InputError]]:
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
+    from pipeline.intake.access import is_folder
     from pipeline.intake.folder import find_specimens, find_undescribed, misnamed
 
     specimens: dict[Path, None] = {}
@@ -86,7 +87,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
         except InputError as error:
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
-    for folder in find_undescribed((folder for folder in folders if folder.is_dir()), settings):
+    for folder in find_undescribed((folder for folder in folders if is_folder(folder)), settings):
         other = misnamed(folder)
         if other is not None and folder in folders:
             continue  # said above
@@ -108,7 +109,7 @@ def exit_code(tally: Tally, refused: int = 0) -> int:
         return 130
     if tally.measured == 0:
         return 3
-    return 1 if tally.failed or refused or tally.trouble else 0
+    return 1 if tally.failed or tally.unusable or refused or tally.trouble else 0
 
 
 def stored_entries(store: Store, tally: Tally) -> Iterator[dict[str, Any]]:
@@ -124,10 +125,16 @@ def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> Non
     keys = ("name", "id", "folder", "status", "headline", "code")
     click.echo('{"specimens": [', nl=False)
     for number, entry in enumerate(entries):
-        shown = {key: entry[key] for key in keys}
+        shown = {key: entry.get(key) for key in keys} | {"usable": entry.get("state") in ("measured", "partial")}
         click.echo(("" if number == 0 else ",") + "\n " + json.dumps(shown), nl=False)
     counts = {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused}
-    rest = {"counts": counts, "interrupted": tally.interrupted, "out": str(out), "trouble": list(tally.trouble)}
+    rest = {
+        "counts": counts,
+        "unusable": tally.unusable,
+        "interrupted": tally.interrupted,
+        "out": str(out),
+        "trouble": list(tally.trouble),
+    }
     click.echo("],\n " + json.dumps(rest)[1:])
 
 
@@ -135,8 +142,11 @@ def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> No
     """One line a specimen, then the counts and where to look."""
     width = min(30, max((len(name) for name in tally.names), default=0))
     for entry in entries:
-        click.echo(f"{entry['name']:<{width}}  {entry['status']:<8}  {entry['headline']}")
+        state = {"unusable": "not usable"}.get(entry.get("state", ""), entry["status"])
+        click.echo(f"{entry['name']:<{width}}  {state:<8}  {entry['headline']}")
     kept = f" ({tally.reused} kept from an earlier run)" if tally.reused else ""
-    click.echo(f"{tally.measured} of {tally.total} measured{kept}, {tally.failed} failed: {out / 'index.html'}")
+    unusable = f", {tally.unusable} of them not usable" if tally.unusable else ""
+    counts = f"{tally.measured} of {tally.total} measured{kept}{unusable}, {tally.failed} failed"
+    click.echo(f"{counts}: {out / 'index.html'}")
     if tally.interrupted:
         click.echo("interrupted; the same command resumes", err=True)

@@ -16,6 +16,8 @@ from pathlib import Path
 from pipeline.errors import InputError
 
 CHUNK_BYTES = 1 << 20
+LONGEST_PATH = 1000
+"""Characters of a path written in a file; each folder in it is looked up, and no system opens one of a few thousand."""
 
 
 def inside(folder: Path, name: str, *, allow_outside: bool) -> Path | None:
@@ -30,13 +32,21 @@ def inside(folder: Path, name: str, *, allow_outside: bool) -> Path | None:
     allow_outside : bool
         Give the path even if it leads out.
     """
-    if "\0" in name:
+    if "\0" in name or len(name) > LONGEST_PATH:
         return None
     path = folder / name.replace("\\", "/")
     if allow_outside:
         return path
     border, target = os.path.realpath(folder), os.path.realpath(path)
     return path if target == border or target.startswith(border.rstrip(os.sep) + os.sep) else None
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder; one that cannot be looked at is none."""
+    try:
+        return path.is_dir()
+    except OSError:  # a name of more than 255 bytes, a folder above that is locked
+        return False
 
 
 def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:

@@ -51,8 +51,9 @@ TEMPERATURES = ("°c", "degc", "c", "k", "°f", "grad c", "deg c")
 SYMBOL = re.compile(r"(?P<base>.*\S)\s+(?:[A-Za-z][A-Za-z]?|[A-Za-z]_\w|[Ii]st|[Aa]ctual)")
 COMPONENT = re.compile(r"f[ _]?[xyz]", re.IGNORECASE)  # of a force, where a cell measures several
 UNIT_IN_NAME = re.compile(
-    r"(?P<base>.*?\S)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|(?:/|\bin\b)\s*(?P<behind>[^\s/]+))\s*"
-)
+    r"(?P<base>.*?\S)\s*(?:\[(?P<square>[^\]]{0,40})\]|\((?P<round>[^)]{0,40})\)|"
+    r"(?:/|\bin\b)\s{0,40}(?P<behind>[^\s/]{1,40}))\s*"
+)  # without a bound on what a unit can be, a cell of brackets takes the square of its length
 UNIT_AS_SUFFIX = re.compile(r"(?P<base>.*\S)[_\s](?P<unit>[^_\s]+)")
 NO_UNIT = ("", "-", "1", "--")
 

@@ -15,10 +15,15 @@ from pathlib import Path
 from typing import Literal
 
 from pipeline.errors import InputError
+from pipeline.intake.tomltable import shown
 
 Decimal = Literal[".", ","]
 Row = tuple[int, list[str]]  # line number from 1, cells
 
+MOST_COLUMNS = 1000
+"""In a line; what stands behind them is left as one cell."""
+HEAD_CHARACTERS = 1_000_000
+"""Of a log that are searched for its header, at most: a table of a thousand columns has a line of 20,000."""
 SEPARATORS = ("\t", ";", ",")
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 OTHER_FILES = {
@@ -36,6 +41,7 @@ CLOCK_WITH_COMMA = re.compile(r"\d:\d\d,\d+$", re.ASCII)
 INFINITE = ("inf", "-inf", "+inf", "infinity")
 SHEET_ERRORS = ("#wert!", "#value!", "#div/0!", "#zahl!", "#num!", "#bezug!", "#ref!", "#name?", "#nv", "#n/a")
 MISSING = frozenset(("", "-", "--", "---", "nan", "na", "n/a", "null", "none", *INFINITE, *SHEET_ERRORS))
+DIGITS = frozenset("0123456789")
 # Digit grouping by space or apostrophe, and the typographic minus sign
 _SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
 
@@ -104,15 +110,17 @@ def cells(text: str, separator: str, *, most: int | None = None) -> list[Row]:
     Line by line, so that a stray quotation mark cannot swallow the rest of the file.
     """
     rows: list[Row] = []
+    if most is not None:
+        text = text[:HEAD_CHARACTERS]
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip(" \t;,"):
             continue
         if len(rows) == most:
             break
         if '"' in line and len(line) < csv.field_size_limit():
-            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])[: MOST_COLUMNS + 1]
         else:
-            parts = line.split(separator)
+            parts = line.split(separator, MOST_COLUMNS)
         rows.append((number, [part.strip() for part in parts]))
     return rows
 
@@ -125,7 +133,7 @@ def smooth(cell: str) -> str:
 
 def is_missing(cell: str) -> bool:
     """True for the ways in which programs write "no value", infinity included."""
-    return cell.casefold() in MISSING
+    return not cell or (cell[-1] not in DIGITS and cell.casefold() in MISSING)
 
 
 def decimal_sign(
@@ -155,10 +163,10 @@ def decimal_sign(
     """
     if decimal is not None:
         return decimal
-    written = [smooth(token) for token in tokens if not is_missing(token)]
-    marked = [token for token in written if "." in token or "," in token]
+    marked = [token for token in tokens if ("." in token or "," in token) and not is_missing(token)]
     if not marked or (separator == "," and not any("," in token for token in marked)):
         return "."
+    marked = [smooth(token) for token in marked]
     point = [token for token in marked if not _fits(POINT, token)]
     comma = [token for token in marked if not _fits(COMMA, token)]
     if bool(point) != bool(comma):
@@ -221,6 +229,8 @@ def to_number(cell: str, decimal: Decimal) -> float | None:
 
 def decimals(cell: str, decimal: Decimal) -> int:
     """Digits behind the decimal sign: the resolution of the log."""
+    if PLAIN[decimal].fullmatch(cell):
+        return len(cell.partition(decimal)[2])
     mantissa = EXPONENT.split(smooth(cell), maxsplit=1)
     shift = int(mantissa[1]) if len(mantissa) > 1 else 0
     return len(mantissa[0].partition(decimal)[2].strip()) - shift
@@ -228,5 +238,5 @@ def decimals(cell: str, decimal: Decimal) -> int:
 
 def column_names(rows: Sequence[Row]) -> str:
     """The cells of a row for a message: at most ten, in quotes."""
-    names = [repr(cell) for cell in rows[0][1] if cell][:10] if rows else []
+    names = [shown(cell) for cell in rows[0][1] if cell][:10] if rows else []
     return ", ".join(names) or "nothing"

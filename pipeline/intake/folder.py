@@ -8,14 +8,15 @@ finding and the rest of the specimen is read.
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.intake.access import inside, outside, sha256
+from pipeline.intake.access import inside, is_folder, outside, sha256, unreadable
 from pipeline.intake.forcelog import read_force_log
 from pipeline.intake.noted import inferred
-from pipeline.intake.photos import NO_PHOTO, list_photos, match_photos, natural_key
+from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key
 from pipeline.intake.plausibility import size_findings
 from pipeline.intake.specimenfile import NAME, SpecimenFile, read_specimen_file
 from pipeline.records import Finding, Specimen
@@ -28,20 +29,19 @@ LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
 def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Specimen folders among and below the given folders, in natural order and without doubles.
 
-    Links to folders are followed, but not in circles. A specimen folder is not searched further.
+    Links to folders are followed, but no folder is searched twice, and a specimen folder not further. A folder that
+    cannot be looked into is among them, so that reading it tells what is in the way.
 
     Raises
     ------
     InputError
-        ``folder/missing`` for a path that is no folder, ``folder/no-specimen`` if there is none in one of the paths.
+        ``folder/missing`` for a path that is no folder, ``file/unreadable`` for one that cannot be looked at,
+        ``folder/no-specimen`` if there is none in one of the paths.
     """
     found: dict[Path, None] = {}
     for path in paths:
-        if not path.is_dir():
-            raise InputError(
-                "is no folder", path=path, code="folder/missing", remedy="give a specimen folder or one above"
-            )
-        here = [folder for folder in _search(path, (), settings.search_depth) if os.path.lexists(folder / NAME)]
+        _check_folder(path)
+        here = [folder for folder, found in _search(path, set(), settings.search_depth) if found]
         if not here:
             other = misnamed(path)
             if other is not None:
@@ -54,6 +54,18 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
             )
         found.update(dict.fromkeys(here))
     return list(found)
+
+
+def _check_folder(path: Path) -> None:
+    """Refuse what is no folder, or cannot be looked at."""
+    try:
+        there = stat.S_ISDIR(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        there = False
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if not there:
+        raise InputError("is no folder", path=path, code="folder/missing", remedy="give a specimen folder or one above")
 
 
 def misnamed(folder: Path) -> InputError | None:
@@ -74,35 +86,58 @@ def misnamed(folder: Path) -> InputError | None:
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Folders that hold photos and a table but no ``specimen.toml``: specimens somebody forgot to describe."""
-    searched = (folder for path in paths for folder in _search(path, (), settings.search_depth))
+    searched = (step for path in paths for step in _search(path, set(), settings.search_depth))
     return [
-        folder
-        for folder in dict.fromkeys(searched)
-        if not os.path.lexists(folder / NAME)
-        and candidate_logs(folder)
-        and list_photos(folder, without=None, settings=settings)
+        folder for folder in dict.fromkeys(f for f, found in searched if not found) if _looks_like_one(folder, settings)
     ]
 
 
-def _search(folder: Path, above: tuple[tuple[int, int], ...], depth: int) -> Iterator[Path]:
-    """All folders on the way down to specimens, and these, which are not searched further.
+def _looks_like_one(folder: Path, settings: IntakeSettings) -> bool:
+    """Whether a folder holds photos and a table."""
+    try:
+        return bool(candidate_logs(folder) and list_photos(folder, without=None, settings=settings))
+    except InputError:  # more photos than are read
+        return True
+    except OSError:
+        return False
 
-    ``above`` are the identities of the folders above, to notice a circle of links.
+
+def _search(folder: Path, seen: set[tuple[int, int]], depth: int) -> Iterator[tuple[Path, bool]]:
+    """Folders on the way down, and whether each is a specimen, which is not searched further.
+
+    A folder that cannot be looked into may be one: reading it says what is in the way. ``seen`` are the identities of
+    the folders searched before: many ways lead through links, and all but the first are passed over.
     """
-    yield folder
-    if os.path.lexists(folder / NAME):
-        return
     try:
         status = folder.stat()
-        entries = sorted((entry.name for entry in folder.iterdir() if entry.is_dir()), key=natural_key)
+        identity = (status.st_dev, status.st_ino)
+        described = _is_there(folder / NAME)
+        below = [] if described or identity in seen else _folders_in(folder)
     except OSError:
+        yield folder, True
         return
-    identity = (status.st_dev, status.st_ino)
-    if identity in above or depth == 0:
-        return
-    for name in entries:
-        if not name.startswith("."):
-            yield from _search(folder / name, (*above, identity), depth - 1)
+    if described or identity not in seen:
+        yield folder, described
+    if not described and depth > 0:
+        seen.add(identity)
+        for name in below:
+            yield from _search(folder / name, seen, depth - 1)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a name stands in a folder, whatever it is; OSError if the folder does not let one see."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _folders_in(folder: Path) -> list[str]:
+    """Names of the folders in a folder, hidden ones left out, in natural order; OSError if it cannot be listed."""
+    with os.scandir(folder) as entries:
+        names = [entry.name for entry in entries if not entry.name.startswith(".") and is_folder(folder / entry.name)]
+    return sorted(names, key=natural_key)
 
 
 def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
@@ -122,8 +157,16 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     Raises
     ------
     InputError
-        If a file cannot be used; photos never raise as long as one is left.
+        If a file cannot be used, whatever the operating system has against it; photos never raise as long as one is
+        left.
     """
+    try:
+        return _specimen(folder, settings)
+    except OSError as error:
+        raise unreadable(folder if error.filename is None else Path(os.fsdecode(error.filename)), error) from error
+
+
+def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     file = read_specimen_file(folder, settings)
     log_path, noted = _log_path(folder, file, settings)
     log = read_force_log(log_path, file.log, settings)
@@ -132,7 +175,7 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     )
     scale = file.camera.scale_px_per_m
     sizes = size_findings(file.length_m, file.diameter_m, photos.steps, scale_px_per_m=scale, settings=settings)
-    calibration = _calibration_hashes(folder, file, settings)
+    calibration, doubts = _calibration_photos(folder, file, settings)
     names = {NAME: folder / NAME, log_path.relative_to(folder).as_posix(): log_path}
     return Specimen(
         id=file.id,
@@ -144,7 +187,7 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
         steps=photos.steps,
         images=photos.paths,
         description=file.description,
-        findings=(*noted, *log.findings, *photos.findings, *sizes),
+        findings=(*noted, *log.findings, *photos.findings, *doubts, *sizes),
         hashes={name: sha256(path) for name, path in names.items()} | photos.hashes | calibration,
     )
 
@@ -196,17 +239,19 @@ def candidate_logs(folder: Path) -> list[str]:
     return sorted((name for name in names if not NO_PHOTO.search(name)), key=natural_key)
 
 
-def _calibration_hashes(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> dict[str, str]:
-    """Hashes of the calibration photos.
+def _calibration_photos(
+    folder: Path, file: SpecimenFile, settings: IntakeSettings
+) -> tuple[dict[str, str], list[Finding]]:
+    """Hashes of the calibration photos, and what is wrong with some of them.
 
     Raises
     ------
     InputError
-        ``camera/no-calibration-photos``.
+        ``camera/no-calibration-photos``, ``file/outside``.
     """
     place = file.camera.calibration
     if place is None:
-        return {}
+        return {}, []
     names = list_photos(place, without=None, settings=settings)
     if not names:
         raise file.source.error(
@@ -216,10 +261,14 @@ def _calibration_hashes(folder: Path, file: SpecimenFile, settings: IntakeSettin
             code="camera/no-calibration-photos",
             remedy="put photos of the board into it, or give scale_px_per_mm instead",
         )
-    hashes = {}
+    hashes: dict[str, str] = {}
+    findings: list[Finding] = []
     for name in names:
-        path = inside(folder, os.path.relpath(place / name, folder), allow_outside=settings.allow_outside)
-        if path is None:
+        within = os.path.relpath(place / name, folder)
+        if inside(folder, within, allow_outside=settings.allow_outside) is None:
             raise outside(place / name, name)
-        hashes[f"{place.name}/{name}"] = sha256(path)
-    return hashes
+        path, digest, trouble = checked_photo(folder, within, settings)
+        findings += trouble
+        if path is not None:
+            hashes[f"{place.name}/{name}"] = digest
+    return hashes, findings

@@ -31,6 +31,8 @@ SPREAD = 8.0
 """Standard deviations of the scatter that the samples of a hold may lie apart: 1,000 of them do so by 6.5."""
 
 
+WILD_ROUNDS = 10
+"""Times that wild forces are left out; without them the largest hold may have a smaller median, and show more."""
 SAME = 4.0
 """Standard deviations of a place: two holds further apart are at two places."""
 
@@ -57,22 +59,18 @@ def load_steps(
     Raises
     ------
     InputError
-        ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters.
+        ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
+        ``log/too-many-steps``.
     """
     name = path.name
-    travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
-    mounted = _mounted(samples, settings.same_displacement_relative * travel, settings)
-    displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
-    displacements, turned = signed_displacements(displacements, name)
-    tolerance = settings.same_displacement_relative * travel
-    runs, grouped = _runs(samples, displacements, tolerance, name=name, settings=settings)
-    _check_swapped(samples, runs, path)
-    wild = _wild(samples.forces, runs, settings)
-    if wild:
-        steps, findings = load_steps(samples.without(wild), spec, path=path, settings=settings)
+    displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
+    left_out: list[Finding] = []
+    while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs, settings)):
         line, force = samples.lines[wild[0]], quantity(float(samples.forces[wild[0]]), "N")
         message = f"{len(wild)} forces are off by more than the largest of all holds and were left out"
-        return steps, (doubtful("log/wild-force", f"{name}: {message} (first: line {line}, {force})"), *findings)
+        left_out.append(doubtful("log/wild-force", f"{name}: {message} (first: line {line}, {force})"))
+        samples = samples.without(wild)
+        displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
     places = hold_places(
         [displacements[run.rows] for run in runs], [_at_photo(samples, run) for run in runs], settings=settings
     )
@@ -92,8 +90,7 @@ def load_steps(
     within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
     order = order_findings(steps, same, name=name)
     return steps, (
-        *moved,
-        *turned,
+        *left_out,
         *grouped,
         *signed,
         *directed,
@@ -102,6 +99,22 @@ def load_steps(
         *within,
         *order,
     )
+
+
+def _grouped(
+    samples: Samples, path: Path, settings: IntakeSettings
+) -> tuple[Array, float, list[Run], tuple[Finding, ...]]:
+    """Signed displacements (n,) m, how close to each other they are one place (m), the holds, and what was inferred."""
+    name = path.name
+    travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
+    tolerance = settings.same_displacement_relative * travel
+    mounted = _mounted(samples, tolerance, settings)
+    displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
+    displacements, turned = signed_displacements(displacements, name)
+    runs, found = _runs(samples, displacements, tolerance, name=name, settings=settings)
+    _check_count(runs, path, settings)
+    _check_swapped(samples, runs, path)
+    return displacements, tolerance, runs, (*moved, *turned, *found)
 
 
 def _steps(
@@ -198,10 +211,11 @@ def _numbered(
         return [Run(*pair, number) for pair, number in zip(pairs, known, strict=True)], []
     message = f"{name}: the step numbers are not unique numbers; the steps were numbered in their order"
     noted = [inferred("log/steps-renumbered", message)]
-    for place, number in enumerate(numbers):
-        if number is None or number not in numbers[:place]:
+    begun: dict[int, int] = {}
+    for again, number in zip(starts, numbers, strict=True):
+        if number is None or begun.setdefault(number, again) == again:
             continue
-        first, again = starts[numbers.index(number)], starts[place]
+        first = begun[number]
         if abs(displacements[again] - displacements[first]) > tolerance:
             lines = f"lines {samples.lines[first]} and {samples.lines[again]}"
             places = f"{displacements[first] * 1e3:.4g} and {displacements[again] * 1e3:.4g} mm"
@@ -234,8 +248,22 @@ def _photo_time(samples: Samples, run: Run) -> float | None:
 def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
     """Forces of a run over time, or over the number of the sample where the log has no time."""
     rows = _rows_with_photo(samples, run)
-    times = np.arange(len(forces), dtype=np.float64) if samples.times is None else samples.times
-    return Hold(times[run.rows], forces[run.rows], photo_time=float(np.mean(times[rows])) if rows else None)
+    if samples.times is None:
+        times, photo = np.arange(run.first, run.last, dtype=np.float64), np.array(rows, dtype=np.float64)
+    else:
+        times, photo = samples.times[run.rows], samples.times[rows]
+    return Hold(times, forces[run.rows], photo_time=float(np.mean(photo)) if rows else None)
+
+
+def _check_count(runs: Sequence[Run], path: Path, settings: IntakeSettings) -> None:
+    """Refuse a log of more steps than anybody holds: a ramp without holds, or a step column that counts the rows."""
+    if len(runs) > settings.steps_max:
+        raise InputError(
+            f"holds {len(runs)} steps, the limit is {settings.steps_max}",
+            path=path,
+            code="log/too-many-steps",
+            remedy="give all rows of one hold the same number in the column step, or raise intake.steps_max",
+        )
 
 
 def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:

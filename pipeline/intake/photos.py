@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from pipeline.errors import InputError
 from pipeline.intake.access import check_file, inside, read_begin, sha256
 from pipeline.intake.noted import doubtful, inferred
+from pipeline.intake.tomltable import shown
 from pipeline.records import Finding, LoadStep
 from pipeline.settings.intake import IntakeSettings
 
@@ -176,7 +177,7 @@ def match_photos(
             )
         if name is not None:
             used[name] = step.step
-            path, digest, trouble = _checked(folder, name, settings)
+            path, digest, trouble = checked_photo(folder, name, settings)
             findings += trouble
             if path is not None:
                 paths[name], hashes[name] = path, digest
@@ -260,7 +261,8 @@ def _present_name(
     place = f"{log_name}, line {step.line}"
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
-        return None, [doubtful("photo/outside", f"{place}: photo {written!r} leads out of the folder and was not read")]
+        told = f"{place}: photo {shown(written)} leads out of the folder and was not read"
+        return None, [doubtful("photo/outside", told)]
     beside = [other for other in present if PurePosixPath(other).name == name]
     if not _exists(path) and len(beside) == 1:
         return beside[0], []  # the name alone, as people write it: there is nothing else that it could mean
@@ -269,11 +271,11 @@ def _present_name(
     alike = [other for other in present if _loose(other) == _loose(name)]
     alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]
     if len(alike) == 1:
-        return alike[0], [inferred("photo/name", f"{place}: photo {written!r} was taken to be {alike[0]}")]
+        return alike[0], [inferred("photo/name", f"{place}: photo {shown(written)} was taken to be {alike[0]}")]
     return None, [
         doubtful(
             "photo/missing",
-            f"{place}: photo {written!r} of step {step.step} does not exist; the step keeps its force only",
+            f"{place}: photo {shown(written)} of step {step.step} does not exist; the step keeps its force only",
         )
     ]
 
@@ -291,7 +293,7 @@ def _loose(name: str, *, whole: bool = True) -> str:
     return path.name if whole or path.suffix not in SUFFIXES else path.stem
 
 
-def _checked(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | None, str, list[Finding]]:
+def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | None, str, list[Finding]]:
     """Path and hash of a photo; a file that cannot be read is a finding, and the rest of the specimen is measured."""
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:

@@ -137,7 +137,7 @@ def read_samples(
         steps=tuple(steps[row] for row in kept) if any(steps) else None,
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
-        resolution=columns.factor["force"] * 10.0 ** -max(decimals(force[row], decimal) for row in kept),
+        resolution=columns.factor["force"] * _last_digit(max(decimals(force[row], decimal) for row in kept)),
         findings=(*_losses(path.name, lines, force, carried, summary), *noted),
     )
     return samples, columns
@@ -148,16 +148,15 @@ def _without_summary(data: Sequence[Row], columns: Columns) -> tuple[Sequence[Ro
 
     Without a displacement where all rows above have one, or with the name of a mean where they have a number.
     """
-    labels = [_is_summary(cells, columns) for _, cells in data]
-    named = next((row for row in range(len(data)) if all(labels[row:])), len(data))
-    if 0 < named < len(data):
-        below, summary = _without_summary(data[:named], columns)
-        return below, [*summary, *data[named:]]
-    own = [not is_missing(_cell(cells, columns.index["displacement"])) for _, cells in data]
-    end = max((row + 1 for row, there in enumerate(own) if there), default=0)
+    end = len(data)
+    while end and _is_summary(data[end - 1][1], columns):
+        end -= 1
+    end = end or len(data)  # where all rows are called so, their cells are refused one by one
+    own = [not is_missing(_cell(cells, columns.index["displacement"])) for _, cells in data[:end]]
+    full = max((row + 1 for row, there in enumerate(own) if there), default=0)
     # a displacement that stands only in the first row of each hold is missing above, too
-    whole = all(own[:end]) and 2 * end > len(data)
-    return (data[:end], data[end:]) if whole else (data, [])
+    end = full if all(own[:full]) and 2 * full > end else end
+    return data[:end], data[end:]
 
 
 def _is_summary(cells: list[str], columns: Columns) -> bool:
@@ -181,6 +180,11 @@ def _losses(
         message = f"{name}: {carried} rows have no displacement; that of the row above was taken"
         findings.append(inferred("log/carried-down", message))
     return findings
+
+
+def _last_digit(places: int) -> float:
+    """Value of the last of so many decimals; a zero may be written with any power of ten."""
+    return float(10.0 ** -min(max(places, -300), 300))
 
 
 def _decimal(spec: LogSpec) -> Decimal | None:

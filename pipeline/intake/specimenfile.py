@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from pipeline.intake.access import inside, outside
+from pipeline.intake.access import inside, is_folder, outside
 from pipeline.intake.tomltable import (
     Check,
     TomlFile,
@@ -21,6 +21,7 @@ from pipeline.intake.tomltable import (
     number,
     number_in,
     one_of,
+    path_text,
     read_toml,
     text,
     whole,
@@ -109,7 +110,7 @@ def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
         },
         "camera": {
             "scale_px_per_mm": number_in(*settings.scale_range_px_per_mm, "(px/mm)"),
-            "calibration": text,
+            "calibration": path_text,
             "board": _board,
             "distance_mm": number_in(1.0, 1e6, "(mm)"),
         },
@@ -120,7 +121,7 @@ def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
             "force_sign": one_of("compression", "tension"),
         },
         "force_log": {
-            "file": text,
+            "file": path_text,
             "columns": _columns,
             "units": _units,
             "separator": one_of(";", ",", "\t"),
@@ -147,7 +148,7 @@ def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: In
         calibration = inside(folder, name, allow_outside=settings.allow_outside)
         if calibration is None:
             raise outside(source.path, name, lambda: source.line_of("camera", "calibration"))
-        if not calibration.is_dir():
+        if not is_folder(calibration):
             raise source.error(
                 f"the calibration folder {name!r} does not exist",
                 table="camera",

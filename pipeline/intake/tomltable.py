@@ -16,11 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import InputError
-from pipeline.intake.access import read_bytes
+from pipeline.intake.access import LONGEST_PATH, read_bytes
+from pipeline.intake.tomldepth import too_deep
 
 Check = Callable[[Any], Any]
 TWICE = re.compile("overwrite|twice|duplicate", re.IGNORECASE)  # in the words of the parser
-HEADER = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]")
+HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
+
+DEEPEST = 8
+"""Parts of a key, or brackets inside each other; specimens and settings have three."""
+LONGEST_SHOWN = 60
+"""Characters of a value or name in a message."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class TomlFile:
         start = re.compile(rf"^\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key is not None else None
         for number, line in enumerate(self.lines, 1):
             if header := HEADER.match(line):
-                current = header[1].strip("\"'")
+                current = header[1].strip().strip("\"'")
                 if start is None and current == table:
                     return number
             elif start is not None and current == table and start.match(line):
@@ -55,7 +61,8 @@ def read_toml(path: Path, *, limit: int) -> TomlFile:
     Raises
     ------
     InputError
-        ``file/...`` as in `read_bytes`, ``toml/encoding`` if it is not UTF-8, ``toml/syntax`` if it is not TOML.
+        ``file/...`` as in `read_bytes`, ``toml/encoding`` if it is not UTF-8, ``toml/syntax`` if it is no TOML or nests
+        deeper than ``DEEPEST``.
     """
     data = read_bytes(path, limit=limit, setting="toml_max_bytes")
     try:
@@ -67,9 +74,17 @@ def read_toml(path: Path, *, limit: int) -> TomlFile:
         ) from error
     text = text.replace("\r\n", "\n")
     lines = tuple(text.split("\n"))
+    if (deep := too_deep(text, DEEPEST)) is not None:
+        raise InputError(
+            f"nests keys or brackets deeper than {DEEPEST} levels",
+            path=path,
+            line=deep,
+            code="toml/syntax",
+            remedy="remove what is too much, three levels are all that is ever needed",
+        )
     try:
         tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # besides TOMLDecodeError: integers of 5000 digits, deep nesting
+    except ValueError as error:  # besides TOMLDecodeError: integers of 5000 digits
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else None
         shown = "" if number is None else f" ({lines[min(number, len(lines)) - 1].strip()[:60]!r})"
@@ -89,7 +104,7 @@ def check_names(file: TomlFile, names: Collection[str], known: Collection[str], 
         near = nearest(name, known)
         place = f"[{table}]" if table else "this file"
         raise InputError(
-            f"{'key' if table else 'table'} {name!r} is not known in {place}",
+            f"{'key' if table else 'table'} {shown(name)} is not known in {place}",
             path=file.path,
             line=file.line_of(table, name) or file.line_of(name),
             code="toml/unknown-key" if table else "toml/unknown-table",
@@ -99,7 +114,7 @@ def check_names(file: TomlFile, names: Collection[str], known: Collection[str], 
 
 def nearest(name: str, known: Collection[str]) -> str:
     """The known name most like a misspelt one; the order of ``known`` decides ties."""
-    plain = name.casefold()
+    plain = name[:LONGEST_SHOWN].casefold()  # comparing takes the product of both lengths
     return max(known, key=lambda candidate: difflib.SequenceMatcher(None, plain, candidate.casefold()).ratio())
 
 
@@ -126,15 +141,23 @@ def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> di
         try:
             result[key] = checks[key](value)
         except ValueError as refused:
-            shown = repr(value) if len(repr(value)) <= 60 else repr(value)[:57] + "..."
             raise file.error(
-                f"{key} = {shown} cannot be used",
+                f"{key} = {shown(value)} cannot be used",
                 table=table,
                 key=key,
                 code="toml/wrong-value",
                 remedy=f"give {refused}",
             ) from refused
     return result
+
+
+def shown(value: Any) -> str:
+    """A value of a file for a message, cut where it is long."""
+    try:
+        told = repr(value)
+    except ValueError:  # an integer of more digits than Python writes, given in hexadecimal
+        return "an endless number"
+    return told if len(told) <= LONGEST_SHOWN else f"{told[: LONGEST_SHOWN - 3]}..."
 
 
 # Checks: value -> value; a ValueError says what is wanted, as the object of "give ...".
@@ -187,9 +210,17 @@ def text(value: Any) -> str:
     return value.strip()
 
 
+def path_text(value: Any) -> str:
+    """A text that can name a file."""
+    name = text(value)
+    if len(name) > LONGEST_PATH:
+        raise ValueError(f"a path of at most {LONGEST_PATH} characters")
+    return name
+
+
 def free_text(value: Any) -> str:
     """Anything a person may write as a note: texts, numbers, dates."""
-    if isinstance(value, dict | list):
+    if isinstance(value, dict | list) or (isinstance(value, int) and abs(value) > 1e300):
         raise ValueError('a text in "double quotes"')
     return str(value)
 

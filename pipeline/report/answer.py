@@ -11,6 +11,7 @@ from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
+from pipeline.visited import answer as decision
 from pipeline.visited import best, leading, pre_curvature, trusted
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -52,7 +53,7 @@ def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
     diagnosis = result.diagnosis
     if result.status == "failed":
         verdict, tone = words("status_failed"), "bad"
-    elif leading(result.findings) is not None:
+    elif leading(result.findings) is not None or not decision(result).usable:
         verdict, tone = words("verdict_fault"), "bad"
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
@@ -104,6 +105,8 @@ def _sentence(result: Result, words: Words) -> str:
         if result.status == "failed" and reason:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
+    told = decision(result)
+    lead = "" if told.usable else f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
     unit = stiffness_unit(result, words)
     change = curve.tangent[-1] - curve.tangent[0]
     beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
@@ -116,7 +119,7 @@ def _sentence(result: Result, words: Words) -> str:
         high=words.curvature(curve.kappa[-1]),
     )
     rest = _together(words.measured(*pre_curvature(result, curve)))
-    return f"{text} {words('answer_pre_curvature', value=rest)}"
+    return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
 
 
 def _together(quantity: str) -> str:
@@ -168,6 +171,8 @@ def _advice(result: Result, words: Words) -> str:
     fault = leading(result.findings)
     if fault is not None:
         return words.said(fault.message).sentence
+    if not decision(result).usable:
+        return words.said(decision(result).reason).sentence
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

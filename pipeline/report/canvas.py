@@ -25,6 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 
+from pipeline.report.page import PALETTE
 from pipeline.report.ruling import FONT, Ruling, rule, text_width
 
 if TYPE_CHECKING:
@@ -33,19 +34,6 @@ if TYPE_CHECKING:
 # A figure of its own, or a part of a page.
 Area = Figure | SubFigure
 
-# role: (in light, in dark). The light colours differ in every role: they are how a role is found again in the SVG.
-PALETTE = {
-    "ink": ("#1c2127", "#e8eaed"),
-    "muted": ("#5b6570", "#a3adb8"),
-    "grid": ("#dfe3e8", "#343b44"),
-    "paper": ("#fffffe", "#15191e"),
-    "inverse": ("#0072b2", "#56b4e9"),
-    "balance": ("#d55e00", "#f0a13c"),
-    "extended": ("#009e73", "#2fd0a2"),
-    "measured": ("#1b2026", "#f2f4f6"),
-    "alarm": ("#b3261e", "#ff8a80"),
-    "unvisited": ("#8a949f", "#77818c"),
-}
 LIGHT = {role: colours[0] for role, colours in PALETTE.items()}
 DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": "-"}
 # cividis ends in a blue and a yellow that vanish on dark and white paper: these parts of it can be seen on either

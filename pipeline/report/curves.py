@@ -7,11 +7,35 @@ is the stiffness of the linear rod that changes its moment by as much over that 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.result import PhotoPart, Result
-from pipeline.visited import Visited
+if TYPE_CHECKING:
+    from pipeline.result import PhotoPart, Result
+
+Array = NDArray[np.float64]
+
+
+class TangentCurve(Protocol):
+    """A visited characteristic, as `pipeline.visited.Visited` and rows of the index have it."""
+
+    @property
+    def kappa(self) -> Array:
+        """(n,) 1/m, increasing."""
+
+    @property
+    def tangent(self) -> Array:
+        """(n,) N m^2."""
+
+    @property
+    def tangent_std(self) -> Array:
+        """(n,) N m^2."""
+
+    @property
+    def factor(self) -> Array:
+        """(n, r) N m^2."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +60,12 @@ class Equivalent:
     departure: float
 
 
-def equivalent(curve: Visited, bounds: tuple[float, float] | None = None) -> Equivalent | None:
+def equivalent(curve: TangentCurve, bounds: tuple[float, float] | None = None) -> Equivalent | None:
     """Equivalent constant stiffness over a range of curvature.
 
     Parameters
     ----------
-    curve : Visited
+    curve : TangentCurve
     bounds : (low, high) in 1/m, optional
         Cut to the visited range; the whole of it by default.
 

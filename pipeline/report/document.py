@@ -7,13 +7,8 @@ was wrong and what was done; evidence; what simulation programs need; data and p
 
 from __future__ import annotations
 
-import re
-from functools import cache
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 from pipeline.report.answer import answer
 from pipeline.report.canvas import page_colours
@@ -32,50 +27,14 @@ from pipeline.report.evidence import (
 )
 from pipeline.report.figures import force_unit, stiffness_unit
 from pipeline.report.files import write_atomic
+from pipeline.report.page import asset, environment, palette_css, unbroken
 from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
 from pipeline.visited import best
 
-TEMPLATES = Path(__file__).parent / "templates"
-
-
-BETWEEN = re.compile(r"(?<=\d) (?=%)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))")
-"""Spaces inside a quantity: a share, a p value, a product of units."""
-
-
-def unbroken(value: Any) -> Any:
-    """A text whose quantities no line break takes apart; markup and what is no text stay as they are."""
-    return BETWEEN.sub("\u00a0", value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-
-@cache
-def environment() -> Environment:
-    """Template engine of report and index: escapes everything, refuses names that do not exist."""
-    engine = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=unbroken,
-    )
-    engine.filters["svg"] = lambda drawn: Markup(drawn.svg)
-    return engine
-
-
-def palette_css() -> Markup:
-    """CSS variables of all colours: light, dark by the reader's system, and light again on paper."""
-    colours = page_colours()
-    light = "".join(f"--{name}:{pair[0]};" for name, pair in colours.items())
-    dark = "".join(f"--{name}:{pair[1]};" for name, pair in colours.items())
-    return Markup(f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}")
-
-
-def asset(name: str) -> Markup:
-    """Style sheet or script of this project, put into the page as it is."""
-    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
+__all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
 
 
 def report_html(result: Result, settings: ReportSettings | None = None) -> str:
@@ -127,7 +86,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             fit_rows=fit_rows(result, words),
             nuisance_rows=nuisance_rows(result, words),
             provenance=provenance_rows(result, words),
-            palette=palette_css(),
+            palette=palette_css(page_colours()),
             css=asset("page.css") + asset("report.css"),
             js=asset("page.js") + asset("report.js"),
         )

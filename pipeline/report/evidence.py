@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
+from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
@@ -68,7 +69,7 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
     """What the page needs to answer a pointer over the main figure: frame, values, bands, supporting photos."""
     if main is None:
         return {}
-    unit, half = figures.stiffness_unit(result, words), figures.band_width(settings)
+    unit, half = figures.stiffness_unit(result, words), band_width(settings)
     ways = [
         {
             "method": method,

@@ -7,13 +7,13 @@ positive), displacement in mm. Bands hold the share of normal errors named in th
 
 from __future__ import annotations
 
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
+from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart
@@ -26,11 +26,6 @@ MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 POINTWISE_HEADROOM = 2.0
 # A base model that lacks its cause wiggles; the answer must stay readable beside it.
 WANTING_HEADROOM = 1.8
-
-
-def band_width(settings: ReportSettings) -> float:
-    """Half width of a band in standard deviations."""
-    return NormalDist().inv_cdf(0.5 + settings.band_coverage / 2.0)
 
 
 def stiffness_unit(result: Result, words: Words) -> Unit:

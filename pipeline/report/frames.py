@@ -11,13 +11,16 @@ from pipeline.compare import Comparison
 from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
-from pipeline.visited import METHODS, best, pre_curvature
+from pipeline.visited import METHODS, answer, best, pre_curvature
 
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
 
 def characteristic_frame(result: Result) -> pd.DataFrame:
-    """Moment curve and both readings by every way, with standard deviations; ``supported`` marks the visited range."""
+    """Moment curve and both readings by every way, with standard deviations.
+
+    ``supported`` marks the visited range; ``answer`` is 1 on the rows of the one curve that is the result, else 0.
+    """
     whole: dict[str, Curve | None] = {
         "inverse": result.inverse.curve if result.inverse else None,
         "balance": result.balance.curve if result.balance else None,
@@ -33,14 +36,15 @@ def characteristic_frame(result: Result) -> pd.DataFrame:
         "moment_std_Nm",
         "secant_std_Nm2",
     ]
-    parts = []
+    parts, chosen = [], answer(result).method
     for method in METHODS:
         curve = whole[method]
         if curve is not None:
             part = pd.DataFrame({name: getattr(curve, name) for name in columns})
             part.insert(0, "method", method)
+            part.insert(1 + columns.index("supported") + 1, "answer", int(method == chosen))
             parts.append(part)
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", *columns])
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", *columns, "answer"])
 
 
 def centerlines_frame(result: Result) -> pd.DataFrame:

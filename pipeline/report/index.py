@@ -1,138 +1,42 @@
 """``index.html`` and ``summary.csv``: all specimens of a batch, also of one that is not finished.
 
-Results are read one by one and only a row of each is kept, so memory does not grow with photos: some kilobytes a
-specimen. The page holds everything it needs: search, filters, sorting, characteristics of selected specimens laid
-over each other, repeat specimens of a type pooled. A failed specimen is a row with its reason and a report that says
-what to do.
+A specimen is a row of a few thousand bytes (`row`), read from its ``entry.json``; from its result only where there is
+no entry, or where the result has changed since. The page holds everything it needs: search, filters and sorting over
+all rows, which are drawn as the reader scrolls to them; characteristics of selected specimens laid over each other;
+repeat specimens of a type pooled. A failed specimen is a row with its reason and a report that says what to do.
 """
 
 from __future__ import annotations
 
-import re
+import json
+import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
-
 from pipeline.intake.photos import natural_key
-from pipeline.report.document import asset, environment, palette_css, write_report
-from pipeline.report.figures import band_width
 from pipeline.report.files import write_atomic
-from pipeline.report.repeats import repeats
-from pipeline.report.tables import write_csv
+from pipeline.report.page import asset, band_width, environment, palette_css
+from pipeline.report.repeats import Repeats, repeats, without_outlying
+from pipeline.report.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
+from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
-from pipeline.result import FindingPart, Result, SpecimenPart, from_json
-from pipeline.settings import ReportSettings
+from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit, suited
-from pipeline.visited import Visited, best, pre_curvature
 
-SHAPE_POINTS = 14
-SHAPE_SIZE = (110.0, 40.0)
+if TYPE_CHECKING:
+    from pipeline.result import Result
 
+BLOCK = 100
+"""Rows that stand in the page as they are; all others are drawn as the reader scrolls to them, as many at a time."""
 
-@dataclass(frozen=True)
-class IndexRow:
-    """What the index keeps of a specimen; SI units."""
+COPIED_S = 1.0
+"""Of copies of a result and its entry either may be the later one by as much; a result changed by hand is later."""
 
-    id: str
-    report: str
-    type: str
-    status: str
-    verdict: str
-    curve: Visited | None
-    pre_curvature: tuple[float, float | None] | None
-    rms_relative: float | None
-    compatible: bool | None
-    photos_used: int
-    photos_given: int
-    warnings: int
-    errors: int
-    reason: str
-    shapes: str
-
-
-def index_row(result: Result, report: str, settings: ReportSettings) -> IndexRow:
-    """Row of one result; ``report`` is the path of its report relative to the index, empty if there is none."""
-    curve = best(result)
-    troubles = [f for f in result.findings if f.level == "error"] + [f for f in result.findings if f.level == "warning"]
-    return IndexRow(
-        id=result.specimen.id,
-        report=report,
-        type=result.specimen.description.get("type", ""),
-        status=result.status,
-        verdict=result.diagnosis.verdict if result.diagnosis else "none",
-        curve=_thinned(curve, settings.index_curve_points),
-        pre_curvature=pre_curvature(result, curve) if curve else None,
-        rms_relative=result.agreement.rms_relative if result.agreement else None,
-        compatible=result.agreement.compatible if result.agreement else None,
-        photos_used=sum(photo.status == "traced" for photo in result.photos),
-        photos_given=len(result.photos),
-        warnings=sum(f.level == "warning" for f in result.findings),
-        errors=sum(f.level == "error" for f in result.findings),
-        reason=troubles[0].message if troubles else "",
-        shapes=_shapes(result),
-    )
-
-
-def _thinned(curve: Visited | None, points: int) -> Visited | None:
-    """The same curve on fewer points."""
-    if curve is None or curve.kappa.size <= points:
-        return curve
-    grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
-
-    def onto(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.interp(grid, curve.kappa, values)
-
-    return Visited(
-        method=curve.method,
-        kappa=grid,
-        moment=onto(curve.moment),
-        moment_std=onto(curve.moment_std),
-        tangent=onto(curve.tangent),
-        tangent_std=onto(curve.tangent_std),
-        secant=onto(curve.secant),
-        secant_std=onto(curve.secant_std),
-        factor=np.column_stack([np.zeros((points, 0)), *map(onto, curve.factor.T)]),
-    )
-
-
-def _shapes(result: Result) -> str:
-    """SVG path of all measured shapes in the chord frame, to one scale, bow downwards."""
-    traced = [photo for photo in result.photos if len(photo.x_m) > 1]
-    width = max((max(photo.x_m) for photo in traced), default=0.0)
-    if width <= 0.0:
-        return ""
-    scale = (SHAPE_SIZE[0] - 4.0) / width
-    parts = []
-    for photo in traced:
-        chosen = np.linspace(0, len(photo.x_m) - 1, SHAPE_POINTS).round().astype(int)
-        parts.append("M" + "L".join(f"{2 + scale * photo.x_m[i]:.0f} {4 + scale * photo.y_m[i]:.1f}" for i in chosen))
-    return "".join(parts)
-
-
-def read_results(folder: Path) -> Iterator[tuple[Result, str]]:
-    """Results below a folder one by one, each with its folder relative to it; an unreadable one counts as failed."""
-    names = (path.parent.relative_to(folder).as_posix() for path in folder.glob("*/**/result.json"))
-    for name in sorted((name for name in names if not re.search(r"(^|/)\.", name)), key=natural_key):
-        path = folder / name / "result.json"
-        try:
-            yield from_json(path.read_text(encoding="utf-8")), name
-        except (ValueError, OSError) as error:
-            yield unreadable(path, name, error), name
-
-
-def unreadable(path: Path, name: str, error: Exception) -> Result:
-    """A failed result in the place of a ``result.json`` that cannot be read."""
-    reason = f"{path.name} of {name} cannot be read ({type(error).__name__}); run the specimen again."
-    return Result(
-        status="failed",
-        specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),
-        findings=[FindingPart(code="result/unreadable", level="error", message=reason)],
-    )
+HEAD, TAIL = 200, 40
+"""Bytes of a ``result.json`` that tell whether it is one, and whole."""
 
 
 def write_index(
@@ -143,7 +47,7 @@ def write_index(
     Parameters
     ----------
     results : iterable of Result, or Path
-        Results, each with its files in ``out/<id>``; or the folder to look for ``result.json`` in.
+        Results, each with its files in ``out/<id>``; or the folder to look for results in.
     out : Path
         Folder of the index.
     settings : ReportSettings, optional
@@ -154,10 +58,82 @@ def write_index(
         index.html, summary.csv.
     """
     settings, out = settings or ReportSettings(), Path(out)
-    pairs = read_results(Path(results)) if isinstance(results, str | Path) else ((r, r.specimen.id) for r in results)
-    rows = [index_row(result, _report(result, folder, out, settings), settings) for result, folder in pairs]
+    return write_rows(index_rows(results, out, settings), out, settings)
+
+
+def index_rows(results: Iterable[Result] | Path, out: Path, settings: ReportSettings) -> list[IndexRow]:
+    """Rows of all results, those that cannot be specimens of their type as not usable; parameters as `write_index`."""
+    if isinstance(results, str | Path):
+        rows = (_row_of(Path(results), name, out, settings) for name in result_folders(Path(results)))
+    else:
+        rows = (replace(index_row(r, settings), report=_report(r, r.specimen.id, out, settings)) for r in results)
+    return without_outlying(list(rows))
+
+
+def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tuple[Path, Path]:
+    """Write ``index.html`` and ``summary.csv`` of rows into a folder; both paths."""
     page = write_atomic(out / "index.html", index_html(rows, settings))
-    return page, write_csv(summary_frame(rows), out / "summary.csv")
+    return page, write_atomic(out / "summary.csv", summary_lines(rows))
+
+
+def result_folders(folder: Path) -> list[str]:
+    """Folders below a folder that hold a result, relative to it, in the order in which people count."""
+    found, open_ = [], [""]
+    while open_:
+        below = open_.pop()
+        try:
+            entries = list(os.scandir(folder / below))
+        except OSError:  # a folder that may not be read holds nothing for us
+            continue
+        if below and any(entry.name == "result.json" for entry in entries):
+            found.append(below)
+        inside = (e.name for e in entries if not e.name.startswith(".") and e.is_dir(follow_symlinks=bool(below == "")))
+        open_ += [f"{below}/{name}" if below else name for name in inside]
+    return sorted(found, key=natural_key)
+
+
+def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> IndexRow:
+    """Row of a stored result: as its entry has it, else from the result."""
+    place = folder / name
+    try:
+        with (place / "entry.json").open("rb") as file:
+            row, entered = from_entry(json.load(file).get("row")), os.fstat(file.fileno()).st_mtime
+        if row.status != "failed" and _as_entered(place / "result.json", entered):
+            report = f"{name}/report.html"
+            return replace(row, report=report if (out / report).exists() else "")
+    except (OSError, ValueError, AttributeError, RecursionError):
+        pass  # none, or not ours: the result itself tells
+    from pipeline.errors import InputError
+    from pipeline.result import read_result
+
+    try:
+        result = read_result(place)
+    except InputError as error:
+        result = unreadable(name, error.message)
+    return replace(index_row(result, settings), report=_report(result, name, out, settings))
+
+
+def _as_entered(path: Path, entered: float) -> bool:
+    """Whether a ``result.json`` is, by its time, its beginning and its end, the one an entry tells of."""
+    with path.open("rb") as file:
+        status = os.fstat(file.fileno())
+        head = file.read(HEAD)
+        file.seek(max(0, status.st_size - TAIL))
+        tail = file.read(TAIL)
+    whole = head.lstrip()[:1] == b"{" and b"cablebend/result/1" in head and tail.rstrip()[-1:] == b"}"
+    return whole and status.st_mtime <= entered + COPIED_S
+
+
+def unreadable(name: str, trouble: str) -> Result:
+    """A failed result in the place of a ``result.json`` that cannot be read."""
+    from pipeline.result import FindingPart, Result, SpecimenPart
+
+    reason = f"result.json of {name} cannot be read: it {trouble}; run the specimen again."
+    return Result(
+        status="failed",
+        specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),
+        findings=[FindingPart(code="result/unreadable", level="error", message=reason)],
+    )
 
 
 def _report(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
@@ -167,103 +143,128 @@ def _report(result: Result, folder: str, out: Path, settings: ReportSettings) ->
     """
     path = out / folder / "report.html"
     if result.status == "failed" and path.parent.is_dir() and not path.exists():
+        from pipeline.report.document import write_report  # matplotlib: for the few that need it
+
         write_report(result, path.parent, settings)
     return f"{folder}/report.html" if path.exists() else ""
 
 
-def summary_frame(rows: list[IndexRow]) -> pd.DataFrame:
-    """One row a specimen; SI units in the column names."""
-    table = []
-    for row in rows:
-        curve = row.curve
-        value, std = row.pre_curvature or (None, None)
-        ends = (
-            [None] * 6
-            if curve is None
-            else [v[i] for i in (0, -1) for v in (curve.kappa, curve.tangent, curve.tangent_std)]
-        )
-        counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
-        answers = (*ends, value, std, row.rms_relative, row.compatible)
-        table.append([row.id, row.type, row.status, row.verdict, *answers, *counts, row.reason, row.report])
-    names = ["id", "type", "status", "verdict"]
-    names += [f"{end}_{name}" for end in ("low", "high") for name in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2")]
-    names += ["pre_curvature_per_m", "pre_curvature_std_per_m", "agreement_rms_relative", "compatible"]
-    names += ["photos_used", "photos_given", "warnings", "errors", "reason", "report"]
-    return pd.DataFrame(table, columns=names)
-
-
-def index_html(rows: list[IndexRow], settings: ReportSettings) -> str:
-    """Text of ``index.html``."""
+def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
+    """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
     words = Words(settings.language)
-    usable = [(row.type, row.curve) for row in rows if row.type and row.curve]
-    unit = suited((v for row in rows if row.curve for v in row.curve.tangent), "N m²", decimal=words.decimal)
-    count = {status: sum(row.status == status for row in rows) for status in ("measured", "partial", "failed")}
-    return (
-        environment()
-        .get_template("index.html")
-        .render(
-            words=words,
-            rows=[_cells(row, unit, words) for row in rows],
-            unit=unit.symbol,
-            count=words("index_count", total=len(rows), **count),
-            verdicts=sorted({row.verdict for row in rows}),
-            types=sorted({row.type for row in rows if row.type}),
-            statuses=[status for status, number in count.items() if number],
-            pooled=repeats(usable, unit, words, settings),
-            data=_overlay_data(rows, unit, words, settings),
-            size=SHAPE_SIZE,
-            palette=palette_css(),
-            css=asset("page.css") + asset("index.css"),
-            js=asset("page.js") + asset("index.js"),
-        )
-    )
+    curves = (row.curve for row in rows if row.curve and row.usable)
+    unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
+    count = {status: sum(row.status == status for row in rows) for status in STATUSES}
+    unusable = sum(row.state == "unusable" for row in rows)
+    pooled = list(repeats(rows, unit, words, settings))
+    shown = {row.state for row in rows}
+    page = environment().get_template("index.html").render(
+        words=words,
+        rows=[_cells(row, unit, words) for row in rows[:BLOCK]],
+        unit=unit.symbol,
+        count=words("index_count", total=len(rows), **count),
+        unusable=words("index_unusable", count=unusable) if unusable else "",
+        verdicts=sorted({_verdict(row) for row in rows}),
+        types=sorted({row.type for row in rows if row.type}),
+        statuses=[state for state in (*STATUSES, "unusable") if state in shown],
+        pooled=pooled,
+        data=DATA,
+        size=SHAPE_SIZE,
+        palette=palette_css(),
+        css=asset("page.css") + asset("index.css"),
+        js=asset("page.js") + asset("index.js"),
+    )  # fmt: skip
+    before, _, after = page.rpartition(DATA)  # a name may hold anything, and names stand before
+    yield before
+    yield from _data(rows, pooled, unit, words, settings)
+    yield after
 
 
-def _cells(row: IndexRow, unit: Unit, words: Words) -> dict[str, object]:
-    """Texts of a row and the numbers it is sorted by."""
-    curve = row.curve
-    ends = (
-        [(None, None), (None, None)] if curve is None else [(curve.tangent[i], curve.tangent_std[i]) for i in (0, -1)]
-    )
+DATA = "\N{OBJECT REPLACEMENT CHARACTER}data\N{OBJECT REPLACEMENT CHARACTER}"
+"""Stands in the page where the data go."""
+
+
+def _verdict(row: IndexRow) -> str:
+    return "fault" if row.state == "unusable" else row.verdict
+
+
+def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
+    """Texts of a row and the numbers it is sorted by, as the script of the page has them.
+
+    Name, report, type, state, verdict, four pairs of number and text, photos used and their text, troubles, the worst
+    of them and its language if it is another one, shapes.
+    """
+    ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
     rms = None if row.rms_relative is None else 100.0 * row.rms_relative
-    return {
-        "id": row.id,
-        "href": quote(row.report),
-        "type": row.type,
-        "status": row.status,
-        "verdict": row.verdict,
-        "low": (ends[0][0], unit.number(*ends[0])),
-        "high": (ends[1][0], unit.number(*ends[1])),
-        "k0": (row.pre_curvature[0], words.measured(*row.pre_curvature)) if row.pre_curvature else (None, "–"),
-        "rms": (rms, "–" if rms is None else words.number(rms, 2)),
-        "compatible": row.compatible,
-        "photos": f"{row.photos_used} / {row.photos_given}",
-        "photos_used": row.photos_used,
-        "troubles": row.warnings + row.errors,
-        "reason": words.said(row.reason),
-        "shapes": row.shapes,
-    }
+    said = words.said(row.fault or row.reason)
+    state, verdict = row.state, _verdict(row)
+    numbers: list[tuple[float | None, str]] = [(value, unit.number(value, std)) for value, std in ends]
+    numbers.append((row.pre_curvature[0], words.measured(*row.pre_curvature)) if row.pre_curvature else (None, "–"))
+    numbers.append((rms, "–" if rms is None else words.number(rms, 2)))
+    return [
+        *(row.id, quote(row.report), row.type, state, verdict),
+        *(part for number in numbers for part in number),
+        *(row.photos_used, f"{row.photos_used} / {row.photos_given}", row.warnings + row.errors),
+        *(said.sentence if said.text else "", "" if said.language == words.language else said.language, row.shapes),
+    ]
 
 
-def _overlay_data(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSettings) -> dict[str, object]:
-    """Curves of all rows for the overlay, to four digits."""
-
-    def short(values: np.ndarray) -> list[float]:
-        return [float(f"{v:.4g}") for v in values]
-
-    return {
+def _data(
+    rows: list[IndexRow], pooled: list[Repeats], unit: Unit, words: Words, settings: ReportSettings
+) -> Iterator[str]:
+    """The data of the page as JSON: first what belongs to all rows, then curves and cells of every row."""
+    whole = {
         "axes": [words("axis_kappa"), words("axis_stiffness", unit=unit.symbol)],
         "decimal": words.decimal,
         "half": band_width(settings),
-        "shown": words("index_shown", shown="{shown}", total="{total}"),
-        "rows": [
-            None
-            if row.curve is None
-            else [
-                short(row.curve.kappa),
-                short(unit.factor * row.curve.tangent),
-                short(unit.factor * row.curve.tangent_std),
-            ]
-            for row in rows
-        ],
+        "block": BLOCK,
+        "typed": any(row.type for row in rows),
+        "size": SHAPE_SIZE,
+        "words": {name: words(f"index_{name}") for name in ("shown", "select")}
+        | {name: words(name) for name in ("shape_alt", "pooled_single", "pooled_mean", "pooled_scatter")},
+        "states": {state: words(f"status_{state}") for state in (*STATUSES, "unusable")},
+        "verdicts": {verdict: "–" if verdict == "none" else words(f"verdict_{verdict}") for verdict in _said(rows)},
+        "pooled": [_figure(entry, unit) for entry in pooled if entry.alt],
     }
+    yield _json(whole)[:-1] + ',"rows":['
+    yield from _separated(_curve(row, unit) for row in rows)
+    yield '],"cells":['
+    yield from _separated(_json(_cells(row, unit, words)) for row in rows)
+    yield "]}"
+
+
+def _said(rows: list[IndexRow]) -> list[str]:
+    return sorted({_verdict(row) for row in rows})
+
+
+def _separated(pieces: Iterable[str]) -> Iterator[str]:
+    for number, piece in enumerate(pieces):
+        yield f",{piece}" if number else piece
+
+
+def _json(value: Any) -> str:
+    """JSON that neither ends a script nor is taken for a tag."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for sign in "<>&'\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
+
+
+def _curve(row: IndexRow, unit: Unit) -> str:
+    """Curvatures, f_EI in the unit of the page, and its standard deviation, to four digits."""
+    if row.curve is None:
+        return "null"
+    parts = (row.curve.kappa, unit.factor * row.curve.tangent, unit.factor * row.curve.tangent_std)
+    return "[" + ",".join(_list(part) for part in parts) + "]"
+
+
+def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
+    """The mean of a type for its figure."""
+    mean = entry.pooled
+    parts = {"mean": mean.mean, "std": mean.std, "scatter": mean.scatter}
+    scaled = {name: [float(f"{unit.factor * value:.4g}") for value in values] for name, values in parts.items()}
+    return {"alt": entry.alt, "members": entry.members, "kappa": [float(f"{k:.4g}") for k in mean.kappa], **scaled}
+
+
+def _list(values: Iterable[float]) -> str:
+    return f"[{','.join(f'{value:.4g}' for value in values)}]"

@@ -21,9 +21,9 @@ from matplotlib.axes import Axes
 
 from pipeline.diagnosis.rediscovery import Discovery, papers_test, rediscover
 from pipeline.diagnosis.words import spoken
-from pipeline.report.canvas import Area, Drawing, drawing
-from pipeline.report.document import asset, environment, palette_css
+from pipeline.report.canvas import Area, Drawing, drawing, page_colours
 from pipeline.report.files import write_atomic
+from pipeline.report.page import asset, environment, palette_css
 from pipeline.report.paper_figures import draw_difference, draw_evolution, draw_responses, draw_shapes, draw_straight
 from pipeline.rounding import fixed, plain
 from rod.bending_test import TABLE_1, TABLE_1_ORDINATES
@@ -103,7 +103,9 @@ def write_paper(folder: Path) -> Paper:
         write_atomic(folder / f"{figure.name}.svg", standalone(figure))
     write_atomic(folder / "paper.json", json.dumps(numbers(paper), indent=1) + "\n")
     page = environment().get_template("paper.html")
-    text = page.render(palette=palette_css(), css=asset("page.css"), statements=statements(paper), figures=figures)
+    text = page.render(
+        palette=palette_css(page_colours()), css=asset("page.css"), statements=statements(paper), figures=figures
+    )
     write_atomic(folder / "paper.html", text)
     return paper
 
@@ -279,7 +281,7 @@ def standalone(figure: Drawing) -> str:
     head, rest = figure.svg.split(">", 1)
     if "xmlns" not in head:
         head += ' xmlns="http://www.w3.org/2000/svg"'
-    return f"{head}><style>{palette_css()}</style>{rest}\n"
+    return f"{head}><style>{palette_css(page_colours())}</style>{rest}\n"
 
 
 def _row(experiment: TableOne) -> dict[str, list[float]]:

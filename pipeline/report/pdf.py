@@ -23,9 +23,10 @@ from pipeline.report import figures, maps, ranking
 from pipeline.report.answer import answer
 from pipeline.report.canvas import LIGHT, Area, style
 from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
-from pipeline.report.document import simulation_texts, unbroken
+from pipeline.report.document import simulation_texts
 from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
+from pipeline.report.page import unbroken
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
 from pipeline.report.ruling import FONT
 from pipeline.report.words import Words

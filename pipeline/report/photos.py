@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
-from pipeline.report.figures import band_width
+from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart

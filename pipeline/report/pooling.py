@@ -8,14 +8,14 @@ point.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
-from pipeline.report.curves import Equivalent, equivalent
-from pipeline.visited import Visited
+from pipeline.report.curves import Equivalent, TangentCurve, equivalent
 
 Array = NDArray[np.float64]
 POINTS = 41
@@ -50,7 +50,7 @@ class Pooled:
     p_value: float
 
 
-def pool(specimens: list[Visited]) -> Pooled | None:
+def pool(specimens: Sequence[TangentCurve]) -> Pooled | None:
     """Pool the characteristics of repeat specimens.
 
     Returns
@@ -81,7 +81,7 @@ def pool(specimens: list[Visited]) -> Pooled | None:
         stiffness_std=float(std[0]),
         scatter_relative=float(tau[0] / abs(mean[0])),
         error_relative=float(np.sqrt(np.mean(own**2)) / abs(mean[0])),
-        p_value=float(chi2.sf(q[0], len(known) - 1)),
+        p_value=float(chdtrc(len(known) - 1, q[0])),
     )
 
 
@@ -107,3 +107,20 @@ def random_effects(values: Array, stds: Array) -> tuple[Array, Array, Array, Arr
     both = 1.0 / (stds**2 + tau2)
     mean = (both * values).sum(axis=0) / both.sum(axis=0)
     return mean, 1.0 / np.sqrt(both.sum(axis=0)), np.sqrt(tau2), q
+
+
+THIRTYFOLD = 30.0
+"""Repeat specimens differ by less, and wrong units of force by more: a prefix is a thousandfold."""
+
+
+def outlying(stiffness: Array) -> NDArray[np.bool_]:
+    """Which of repeat specimens (n,) have a stiffness that most of the others leave a factor of thirty away.
+
+    A specimen is believed if more than half of all, itself included, lie within that factor: of two that are further
+    apart neither is.
+    """
+    logs = np.log(np.maximum(stiffness, np.finfo(float).tiny))
+    ordered = np.sort(logs)
+    low, high = (logs + sign * np.log(THIRTYFOLD) for sign in (-1.0, 1.0))
+    near = np.searchsorted(ordered, high, side="right") - np.searchsorted(ordered, low, side="left")
+    return np.asarray(2 * near <= stiffness.size)

@@ -20,10 +20,14 @@ RELATIVE = ("scale", "parallax")
 
 @dataclass(frozen=True)
 class Provenance:
-    """Command, plain facts, input hashes and settings of a result."""
+    """Command, plain facts, input hashes and settings of a result.
+
+    ``clock`` is apart, for it is all that differs when the same input is measured again: report.pdf leaves it out.
+    """
 
     command: str
     facts: list[tuple[str, str]]
+    clock: list[tuple[str, str]]
     inputs: list[tuple[str, str]]
     settings: str
 
@@ -31,10 +35,11 @@ class Provenance:
 def provenance_rows(result: Result, words: Words) -> Provenance:
     """Provenance as the page shows it; entries without a word for them are listed by their own names."""
     source = result.provenance
-    plain = {key: value for key, value in source.items() if key not in APART} | source.get("clock", {})
+    plain = {key: value for key, value in source.items() if key not in APART}
     return Provenance(
         command=_text(source.get("command", "")),
         facts=[(words.fact(key), _text(value)) for key, value in plain.items()],
+        clock=[(words.fact(key), _text(value)) for key, value in source.get("clock", {}).items()],
         inputs=list(source.get("inputs_sha256", {}).items()),
         settings=json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
     )

@@ -1,56 +1,91 @@
-"""Repeat specimens of one cable type on the index: a sentence and a figure a type."""
+"""Repeat specimens of one cable type on the index: which of them cannot be, and a sentence and a figure a type.
+
+Only specimens that are usable are pooled. A specimen whose stiffness is a thirtieth or thirty times that of most others
+of its type is not: that is a wrong unit of the force, which no specimen shows on its own if its cable is soft.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import groupby
-from operator import itemgetter
 
-from matplotlib.axes import Axes
+import numpy as np
 
-from pipeline.report.canvas import LIGHT, Area, Drawing, drawing, finish, plot_area
-from pipeline.report.figures import band_width
-from pipeline.report.pooling import Pooled, pool
+from pipeline.report.pooling import Pooled, outlying, pool
+from pipeline.report.row import IndexRow, RowCurve
 from pipeline.report.words import Words
-from pipeline.settings import ReportSettings
+from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit
-from pipeline.visited import Visited
+
+LINES = 40  # single curves of a figure: more are a blot
 
 
-def repeats(
-    specimens: list[tuple[str, Visited]], unit: Unit, words: Words, settings: ReportSettings
-) -> list[dict[str, object]]:
-    """Repeat specimens by type, most specimens first.
+@dataclass(frozen=True)
+class Repeats:
+    """Repeat specimens of one type.
 
-    Parameters
+    Attributes
     ----------
-    specimens : list of (type, characteristic)
-    unit : Unit
-        Of bending stiffness, for all of the index.
-    words : Words
-    settings : ReportSettings
-
-    Returns
-    -------
-    list of dict
-        ``type``, ``text`` (a sentence) and ``figure`` (None after the first types).
+    type, text : str
+        Of the cable; mean, scatter and whether they differ.
+    pooled : Pooled
+    members : tuple of int
+        Numbers of the rows, the first of them.
+    alt : str
+        The figure in words; empty if none is to be drawn.
     """
-    ordered = sorted(specimens, key=itemgetter(0))
-    groups = [(name, [curve for _, curve in group]) for name, group in groupby(ordered, key=itemgetter(0))]
-    entries: list[dict[str, object]] = []
-    for name, curves in sorted(groups, key=lambda group: -len(group[1])):
-        together = pool(curves)
+
+    type: str
+    text: str
+    pooled: Pooled
+    members: tuple[int, ...]
+    alt: str
+
+
+def by_type(rows: list[IndexRow]) -> list[tuple[str, list[tuple[int, RowCurve]]]]:
+    """Usable rows with a type and a curve, with their numbers: type by type, most specimens first."""
+    curves = [(row.type, i, row.curve) for i, row in enumerate(rows) if row.usable and row.type and row.curve]
+    ordered = sorted(curves, key=lambda entry: entry[:2])
+    groups = [(name, [(i, curve) for _, i, curve in group]) for name, group in groupby(ordered, key=lambda e: e[0])]
+    return sorted(groups, key=lambda group: -len(group[1]))
+
+
+def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
+    """The rows, those that cannot be specimens of their type as not usable."""
+    judged = list(rows)
+    for name, group in by_type(rows):
+        means = np.array([float(np.mean(curve.tangent)) for _, curve in group])
+        for (number, _), mean, wrong in zip(group, means, outlying(means), strict=True):
+            if not wrong:
+                continue
+            from pipeline.visited import none_of_its_type  # loads what results are made of: for the few that need it
+
+            times = mean / float(np.median(means[means != mean]))
+            fault = none_of_its_type(times, others=len(group) - 1, kind=name)
+            judged[number] = replace(rows[number], usable=False, fault=fault, outlying=True)
+    return judged
+
+
+def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSettings) -> Iterable[Repeats]:
+    """Repeat specimens by type, most specimens first; ``unit`` is that of bending stiffness for all of an index."""
+    drawn = 0
+    for name, group in by_type(rows):
+        together = pool([curve for _, curve in group])
         if together is None:
             continue
-        figure = None
-        if len(entries) < settings.pooled_types_drawn:
-            figure = _pooled_figure(f"pooled-{len(entries)}", name, together, curves, unit, words, settings)
-        entries.append(
-            {"type": name, "text": _pooled_text(together, len(curves), unit, words, settings), "figure": figure}
+        drawn += 1
+        shown = drawn <= settings.pooled_types_drawn
+        yield Repeats(
+            type=name,
+            text=_text(together, len(group), unit, words, settings),
+            pooled=together,
+            members=tuple(number for number, _ in group[:LINES]),
+            alt=words("pooled_alt", count=len(group), type=name) if shown else "",
         )
-    return entries
 
 
-def _pooled_text(pooled: Pooled, count: int, unit: Unit, words: Words, settings: ReportSettings) -> str:
+def _text(pooled: Pooled, count: int, unit: Unit, words: Words, settings: ReportSettings) -> str:
     """Mean, scatter against own errors, and whether the specimens differ."""
     differ = pooled.p_value < settings.pooled_p_value
     return words(
@@ -63,30 +98,3 @@ def _pooled_text(pooled: Pooled, count: int, unit: Unit, words: Words, settings:
         own=words.number(100.0 * pooled.error_relative, 2),
         verdict=words("pooled_differ" if differ else "pooled_same", p=words.probability(pooled.p_value, name="p")),
     )
-
-
-def _pooled_figure(
-    key: str,
-    name: str,
-    pooled: Pooled,
-    curves: list[Visited],
-    unit: Unit,
-    words: Words,
-    settings: ReportSettings,
-) -> Drawing:
-    """Draw the single curves, the scatter between specimens, and the mean with its band."""
-
-    def draw(figure: Area) -> Axes:
-        axes, half = plot_area(figure), band_width(settings)
-        for index, curve in enumerate(curves[:40]):  # more lines than that are a blot
-            label = words("pooled_single") if index == 0 else None
-            axes.plot(curve.kappa, unit.factor * curve.tangent, color=LIGHT["muted"], lw=0.7, alpha=0.6, label=label)
-        for spread, alpha, label in ((pooled.scatter, 0.14, "pooled_scatter"), (pooled.std, 0.3, "pooled_mean")):
-            low, high = (unit.factor * (pooled.mean + sign * half * spread) for sign in (-1.0, 1.0))
-            axes.fill_between(pooled.kappa, low, high, color=LIGHT["inverse"], alpha=alpha, lw=0.0, label=words(label))
-        axes.plot(pooled.kappa, unit.factor * pooled.mean, color=LIGHT["inverse"], lw=2.2)
-        axes.set_ylim(bottom=0.0)
-        y = words("axis_stiffness", unit=unit.symbol)
-        return finish(axes, x=words("axis_kappa"), y=y, decimal=words.decimal, legend=3)
-
-    return drawing(key, draw, title=name, description=words("pooled_alt", count=len(curves), type=name))

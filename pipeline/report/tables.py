@@ -2,7 +2,7 @@
 
 ``characteristic.csv`` and ``centerlines.csv`` are fixed by the contract; ``moment_curve.csv`` (kappa, m) and
 ``simulation.csv`` (constants with errors) are what simulation programs ask for. Text that a spreadsheet would run as
-a formula gets an apostrophe in front (CWE-1236).
+a formula is disarmed, see `cells`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from pipeline.report.cells import FLOATS, neutral
 from pipeline.report.files import write_atomic
 from pipeline.report.frames import centerlines_frame, characteristic_frame, moment_frame, simulation_frame
 from pipeline.result import Result, to_json
 from pipeline.settings import ReportSettings
-
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
-# Nine digits: below a nanometre on a metre and beyond any band here.
-FLOATS = "%.9g"
 
 
 def write_result(result: Result, folder: Path) -> Path:
@@ -56,11 +53,3 @@ def csv_text(frame: pd.DataFrame) -> str:
         if not pd.api.types.is_numeric_dtype(safe[name]):
             safe[name] = safe[name].map(neutral)
     return safe.to_csv(index=False, float_format=FLOATS, lineterminator="\n")
-
-
-def neutral(cell: object) -> object:
-    """Text that no spreadsheet takes for a formula or for the end of a row; anything but text unchanged."""
-    if not isinstance(cell, str):
-        return cell
-    text = cell.replace("\r", " ")  # the writer quotes line feeds, but not a lone carriage return
-    return f"'{text}" if cell.startswith(FORMULA_STARTS) else text

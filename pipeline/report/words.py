@@ -14,7 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.diagnosis.words import spoken
 from pipeline.report.german import in_german
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
@@ -31,6 +30,8 @@ def _table() -> dict[str, dict[str, Any]]:
 @cache
 def _german_causes() -> dict[str, str]:
     """German names of the causes, by their names of the contract, with and without underscores, and by the English."""
+    from pipeline.diagnosis.words import spoken  # the index needs it in German alone, and it loads all causes
+
     rows = _table()["causes"].items()
     forms = {name: (name, name.replace("_", " "), spoken(name)) for name, _ in rows}  # the second: earlier results
     return {english: german for name, german in rows for english in forms[name]}
@@ -91,6 +92,8 @@ class Words:
 
     def cause(self, name: str) -> str:
         """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
+        from pipeline.diagnosis.words import spoken
+
         return str(_table()["causes"].get(name, spoken(name))) if self.language == "de" else spoken(name)
 
     def said(self, sentence: str) -> Said:

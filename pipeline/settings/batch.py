@@ -28,7 +28,7 @@ class BatchSettings(BaseModel):
     waiting_per_worker: int = Field(
         2,
         ge=1,
-        description="specimens handed out a worker; one is measured, the next waits, memory stays flat",
+        description="specimens handed out a worker of a cluster; one is measured, the next waits, memory stays flat",
     )
     reports: bool = Field(
         True,

@@ -27,6 +27,7 @@ class IntakeSettings(BaseModel):
         "measured without a folder",
     )
     photos_max: int = Field(10_000, gt=0, description="photos in one folder; a test has tens of steps")
+    steps_max: int = Field(10_000, gt=0, description="steps in one force log; as many as photos")
     search_depth: int = Field(12, gt=0, description="folders below the given one; deeper trees are linked or a mistake")
 
     # Force log

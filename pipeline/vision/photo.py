@@ -9,26 +9,25 @@ Colour channels stay in the order of OpenCV (blue, green, red); values stay inte
 
 from __future__ import annotations
 
-import io
-import struct
-import warnings
+import errno
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import ImageOps
 
 from pipeline.records import Rejected
 from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opened, read_header
 
 Pixels = NDArray[np.uint8 | np.uint16]
 
 # EXIF orientation -> OpenCV operations that turn the stored picture into the displayed one
 _ROTATIONS = {3: cv2.ROTATE_180, 6: cv2.ROTATE_90_CLOCKWISE, 8: cv2.ROTATE_90_COUNTERCLOCKWISE}
 _MIRRORED = {2: (1, None), 4: (0, None), 5: (1, cv2.ROTATE_90_COUNTERCLOCKWISE), 7: (1, cv2.ROTATE_90_CLOCKWISE)}
-_ORIENTATION_TAG = 0x0112
 
 
 @dataclass(frozen=True)
@@ -65,14 +64,6 @@ class Photo:
         return self.pixels.shape[1], self.pixels.shape[0]
 
 
-@dataclass(frozen=True)
-class _Header:
-    kind: str
-    width: int
-    height: int
-    orientation: int
-
-
 def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) -> Photo | Rejected:
     """Read one photo.
 
@@ -93,13 +84,16 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
     """
     name = path.name if name is None else name
     try:
-        if path.stat().st_size > settings.max_file_megabytes * 1e6:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for whoever writes into it
+            raise OSError(errno.EINVAL, "it is no ordinary file")
+        megabytes = status.st_size / 1e6
+        if megabytes > settings.max_file_megabytes:
             return _refused(
                 name,
                 "photo/too-large",
-                f"the file has {path.stat().st_size / 1e6:.0f} MB, more than the limit of "
-                f"{settings.max_file_megabytes:.0f} MB",
-                megabytes=path.stat().st_size / 1e6,
+                f"the file has {megabytes:.0f} MB, more than the limit of {settings.max_file_megabytes:.0f} MB",
+                megabytes=megabytes,
             )
         # OpenCV opens paths in the system's code page on Windows; bytes work everywhere.
         data = path.read_bytes()
@@ -112,7 +106,7 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
     """Decode the bytes of a photo; see `load_photo`."""
     if not data:
         return _refused(name, "photo/empty", "the file is empty")
-    header = _read_header(data)
+    header = read_header(data)
     if header is None:
         return _refused(name, "photo/unreadable", "the file is not a readable png, jpg, bmp or tif")
     megapixels = header.width * header.height / 1e6
@@ -131,9 +125,9 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
             f"the picture is {side} px small, the least is {settings.min_side_px} px",
             side_px=side,
         )
-    if not _complete(data, header.kind):
+    if not is_whole(data, header.kind):
         return _refused(name, "photo/truncated", "the file ends before the picture does; copy it again")
-    pixels = _decode(data, header)
+    pixels = _decode(data, header) if is_sound(data, header.kind) else None
     if pixels is None:
         return _refused(name, "photo/unreadable", f"the {header.kind} file is damaged or of an unknown variant")
     return Photo(name=name, pixels=pixels, bit_depth=_bit_depth(pixels))
@@ -173,61 +167,7 @@ def _refused(name: str, code: str, reason: str, **figure: float) -> Rejected:
     return Rejected(image=name, code=code, reason=f"{name}: {reason}.", figure=figure)
 
 
-def _read_header(data: bytes) -> _Header | None:
-    """Kind, size and orientation without decoding; None if no decoder knows the file."""
-    with warnings.catch_warnings():
-        # The limit is ours and is checked by the caller; Pillow's own would be a warning without the file's name.
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        # Damaged metadata is no reason to refuse the pixels.
-        warnings.simplefilter("ignore", UserWarning)
-        try:
-            with Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "BMP", "TIFF")) as image:
-                kind = {"MPO": "jpg", "JPEG": "jpg", "TIFF": "tif"}.get(
-                    image.format or "", (image.format or "").lower()
-                )
-                return _Header(kind, image.width, image.height, _orientation(image))
-        except Image.DecompressionBombError:
-            return _Header("picture", 10**9, 10**9, 1)
-        except (UnidentifiedImageError, OSError, ValueError, SyntaxError, struct.error):
-            return None
-
-
-def _orientation(image: Image.Image) -> int:
-    try:
-        if image.format == "PNG":
-            # Pillow's getexif decodes a png without EXIF to look behind the pixels; cameras write it in front.
-            exif = Image.Exif()
-            exif.load(image.info.get("exif", b""))
-            return int(exif.get(_ORIENTATION_TAG, 1))
-        return int(image.getexif().get(_ORIENTATION_TAG, 1))
-    except (OSError, ValueError, SyntaxError, TypeError, struct.error):
-        return 1
-
-
-def _complete(data: bytes, kind: str) -> bool:
-    """True unless the file was cut: decoders return grey areas for the missing part of a jpg."""
-    if kind == "jpg":
-        # The end mark cannot occur inside the coded picture, but a thumbnail before it has one of its own.
-        start = _start_of_scan(data)
-        return start is not None and data.find(b"\xff\xd9", start) >= 0
-    if kind == "png":
-        return data.rfind(b"IEND") >= 0
-    if kind == "bmp":
-        return len(data) >= int.from_bytes(data[10:14], "little") + 1
-    return True
-
-
-def _start_of_scan(data: bytes) -> int | None:
-    place = 2
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
-        if marker == 0xDA:
-            return place
-        place += 1 if marker == 0xFF else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return None
-
-
-def _decode(data: bytes, header: _Header) -> Pixels | None:
+def _decode(data: bytes, header: Header) -> Pixels | None:
     try:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
@@ -252,7 +192,10 @@ def _without_alpha(pixels: Pixels) -> Pixels:
 def _decode_by_pillow(data: bytes) -> Pixels | None:
     """Variants that OpenCV does not know (4-bit tif, odd palettes)."""
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        image = opened(data)
+        if image is None:
+            return None
+        with image:
             turned = ImageOps.exif_transpose(image)
             if turned.mode in ("I;16", "I;16B", "I;16L"):
                 return np.asarray(turned).astype(np.uint16)
@@ -260,7 +203,7 @@ def _decode_by_pillow(data: bytes) -> Pixels | None:
                 return np.asarray(turned.convert("L"))
             if turned.mode in ("P", "RGB", "RGBA", "CMYK", "YCbCr"):
                 return np.ascontiguousarray(np.asarray(turned.convert("RGB"))[..., ::-1])
-    except (OSError, ValueError, SyntaxError, EOFError, struct.error, Image.DecompressionBombError):
+    except BROKEN:
         return None
     return None
 

@@ -7,7 +7,10 @@ variable ``HELD_BEYOND_FIVE_IN`` = OUT it holds once five specimens are stored: 
 """
 
 import argparse
+import os
+import subprocess
 import sys
+import time
 from pathlib import Path
 from unittest import mock
 
@@ -20,6 +23,8 @@ from pipeline.cli.run import exit_code
 from pipeline.intake.folder import find_specimens
 from pipeline.settings import Settings
 
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE_S = 300.0  # ends a test that hangs; a run takes 10 s on an idle machine and minutes on a busy one
 TOML = """\
 [specimen]
 id = "{id}"
@@ -84,7 +89,8 @@ def cheap_stages() -> Stages:
             Path(argument).touch()
             os._exit(1)
         elif wish == "hang":
-            time.sleep(3600.0)
+            grown = b"x" * int(argument or 0)
+            time.sleep(3600.0 + len(grown))
         elif wish == "bug":
             raise ZeroDivisionError("float division by zero")
         elif wish == "memory":
@@ -141,6 +147,21 @@ def run_cheaply(folder: Path, out: Path, *, scheduler: str | None = None, on_out
     found = find_specimens([folder], settings.intake)
     with mock.patch("pipeline.batch.orders.code_version", return_value="test"):
         return run_batch(found, out, settings, scheduler=scheduler, stages=cheap_stages(), on_outcome=on_outcome)
+
+
+def start(*arguments, **environment) -> subprocess.Popen:
+    """A batch as a program of its own, in a group of its own so that it can be interrupted as a terminal does."""
+    command = [sys.executable, "-m", "tests.pipeline.cheap_batch", *map(str, arguments)]
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=ROOT, start_new_session=True, env=os.environ | environment, **silent)
+
+
+def wait_for(condition, process: subprocess.Popen, seconds: float = PATIENCE_S) -> None:
+    until = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < until
+        time.sleep(0.05)
 
 
 def stored(out: Path) -> dict[str, bytes]:

@@ -17,6 +17,7 @@ from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.statistics.score import descending
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 LEAST_SHARE = 0.02
@@ -61,7 +62,7 @@ def with_more_forms(
         # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
         for eligible in (fresh, fitting):
             if _loudest(more.statistic, eligible) ** 2 >= least:
-                loudest = int(np.argmax(more.statistic * eligible))
+                loudest = int(descending(more.statistic * eligible)[0])
                 added = fit_terms(observation, fitted, more, (loudest,), settings)
             if added is not None and fitted.chi2 - added.chi2 >= least:
                 break

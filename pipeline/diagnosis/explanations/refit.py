@@ -109,12 +109,8 @@ def fit_terms(
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
     added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
-    # the first start speaks for all, but not beside a base model that has not settled itself
-    speaks = 1 if base.converged else 2
     best: Fit | None = None
-    for tried, start in enumerate([linear_start(observation, added), *_other_valleys(added)]):
-        if tried >= speaks and best is not None and best.converged and best.chi2 >= hopeless:
-            break
+    for start in (linear_start(observation, added), *_other_valleys(added)):
         found = fit_from(observation, added.extension, start, base, settings, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found

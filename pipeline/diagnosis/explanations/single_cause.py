@@ -18,6 +18,7 @@ from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.statistics.score import descending
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 NEARLY_AS_LOUD = 0.75
@@ -149,7 +150,7 @@ def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
     Which setting is right may show only when further forms act beside.
     """
     own = suspicion.of(cause)
-    ranked = [int(k) for k in own[np.argsort(-suspicion.statistic[own], kind="stable")]]
+    ranked = [int(k) for k in own[descending(suspicion.statistic[own])]]
     least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]
     loud = [k for k in ranked[:4] if suspicion.statistic[k] >= least]
     first = suspicion.terms[ranked[0]].variant

@@ -180,8 +180,7 @@ class Base:
 
     def characteristic(self, vector: Array) -> Characteristic:
         """f_EI over the excess curvature."""
-        ordinates = self.stiffness * np.exp(vector[: len(self.knots)])
-        return Characteristic.from_ordinates(self.knots, ordinates, reading="tangent", abscissa="excess")
+        return Characteristic.from_ordinates(self.knots, self.ordinates(vector), reading="tangent", abscissa="excess")
 
     def model(self, vector: Array, *, steps: int = 0) -> Model:
         """The model at a parameter vector; ``steps`` of the test, which count where displacements are not exact."""
@@ -203,8 +202,23 @@ class Base:
 
     def law_directions(self, vector: Array, knots: Array) -> Array:
         """Change (k, p) of the law at ``knots`` (k,) per unit of the first p parameters, N m^2."""
-        cardinal = [Characteristic.from_ordinates(self.knots, unit).f(knots) for unit in np.eye(len(self.knots))]
-        return np.column_stack(cardinal) * self.stiffness * np.exp(vector[: len(self.knots)])
+        own = np.array_equal(knots, self.knots)
+        return (np.eye(len(knots)) if own else self._cardinal(knots)) * self.ordinates(vector)
+
+    def ordinates(self, vector: Array) -> Array:
+        """Control points (p,) of the law, N m^2."""
+        return np.asarray(self.stiffness * np.exp(vector[: len(self.knots)]))
+
+    @cached_property
+    def between(self) -> Array:
+        """The law per ordinate (5 (p - 1), p) at five places from each control point to the next."""
+        shares = np.linspace(0.0, 1.0, 7)[1:-1]
+        return self._cardinal((self.knots[:-1, None] + np.diff(self.knots)[:, None] * shares).ravel())
+
+    def _cardinal(self, at: Array) -> Array:
+        return np.column_stack(
+            [Characteristic.from_ordinates(self.knots, unit).f(at) for unit in np.eye(len(self.knots))]
+        )
 
     def admissible(self, vector: Array) -> bool:
         """Whether nothing is absurd: stiffness within e^12 of the reference, scale and length within 30 %."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
+from pipeline.diagnosis.fits.step import Linearised, lasting, reach
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Model
 from pipeline.diagnosis.observations.simulation import Run, run
@@ -35,12 +36,6 @@ that no model explains else kept every one of hundreds of fits at work on a hund
 
 PART = 0.4
 """Share of a step that leads too far; where amount and stiffness act as a product, halves of a step did."""
-
-LAW_REACH = 0.7
-"""Logarithm by which one step may move an ordinate of the law at most: a factor two."""
-
-BEND_REACH = 0.2
-"""Of the curvature scale: how far one step may move K0 at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +150,8 @@ def fit(
     converged, damping, crawled, falls = False, 0.0, 0, [np.inf, np.inf]
     for left in range(iterations, 0, -1):
         cost = state.cost(rows)
-        linear = _Linearised(jacobian[rows], state.residual[rows], cutoff)
+        bounds = lasting(extension, state.vector)
+        linear = Linearised(jacobian[rows], state.residual[rows], cutoff, bounds, reach(extension))
         left_over = max(cost / max(int(rows.sum()), 1), 1.0)  # a sigma of what a misfit leaves is no sigma of the noise
         if linear.expected_fall < tolerance * left_over:
             converged = True
@@ -232,7 +228,7 @@ def _lower(
     observation: Observation,
     extension: Extension,
     state: _State,
-    linear: _Linearised,
+    linear: Linearised,
     damping: float,
     rows: NDArray[np.bool_],
 ) -> tuple[_State, float] | None:
@@ -243,7 +239,7 @@ def _lower(
     """
     least = max(damping, 1e-5)
     for used, share in ((damping, 1.0), (least, PART), *((least * 10.0**k, 1.0) for k in range(1, 7))):
-        trial = _within_reach(extension, state.vector, state.vector + share * linear.step(used))
+        trial = extension.brought_inside(state.vector + share * linear.step(used))
         if not extension.admissible(trial):
             continue
         base_model = extension.base_model(trial)
@@ -252,36 +248,3 @@ def _lower(
         if value is not None and np.sum(value[rows] ** 2) < state.cost(rows):
             return _State(trial, base_model, there, value), used
     return None
-
-
-class _Linearised:
-    """The linear problem at a state: columns of unit length, so that ``damping`` is a pure number."""
-
-    def __init__(self, jacobian: Array, residual: Array, cutoff: float) -> None:
-        size = np.linalg.norm(jacobian, axis=0)
-        self.size = np.where(size > 0.0, size, 1.0)
-        left, weight, self.right = np.linalg.svd(jacobian / self.size, full_matrices=False)
-        self.kept = weight > cutoff * weight[0]
-        self.weight, self.along = weight, np.where(self.kept, left.T @ residual, 0.0)
-
-    @property
-    def expected_fall(self) -> float:
-        """Fall of chi-square the linear model promises for the whole step."""
-        return float(self.along @ self.along)
-
-    def step(self, damping: float) -> Array:
-        """Step (p,), held back where the data hardly tell the direction (relative weight below ``damping``)."""
-        weight = np.where(self.kept, self.weight, 1.0)
-        filtered = weight / (weight**2 + (damping * self.weight[0]) ** 2)
-        return np.asarray(self.right.T @ (filtered * self.along) / self.size)
-
-
-def _within_reach(extension: Extension, vector: Array, trial: Array) -> Array:
-    """The trial, taken back into its range and no farther from the vector than one step may go."""
-    near = extension.brought_inside(trial)
-    law = slice(0, len(extension.base.knots))
-    near[law] = np.clip(near[law], vector[law] - LAW_REACH, vector[law] + LAW_REACH)
-    if (bend := extension.base.pre_curvature_index) is not None:
-        reach = BEND_REACH * extension.facts.curvature_scale
-        near[bend] = np.clip(near[bend], vector[bend] - reach, vector[bend] + reach)
-    return near

@@ -13,6 +13,7 @@ Code: ``photo/scatter``.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,10 +121,10 @@ def waves_of_midlines(shapes: Shapes, settings: DiagnosisSettings) -> tuple[floa
     shapes : Shapes
     settings : DiagnosisSettings
     """
-    table, rng = shapes.table, np.random.default_rng(settings.seed)
+    table = shapes.table
     if len(table) < LEAST_PHOTOS or table.shape[1] <= len(table):
         return None
-    nulls = [_patterns_of_noise(table.shape, count, settings.gain_draws, rng) for count in range(MOST_PATTERNS + 1)]
+    nulls = _nulls(table.shape, settings.gain_draws, settings.seed)
     clear = next((k for k, null in enumerate(nulls) if not _stands_out(table, k, null, level=DOUBTFUL)), None)
     if clear is None or chdtrc(_freedom(table, clear), float(np.sum(_beside(table, clear) ** 2))) > RARE:
         return None
@@ -162,6 +163,13 @@ def _stands_out(table: Array, count: int, null: Array, *, level: float) -> bool:
     """Whether the next patterns of a table are stronger than those of noise, of any level, are seldom: one, or two."""
     found = _shares(np.asarray(np.linalg.svd(table, compute_uv=False))[None, count:])[0]
     return bool(np.any(np.mean(null >= found, axis=0) <= level))
+
+
+@lru_cache(maxsize=8)
+def _nulls(shape: tuple[int, ...], draws: int, seed: int) -> tuple[Array, ...]:
+    """What `_patterns_of_noise` gives for each number of patterns: the same for all tables of a size."""
+    rng = np.random.default_rng(seed)
+    return tuple(_patterns_of_noise(shape, count, draws, rng) for count in range(MOST_PATTERNS + 1))
 
 
 def _patterns_of_noise(shape: tuple[int, ...], count: int, draws: int, rng: np.random.Generator) -> Array:

@@ -19,7 +19,7 @@ from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.diagnosis.statistics.score import Scores, admissible, score, span
+from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score, span
 
 Array = NDArray[np.float64]
 
@@ -65,8 +65,8 @@ class Suspicion:
             return None
         statistic = self.statistic[own]
         if statistic.max() <= 0.0:
-            return int(own[np.argmax(np.abs(self.scores.z[own]))])
-        return int(own[np.argmax(statistic)])
+            return int(own[descending(np.abs(self.scores.z[own]))[0]])
+        return int(own[descending(statistic)[0]])
 
 
 def suspect(

@@ -67,12 +67,8 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
 
     None where the base model's excess on them is within three standard deviations of chance: a share of nothing.
     """
-    base, extended = [], []
-    for fold in folds:
-        root = predictive_root(fold.inside, fold.outside)
-        base.append(linalg.solve_triangular(root, fold.base, lower=True))
-        extended.append(linalg.solve_triangular(root, fold.extended, lower=True))
-    before, after = np.concatenate(base), np.concatenate(extended)
+    whitened = [whitened_by_prediction(fold) for fold in folds]
+    before, after = (np.concatenate(residuals) for residuals in zip(*whitened, strict=True))
     count = len(before)
     excess = float(before @ before) - count
     if excess <= SIGNIFICANT * np.sqrt(2.0 * count):
@@ -81,20 +77,27 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     # what the extension takes away is the signal; noise is drawn anew, as large as what it leaves
     signal = before - after
     level = np.sqrt(max(1.0, float(after @ after) / count))
-    noise = level * rng.standard_normal((draws, count))
-    base_chi2 = np.sum((signal + noise) ** 2, axis=1)
-    share = (base_chi2 - np.sum(noise**2, axis=1)) / np.maximum(base_chi2 - count, 0.5 * excess)
+    size = float(np.linalg.norm(signal))
+    # of the noise only its part along the signal and its square count, so nothing as long as the samples is drawn
+    along = level * rng.standard_normal(draws)
+    gained = size**2 + 2.0 * size * along
+    base_chi2 = gained + along**2 + level**2 * rng.chisquare(max(count - 1, 1), draws)
+    share = gained / np.maximum(base_chi2 - count, 0.5 * excess)
     low, high = np.quantile(share, [0.025, 0.975])
     return HeldOut(removed, (float(min(low, removed)), float(max(high, removed))), excess)
 
 
-def predictive_root(inside: Array, outside: Array) -> Array:
-    """Cholesky factor (n, n) of the predictive covariance of the rows left out.
+def whitened_by_prediction(fold: Fold) -> tuple[Array, Array]:
+    """Both residuals (n,) of a fold, whitened by the predictive covariance C = I + R R^T of its rows left out.
 
-    Directions the fitted rows do not determine get a variance of 1e8 instead of infinity: no prediction, no verdict.
+    With the thin singular value decomposition R = U S V^T, C^(-1/2) = I + U ((1 + S^2)^(-1/2) - I) U^T: nothing of size
+    n x n is made, however many samples a hold has. Directions the fitted rows do not determine get a variance of 1e8
+    instead of infinity: no prediction, no verdict.
     """
-    size = np.linalg.norm(np.vstack([inside, outside]), axis=0)
+    size = np.linalg.norm(np.vstack([fold.inside, fold.outside]), axis=0)
     size = np.where(size > 0.0, size, 1.0)
-    _, weight, right = linalg.svd(inside / size, full_matrices=False)
-    reach = (outside / size) @ right.T / np.maximum(weight, 1e-4 * max(weight.max(initial=0.0), 1e-300))
-    return np.asarray(linalg.cholesky(np.eye(len(outside)) + reach @ reach.T, lower=True))
+    _, weight, right = linalg.svd(fold.inside / size, full_matrices=False)
+    reach = (fold.outside / size) @ right.T / np.maximum(weight, 1e-4 * max(weight.max(initial=0.0), 1e-300))
+    left, spread, _ = linalg.svd(reach, full_matrices=False)
+    less = 1.0 / np.sqrt(1.0 + spread**2) - 1.0
+    return fold.base + left @ (less * (left.T @ fold.base)), fold.extended + left @ (less * (left.T @ fold.extended))

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+
+from pipeline.diagnosis.statistics.score import descending, scores_of_noise
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def best_pairs(gains: Array, owner: NDArray[np.int_], *, count: int) -> list[Pai
     value = gains[row, column]
     found: list[Pair] = []
     seen: set[frozenset[int]] = set()
-    for at in np.argsort(-value):
+    for at in descending(value):
         if len(found) == count or value[at] <= 0.0:
             break
         names = frozenset((int(owner[row[at]]), int(owner[column[at]])))
@@ -72,8 +73,7 @@ def null_pair_gain(
     rng: np.random.Generator,
 ) -> float:
     """Gain the best pair exceeds with probability ``level`` when nothing is wrong: draws of scores N(0, U^T U)."""
-    triangle = linalg.qr(unit, mode="r")[0][: unit.shape[1]]
     cosine = np.clip(unit.T @ unit, -1.0, 1.0)
-    scores = rng.standard_normal((draws, len(triangle))) @ triangle
+    scores = scores_of_noise(unit, draws=draws, rng=rng)
     best = [float(pair_gains(z, cosine, sign, owner, collinear=collinear).max(initial=0.0)) for z in scores]
     return float(np.quantile(best, 1.0 - level))

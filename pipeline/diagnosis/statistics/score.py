@@ -124,12 +124,36 @@ def null_maxima(
     z = np.zeros((draws, unit.shape[1]))
     for rows, freedom in ((known, 0.0), *estimated):
         if np.any(rows):
-            triangle = linalg.qr(unit[rows], mode="r")[0][: unit.shape[1]]
-            part = rng.standard_normal((draws, triangle.shape[0])) @ triangle
+            part = scores_of_noise(unit[rows], draws=draws, rng=rng)
             if freedom:
                 part /= np.sqrt(rng.chisquare(freedom, draws) / freedom)[:, None]
             z += part
     return np.sort(admissible(z, sign).max(axis=1))
+
+
+ALIKE = 1e-6
+"""Of the largest value: what differs by less differs by rounding. Forms of a cause may have the very same trace."""
+
+
+def descending(values: Array) -> NDArray[np.int_]:
+    """Order (n,) of values, the largest first; such as are alike stay in their own order, the simpler form first."""
+    order = np.argsort(-values, kind="stable")
+    falls = -np.diff(values[order], prepend=values[order[:1]])
+    place = np.cumsum(falls > ALIKE * np.max(np.abs(values), initial=0.0))
+    return np.asarray(order[np.lexsort((order, place))])
+
+
+def scores_of_noise(columns: Array, *, draws: int, rng: np.random.Generator) -> Array:
+    """What unit noise scores along columns C (n, k): draws (draws, k) of N(0, C^T C).
+
+    By the symmetric root of C^T C, the one root that moves no further than C does. The rows of a triangular one turn
+    freely where columns are nearly dependent, and the same seed then makes other draws on another processor.
+    """
+    if len(columns) <= columns.shape[1]:
+        return np.asarray(rng.standard_normal((draws, len(columns))) @ columns)
+    variances, directions = np.linalg.eigh(columns.T @ columns)
+    root = (directions * np.sqrt(np.maximum(variances, 0.0))) @ directions.T
+    return np.asarray(rng.standard_normal((draws, len(root))) @ root)
 
 
 def threshold(maxima: Array, level: float) -> float:

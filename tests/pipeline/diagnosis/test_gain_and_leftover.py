@@ -7,7 +7,7 @@ from pipeline.diagnosis.fits.heldout import answers, unproven
 from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
-from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, predictive_root
+from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out, whitened_by_prediction
 from pipeline.diagnosis.statistics.leftover import leftover_of
 from pipeline.diagnosis.statistics.smooth_fields import smooth_fields
 from pipeline.result import GainPart
@@ -57,9 +57,26 @@ def test_a_useless_extension_removes_nothing():
 
 def test_what_the_kept_data_do_not_tell_counts_for_neither_model():
     inside = np.array([[1.0, 0.0], [1.0, 0.0]])
-    root = predictive_root(inside, np.array([[0.0, 1.0], [1.0, 0.0]]))
-    variance = np.diag(root @ root.T)
-    assert variance[0] > 1e6 and variance[1] == pytest.approx(1.5)
+    outside = np.array([[0.0, 1.0], [1.0, 0.0]])
+    unknown, known = whitened_by_prediction(Fold(np.eye(2)[0], np.eye(2)[1], inside, outside))
+    assert unknown @ unknown < 1e-6
+    assert known @ known == pytest.approx(1.0 / 1.5)
+
+
+def test_whitening_by_prediction_is_that_of_the_full_covariance():
+    rng = np.random.default_rng(3)
+    inside, outside, residual = rng.normal(size=(30, 4)), rng.normal(size=(12, 4)), rng.normal(size=12)
+    covariance = np.eye(12) + outside @ np.linalg.solve(inside.T @ inside, outside.T)
+    white, same = whitened_by_prediction(Fold(residual, residual, inside, outside))
+    assert white @ same == pytest.approx(residual @ np.linalg.solve(covariance, residual), rel=1e-10)
+
+
+def test_a_hold_of_200_000_samples_is_weighed():
+    rng = np.random.default_rng(4)
+    outside, noise = rng.normal(size=(200_000, 2)), rng.normal(size=200_000)
+    fold = Fold(0.2 + noise, noise, np.eye(2) * 1e3, outside)
+    found = held_out([fold], draws=500, rng=rng)
+    assert found.interval[0] < 1.0 < found.interval[1] and found.interval[1] - found.interval[0] < 1.0
 
 
 @pytest.fixture(scope="module")

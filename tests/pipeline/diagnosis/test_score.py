@@ -2,7 +2,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.diagnosis.statistics.score import adjusted_p, admissible, null_maxima, score, sigma_needed, threshold
+from pipeline.diagnosis.statistics.score import (
+    adjusted_p,
+    admissible,
+    descending,
+    null_maxima,
+    score,
+    scores_of_noise,
+    sigma_needed,
+    threshold,
+)
 
 
 @pytest.fixture
@@ -82,3 +91,31 @@ def test_adjusted_p_goes_over_smoothly_into_the_tail(problem):
     # five tests, two of them nearly one: the tail lies between that of three and of five independent ones
     tail = 2.0 * stats.norm.sf(9.0)
     assert 3.0 * tail < p[-1] < 5.5 * tail
+
+
+@pytest.mark.parametrize("rows", [80, 4])
+def test_scores_of_noise_spread_as_the_columns_say(problem, rows):
+    columns = problem[1][:rows]
+    drawn = scores_of_noise(columns, draws=40000, rng=np.random.default_rng(13))
+    wanted = columns.T @ columns
+    # 4 sigma of a covariance of 40,000 draws
+    error = 4.0 * np.sqrt((np.outer(np.diag(wanted), np.diag(wanted)) + wanted**2) / 40000)
+    assert np.all(np.abs(np.cov(drawn.T) - wanted) < error)
+
+
+def test_threshold_stays_where_directions_that_are_the_same_differ_by_rounding(problem):
+    """Forms of one cause may have one trace; a triangular root of their product then turns freely."""
+    jacobian, columns = problem
+    columns = np.column_stack([columns[:, 0], columns])
+    moved = columns * (1.0 + 1e-13 * np.random.default_rng(14).standard_normal(columns.shape))
+    limits = []
+    for given in (columns, moved):
+        unit = score(np.zeros(80), jacobian, given).unit
+        limits.append(threshold(null_maxima(unit, np.zeros(6), draws=2000, rng=np.random.default_rng(15)), 0.01))
+    assert limits[1] == pytest.approx(limits[0], rel=1e-6)
+
+
+def test_of_directions_that_sound_alike_the_first_comes_first():
+    values = np.array([1.0, 5.0, 3.0, 5.0 * (1.0 + 1e-12), 3.0 + 1e-3, 0.0])
+    assert descending(values).tolist() == [1, 3, 4, 2, 0, 5]
+    assert descending(np.zeros(0)).size == 0

@@ -2,12 +2,17 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import pandas as pd
 import pytest
 
+from pipeline.batch.store import write_entry
 from pipeline.report.index import write_index
+from pipeline.report.row import as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
+from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
 
 
@@ -113,3 +118,70 @@ def test_failed_specimen_gets_a_report_that_says_why_and_what_to_do(failed_resul
 
 def test_no_link_leads_nowhere(failed_result, tmp_path):
     assert "<a href" not in write_index([failed_result], tmp_path)[0].read_text(encoding="utf-8")
+
+
+def scaled(result, times, **changes):
+    """The result with a stiffness so many times as large."""
+    curve = result.inverse.curve
+    update = {name: [times * v for v in getattr(curve, name)] for name in ("tangent_Nm2", "tangent_std_Nm2")}
+    inverse = result.inverse.model_copy(update={"curve": curve.model_copy(update=update)})
+    return result.model_copy(update={"inverse": inverse, **changes})
+
+
+def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_result, diagnosed):
+    for result in (full_result, partial_result, failed_result, diagnosed("two_causes")):
+        row = index_row(result, ReportSettings())
+        again = from_entry(json.loads(json.dumps(as_entry(row))))
+        assert as_entry(again) == as_entry(row)
+
+
+def test_a_row_is_small(full_result):
+    assert len(json.dumps(as_entry(index_row(full_result, ReportSettings())))) < 5000
+
+
+def test_results_with_entries_are_not_read(full_result, tmp_path, monkeypatch):
+    for name in ("a", "b"):
+        write_result(named(full_result, name), tmp_path / name)
+        write_entry({"row": as_entry(index_row(named(full_result, name), ReportSettings()))}, tmp_path / name)
+    monkeypatch.setattr("pipeline.result.read_result", lambda path: pytest.fail(f"{path} was read"))
+    assert list(pd.read_csv(write_index(tmp_path, tmp_path)[1]).id) == ["a", "b"]
+
+
+def test_writing_the_index_loads_no_drawing_library():
+    heavy = "{'matplotlib', 'pandas', 'cv2', 'skimage', 'pipeline.diagnosis', 'pipeline.vision'}"
+    program = f"import sys, pipeline.report.index; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_what_is_not_usable_is_in_no_mean(full_result, tmp_path):
+    fault = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
+    wrong = scaled(named(full_result, "3", "B"), 1000.0, findings=[fault])
+    batch = [named(full_result, str(i), "B") for i in range(3)] + [wrong]
+    page, summary = write_index(batch, tmp_path)
+    text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert "3 specimens. Mean f_EI over 2.00 to 8.70 1/m: 13.2" in text
+    assert '<tr class="unusable">' in text and "data at fault" in text
+    table = pd.read_csv(summary)
+    assert list(table.usable) == [True, True, True, False]
+    assert list(table.worst_finding)[3] == "size/force"
+
+
+@pytest.mark.parametrize(
+    ("language", "said"), [("en", "check the unit of the forces"), ("de", "die Einheit der Kräfte")]
+)
+def test_a_wrong_unit_that_shows_beside_repeat_specimens_alone(full_result, tmp_path, language, said):
+    """A soft cable a thousand times as stiff is still a cable."""
+    batch = [named(full_result, str(i), "B") for i in range(5)] + [scaled(named(full_result, "5", "B"), 1000.0)]
+    page, summary = write_index(batch, tmp_path, ReportSettings(language=language))
+    assert list(pd.read_csv(summary).usable) == [True] * 5 + [False]
+    assert "f_EI is 1000 times that of the other 5 specimens of type B" in pd.read_csv(summary).reason[5]
+    text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert said in text and ("5 specimens. Mean" in text or "5 Proben. Mittleres" in text)
+
+
+def test_of_two_that_contradict_each_other_neither_is_believed(full_result, tmp_path):
+    pair = [named(full_result, "a", "B"), scaled(named(full_result, "b", "B"), 1000.0)]
+    assert not pd.read_csv(write_index(pair, tmp_path)[1]).usable.any()
+    pair = [named(full_result, "a", "B"), scaled(named(full_result, "b", "B"), 20.0)]
+    assert pd.read_csv(write_index(pair, tmp_path)[1]).usable.all()

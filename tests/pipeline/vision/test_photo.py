@@ -1,6 +1,9 @@
 """One loader for every photo; Pillow is the other witness for what a file shows."""
 
+import os
 import struct
+import subprocess
+import sys
 import zlib
 from io import BytesIO
 from pathlib import Path
@@ -161,3 +164,89 @@ def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
         outcome = load_photo(path, SETTINGS)
         assert isinstance(outcome, Rejected)
         assert outcome.code == "photo/missing"
+
+
+def png_chunks(data: bytes) -> list[tuple[int, bytes, int]]:
+    """Place, name and length of each chunk."""
+    found, place = [], 8
+    while place < len(data):
+        length = int.from_bytes(data[place : place + 4], "big")
+        found.append((place, data[place + 4 : place + 8], length))
+        place += 12 + length
+    return found
+
+
+MEASURE = """
+import resource, sys
+from pathlib import Path
+from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.vision.photo import load_photo
+used = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+before = used()
+print(getattr(load_photo(Path(sys.argv[1]), PhotoSettings()), "code", "read"), used() - before)
+"""
+
+
+def test_a_damaged_length_in_a_png_costs_no_memory(tmp_path: Path) -> None:
+    data = bytearray(coded(picture(np.uint8, 3), ".png"))
+    place = next(place for place, name, _ in png_chunks(data) if name == b"IDAT")
+    data[place : place + 4] = struct.pack(">I", 0xFFFFFFF0)
+    path = tmp_path / "damaged.png"
+    path.write_bytes(data)
+    done = subprocess.run([sys.executable, "-c", MEASURE, path], capture_output=True, text=True, check=True)
+    outcome, megabytes = done.stdout.split()
+    assert outcome == "photo/unreadable"
+    assert float(megabytes) < 200.0  # the length asks for 4,300
+
+
+def test_every_damaged_chunk_of_a_png_is_refused() -> None:
+    whole = coded(np.vstack([picture(np.uint8, 3)] * 3), ".png")
+    chunks = png_chunks(whole)
+    assert [name for _, name, _ in chunks].count(b"IDAT") > 1  # the last rows are in a chunk of their own
+    for place, _, length in chunks:
+        for wrong in (0xFFFFFFF0, 0x7FFFFFFF, length + 100):
+            damaged = whole[:place] + struct.pack(">I", wrong) + whole[place + 4 :]
+            assert refused(damaged) in ("photo/unreadable", "photo/truncated")
+        if length:
+            changed = bytearray(whole)
+            changed[place + 8 + length // 2] ^= 0x55
+            assert refused(bytes(changed)) in ("photo/unreadable", "photo/too-large")
+
+
+def test_a_damaged_remark_behind_the_pixels_of_a_png_is_no_reason_to_refuse_its_pixels() -> None:
+    whole = coded(picture(np.uint8, 3), ".png")
+    remark = b"tEXtComment\0hello"
+    chunk = struct.pack(">I", len(remark) - 4) + remark + b"\0\0\0\0"  # a wrong checksum
+    place = next(place for place, name, _ in png_chunks(whole) if name == b"IEND")
+    assert isinstance(decode_photo(whole[:place] + chunk + whole[place:], SETTINGS, name="a"), Photo)
+
+
+@pytest.mark.parametrize(("side", "megapixels"), [(12_000, "144"), (14_000, "196"), (60_000, "3600")])
+def test_the_true_size_of_an_enormous_picture_is_told(side: int, megapixels: str) -> None:
+    outcome = decode_photo(bare_png(side, side), SETTINGS, name="big")
+    assert isinstance(outcome, Rejected)
+    assert outcome.reason == f"big: the photo has {megapixels} Mpx, more than the limit of 120 Mpx."
+
+
+def test_the_limit_on_megapixels_can_be_raised_beyond_that_of_the_library() -> None:
+    width, height = 18_000, 10_000  # 180 Mpx; Pillow refuses more than 179
+    done, data = cv2.imencode(".png", np.zeros((height, width), np.uint8), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    assert done
+    photo = decode_photo(data.tobytes(), PhotoSettings(max_megapixels=200.0), name="big")
+    assert isinstance(photo, Photo)
+    assert photo.size == (width, height)
+
+
+def test_a_pipe_is_not_opened(tmp_path: Path) -> None:
+    path = tmp_path / "pipe.png"
+    os.mkfifo(path)
+    outcome = load_photo(path, SETTINGS)  # waits for a writer for ever if it is opened
+    assert isinstance(outcome, Rejected)
+    assert outcome.reason == "pipe.png: the file cannot be opened (it is no ordinary file)."
+
+
+def test_a_tif_of_absurd_tiles_is_refused() -> None:
+    values = {256: 120, 257: 90, 258: 8, 259: 1, 262: 1, 277: 1, 322: 2**31, 323: 16, 324: 200, 325: 1000}
+    entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items())
+    data = b"II*\0" + struct.pack("<IH", 8, len(values)) + entries + bytes(20_000)
+    assert refused(data) == "photo/unreadable"

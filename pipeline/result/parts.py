@@ -1,37 +1,33 @@
-"""The result of one specimen: ``result.json`` as a typed record, and its published schema.
+"""The parts of a result and the whole: what ``result.json`` holds, by name and unit.
 
-``result.json`` is at once the cache, the provenance record, the report's only source and what the Python API returns.
-SI units; the unit stands in every name. Arrays are plain lists so that any program reads them.
-The parts fixed by the contract (schema, specimen, photos, inverse, balance, agreement, diagnosis, findings, provenance)
-keep their names; more stands beside them.
+The parts fixed by the contract (schema, specimen, answer, photos, inverse, balance, agreement, diagnosis, findings,
+provenance) keep their names; more stands beside them.
 """
 
 from __future__ import annotations
 
 from html import escape
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from pipeline.errors import InputError
+from pipeline.result.lists import Floats, Number, check_one_length
 from pipeline.rounding import rounded
-
-Floats = list[float]
 
 
 class Part(BaseModel):
-    """Base of all parts: frozen, no unknown keys, NaN and infinity written as null by whoever fills it."""
+    """Base of all parts: frozen; keys it does not know are passed over; NaN is null, written by whoever fills it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, populate_by_name=True)
 
 
 class SpecimenPart(Part):
     """The cable and the rig, as given."""
 
     id: str
-    length_m: float | None = Field(None, description="None if specimen.toml could not be read")
-    diameter_m: float | None = None
+    length_m: Number | None = Field(None, description="None if specimen.toml could not be read")
+    diameter_m: Number | None = None
     folder: str
     moving_bearing: str = ""
     description: dict[str, str] = {}
@@ -43,7 +39,7 @@ class PreviewPart(Part):
     jpeg_base64: str
     width: int
     height: int
-    reduction: float
+    reduction: Number
     strip_base64: str | None = None
 
 
@@ -55,14 +51,14 @@ class PhotoPart(Part):
     status: Literal["traced", "rejected", "missing"]
     reason: str | None = None
     code: str | None = None
-    chord_m: float | None = None
-    chord_std_m: float | None = None
-    traced_length_m: float | None = None
-    traced_length_std_m: float | None = None
-    width_m: float | None = None
-    width_std_m: float | None = None
-    left_px: tuple[float, float] | None = None
-    right_px: tuple[float, float] | None = None
+    chord_m: Number | None = None
+    chord_std_m: Number | None = None
+    traced_length_m: Number | None = None
+    traced_length_std_m: Number | None = None
+    width_m: Number | None = None
+    width_std_m: Number | None = None
+    left_px: tuple[Number, Number] | None = None
+    right_px: tuple[Number, Number] | None = None
     mirrored: bool | None = None
     s_m: Floats = []
     x_m: Floats = []
@@ -76,17 +72,23 @@ class PhotoPart(Part):
     kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m")
     shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal, at s_m")
     shape_residual_std_m: Floats = Field([], description="its standard deviation: photo noise, correlated")
-    quality: dict[str, float] = {}
+    quality: dict[str, Number] = {}
     preview: PreviewPart | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        places = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m", "seen")
+        check_one_length(self, places, ("kappa_fit_per_m", "shape_residual_m", "shape_residual_std_m"))
+        return self
 
 
 class ScalePart(Part):
     """Scale of the photos and where it came from; `axis_parallax_std` as in `pipeline.records.Traces`."""
 
-    px_per_mm: float
-    std_relative: float
+    px_per_mm: Number
+    std_relative: Number
     source: str
-    axis_parallax_std: float = 0.0
+    axis_parallax_std: Number = 0.0
 
 
 class StepPart(Part):
@@ -94,10 +96,10 @@ class StepPart(Part):
 
     step: int
     branch: str
-    displacement_m: float
-    force_N: float
-    force_std_N: float
-    force_fit_N: float | None = None
+    displacement_m: Number
+    force_N: Number
+    force_std_N: Number
+    force_fit_N: Number | None = None
     image: str | None = None
 
 
@@ -116,24 +118,34 @@ class Curve(Part):
         [], description="F (n, r) with F F^T the covariance of tangent_Nm2 along the grid; empty if not known"
     )
 
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if any(high <= low for low, high in pairwise(self.kappa_per_m)):
+            raise ValueError("kappa_per_m does not increase")
+        if len({len(row) for row in self.tangent_factor_Nm2}) > 1:
+            raise ValueError("tangent_factor_Nm2 has rows of different lengths")
+        factor = "tangent_factor_Nm2"
+        check_one_length(self, tuple(name for name in Curve.model_fields if name != factor), (factor,))
+        return self
+
 
 class KnotPart(Part):
     """A control point of the natural cubic spline, tangent reading."""
 
-    kappa_per_m: float
-    tangent_Nm2: float
-    std_Nm2: float
+    kappa_per_m: Number
+    tangent_Nm2: Number
+    std_Nm2: Number
 
 
 class MisfitPart(Part):
     """How well the fitted simulation explains the data, in units and in sigma."""
 
-    force_rmse_N: float
-    shape_rmse_m: float
-    curvature_rmse_per_m: float | None = None
-    chi2: float
-    degrees_of_freedom: float
-    chi2_by_block: dict[str, tuple[float, float]] = Field({}, description="chi2 and number of data by block")
+    force_rmse_N: Number
+    shape_rmse_m: Number
+    curvature_rmse_per_m: Number | None = None
+    chi2: Number
+    degrees_of_freedom: Number
+    chi2_by_block: dict[str, tuple[Number, Number]] = Field({}, description="chi2 and number of data by block")
 
 
 class InversePart(Part):
@@ -144,14 +156,14 @@ class InversePart(Part):
     advice: str = ""
     converged: bool
     iterations: int = 0
-    pre_curvature_per_m: float | None = None
-    pre_curvature_std_per_m: float | None = None
-    supported_per_m: tuple[float, float] | None = None
+    pre_curvature_per_m: Number | None = None
+    pre_curvature_std_per_m: Number | None = None
+    supported_per_m: tuple[Number, Number] | None = None
     knots: list[KnotPart] = []
     knots_chosen_by: str = ""
     curve: Curve | None = None
     misfit: MisfitPart | None = None
-    nuisance: dict[str, tuple[float, float]] = Field({}, description="fitted value and std, e.g. scale, length")
+    nuisance: dict[str, tuple[Number, Number]] = Field({}, description="fitted value and std, e.g. scale, length")
     branches: dict[str, Curve] = Field({}, description="loading and unloading fitted apart")
 
 
@@ -168,27 +180,27 @@ class BalancePart(Part):
 
     outcome: str
     advice: str = ""
-    pre_curvature_per_m: float | None = None
-    pre_curvature_std_per_m: float | None = None
-    supported_per_m: tuple[float, float] | None = None
+    pre_curvature_per_m: Number | None = None
+    pre_curvature_std_per_m: Number | None = None
+    supported_per_m: tuple[Number, Number] | None = None
     curve: Curve | None = None
     points_kappa_per_m: Floats = []
     points_moment_Nm: Floats = []
     pointwise: list[PointwisePart] = []
-    checks: dict[str, float] = Field({}, description="left against right half, photo against photo: z or p")
+    checks: dict[str, Number] = Field({}, description="left against right half, photo against photo: z or p")
 
 
 class AgreementPart(Part):
     """Both ways compared as the same quantity on the range both visited."""
 
     quantity: Literal["tangent"] = "tangent"
-    rms_relative: float | None = None
-    max_relative: float | None = None
+    rms_relative: Number | None = None
+    max_relative: Number | None = None
     compatible: bool | None = None
-    p_value: float | None = None
-    level: float = 0.05
-    range_per_m: tuple[float, float] | None = None
-    pre_curvature: dict[str, tuple[float, float]] = Field({}, description="K0 and std: photo, balance, inverse")
+    p_value: Number | None = None
+    level: Number = 0.05
+    range_per_m: tuple[Number, Number] | None = None
+    pre_curvature: dict[str, tuple[Number, Number]] = Field({}, description="K0 and std: photo, balance, inverse")
     hints: list[str] = []
 
 
@@ -196,10 +208,10 @@ class CauseForm(Part):
     """One form of a cause as it stands in the extended model: what a prediction needs of it."""
 
     label: str = Field("", description="in words, as it completes the cause's name")
-    amount: float = Field(description="in the cause's unit")
-    std: float
-    at: float = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
-    width: float = Field(
+    amount: Number = Field(description="in the cause's unit")
+    std: Number
+    at: Number = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
+    width: Number = Field(
         0.0, description="of a spot, in shares of the length; of what a steep camera foreshortens its distance, m"
     )
     tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
@@ -214,9 +226,9 @@ class CausePart(Part):
 
     name: str
     class_: Annotated[list[str], Field(alias="class")] = []
-    probability: float
-    estimate: float
-    std: float
+    probability: Number
+    estimate: Number
+    std: Number
     unit: str
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
 
@@ -225,34 +237,34 @@ class CauseRow(Part):
     """One row of the table of causes; see `pipeline.diagnosis`."""
 
     name: str
-    z: float
-    p_adjusted: float
-    estimate: float
-    std: float
+    z: Number
+    p_adjusted: Number
+    estimate: Number
+    std: Number
     unit: str
-    minimal_detectable: float | None = None
-    surviving_fraction: float
+    minimal_detectable: Number | None = None
+    surviving_fraction: Number
     nearest_twin: str = ""
-    twin_cosine: float = 0.0
-    delta_chi2: float | None = None
-    heldout_excess_removed: float | None = None
-    stiffness_shift: float | None = None
+    twin_cosine: Number = 0.0
+    delta_chi2: Number | None = None
+    heldout_excess_removed: Number | None = None
+    stiffness_shift: Number | None = None
 
 
 class GainPart(Part):
     """What the extension bought, on steps it had not seen."""
 
-    heldout_excess_removed: float
-    ci95: tuple[float, float]
-    force_rmse_N: tuple[float, float]
-    shape_rmse_m: tuple[float, float]
+    heldout_excess_removed: Number
+    ci95: tuple[Number, Number]
+    force_rmse_N: tuple[Number, Number]
+    shape_rmse_m: tuple[Number, Number]
 
 
 class BlindSpot(Part):
     """A cause that cannot be seen here but would hurt."""
 
     name: str
-    stiffness_bias_at_plausible_size: float
+    stiffness_bias_at_plausible_size: Number
     settled_by: str
 
 
@@ -269,14 +281,14 @@ class ResidualMap(Part):
     s_m: Floats
     steps: list[int]
     branches: list[str] = []
-    shape_sigma: list[list[float | None]]
-    force_sigma: list[float | None] = []
-    shape_m: list[list[float | None]] = []
-    force_N: list[float | None] = []
-    chord_m: list[float | None] = []
-    chord_sigma: list[float | None] = []
-    displacement_m: list[float | None] = []
-    chi2: dict[str, float] = Field({}, description="by kind of data: force, chord, shape")
+    shape_sigma: list[list[Number | None]]
+    force_sigma: list[Number | None] = []
+    shape_m: list[list[Number | None]] = []
+    force_N: list[Number | None] = []
+    chord_m: list[Number | None] = []
+    chord_sigma: list[Number | None] = []
+    displacement_m: list[Number | None] = []
+    chi2: dict[str, Number] = Field({}, description="by kind of data: force, chord, shape")
     data: dict[str, int] = Field({}, description="number of data by kind")
 
 
@@ -284,9 +296,9 @@ class ForceCorrectionPart(Part):
     """Forces of some steps that were wrong together: shown = factor * force + offset; a finding says why."""
 
     steps: list[int]
-    factor: float
-    offset_N: float
-    errors_N: list[list[float]] = Field(
+    factor: Number
+    offset_N: Number
+    errors_N: list[list[Number]] = Field(
         [], description="what the correction may be off by at each of the steps; a row is one standard deviation"
     )
 
@@ -308,10 +320,20 @@ class DiagnosisPart(Part):
     leftover: dict[str, Any] | None = None
     residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
     residuals_after: dict[str, Any] | None = None
-    twins: dict[str, dict[str, float]] = Field({}, description="cosines of confusable causes")
+    twins: dict[str, dict[str, Number]] = Field({}, description="cosines of confusable causes")
     left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
     left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
     corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")
+
+
+class AnswerPart(Part):
+    """Which of the curves is the result, why, and whether a fault of the data makes it none of the cable's."""
+
+    method: Literal["extended", "inverse", "balance"] | None = None
+    usable: bool
+    reason: str
+    pre_curvature_per_m: Number | None = None
+    pre_curvature_std_per_m: Number | None = None
 
 
 class FindingPart(Part):
@@ -329,6 +351,7 @@ class Result(Part):
     status: Literal["measured", "partial", "failed"]
     headline: str = ""
     specimen: SpecimenPart
+    answer: AnswerPart | None = Field(None, description="see `pipeline.visited.answer`; none in earlier results")
     scale: ScalePart | None = None
     photos: list[PhotoPart] = []
     steps: list[StepPart] = []
@@ -362,39 +385,3 @@ def _ends(curve: Curve) -> list[tuple[float, str]]:
         (curve.kappa_per_m[i], rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i]) + " mN m²")
         for i in ends
     ]
-
-
-def to_json(result: Result) -> str:
-    """Text of ``result.json``: contract names, no NaN, one line per top-level entry not guaranteed."""
-    return result.model_dump_json(by_alias=True, indent=1)
-
-
-def from_json(text: str) -> Result:
-    """Read ``result.json`` back; raises ``pydantic.ValidationError`` for anything that is not one."""
-    return Result.model_validate_json(text)
-
-
-def read_result(path: Path | str) -> Result:
-    """Read ``result.json``, or the one in a folder.
-
-    Raises
-    ------
-    InputError
-        ``result/unreadable`` if it cannot be read or is none.
-    """
-    file = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
-    try:
-        return from_json(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        told = error.strerror.lower() if isinstance(error, OSError) and error.strerror else type(error).__name__
-        raise InputError(
-            f"is no readable result ({told})",
-            path=file,
-            code="result/unreadable",
-            remedy="give a result.json that `cablebend run` wrote, or its folder",
-        ) from error
-
-
-def schema() -> dict[str, Any]:
-    """JSON schema of ``result.json``, published as ``result.schema.json``."""
-    return Result.model_json_schema(by_alias=True)

@@ -1,0 +1,95 @@
+"""Orders -> outcomes on a dask cluster that is there already, given by the address of its scheduler.
+
+Who may reach that cluster can run code in it: it is secured by whoever set it up (see dask's documentation on TLS). The
+client in this process only calls out and listens nowhere.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Iterator, Sequence
+
+from distributed import Client, Future, KilledWorker
+
+from pipeline.batch.orders import Order
+from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
+from pipeline.errors import InputError
+from pipeline.settings.batch import BatchSettings
+
+LOOK_S = 0.2  # between two looks whether Ctrl-C was pressed while nothing ended
+CONNECT_S = 5.0  # to a scheduler given by its address; those that answer do so within a second
+
+
+def measure_on_cluster(
+    scheduler: str, orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+) -> Iterator[Outcome]:
+    """Measure orders on a dask cluster; outcomes in the order in which they end.
+
+    Raises
+    ------
+    InputError
+        ``batch/no-scheduler`` if nobody answers at the address.
+    KeyboardInterrupt
+        Once ``interrupted`` is set.
+    """
+    try:
+        client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no dask scheduler answers at {scheduler!r}",
+            code="batch/no-scheduler",
+            remedy="start one with `dask scheduler`, or leave --scheduler out to use this machine",
+        ) from error
+    with client:
+        yield from _stream(client, orders, settings, stages, interrupted)
+
+
+def _next(ended: queue.SimpleQueue[Future[Outcome]], interrupted: threading.Event) -> Future[Outcome]:
+    """The next future that ended, or KeyboardInterrupt."""
+    while True:
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        with contextlib.suppress(queue.Empty):
+            return ended.get(timeout=LOOK_S)
+
+
+def _stream(
+    client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+) -> Iterator[Outcome]:
+    """Keep a few orders per worker under way.
+
+    Where the scheduler blames an order for workers that died around it, it is handed out again: whether it is to blame
+    the order itself knows, by the notes of its attempts.
+    """
+    # The futures are kept: dask drops the work of those that nobody holds.
+    doing: dict[str, tuple[Future[Outcome], Order, float, int]] = {}
+    ended: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
+
+    def hand_out(order: Order, again: int = 0) -> None:
+        future = client.submit(measure_order, order, stages, key=f"specimen-{uuid.uuid4().hex}", pure=False)
+        doing[str(future.key)] = future, order, time.monotonic(), again
+        future.add_done_callback(ended.put)
+
+    workers = max(1, sum(client.ncores().values()))
+    waiting = iter(orders)
+    for order in itertools.islice(waiting, workers * settings.waiting_per_worker):
+        hand_out(order)
+    while doing:
+        future = _next(ended, interrupted)
+        _, order, started, again = doing.pop(str(future.key))
+        trouble = None if future.status == "finished" else future.exception()
+        if isinstance(trouble, KilledWorker) and again < settings.attempts:
+            hand_out(order, again + 1)
+            continue
+        following = next(waiting, None)
+        if following is not None:
+            hand_out(following)
+        if trouble is None:
+            yield future.result()
+        else:
+            yield store_death(order, f"{type(trouble).__name__}: {' '.join(str(trouble).split())[:300]}", started)

@@ -1,0 +1,163 @@
+"""Orders -> outcomes by processes of this machine, each at the end of a pipe of its own.
+
+A pipe has no name and no port: nobody but this process and its worker can write into it, and what is pickled there
+(orders and stages on the way out, outcomes on the way back) was made by the program itself. A worker takes one specimen
+at a time, and ends when this process does, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing import connection, resource_tracker
+from multiprocessing.context import SpawnProcess
+
+import cloudpickle
+import psutil
+from dask.system import CPU_COUNT
+
+from pipeline.batch.orders import Order
+from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
+from pipeline.settings.batch import BatchSettings
+from pipeline.threads import ONE_THREAD
+
+LOOK_S = 0.2  # between two looks at Ctrl-C and at the memory of the workers while nothing ended
+SHARED = 0.95  # of the memory of this machine, by the workers; the rest is for this process
+# A worker is begun anew, not forked: a fork would take over locks that threads of libraries hold at that moment.
+SPAWN = multiprocessing.get_context("spawn")
+Pipe = connection.Connection
+
+
+@dataclass(frozen=True)
+class _Worker:
+    """A process and this end of the pipe to it."""
+
+    process: SpawnProcess
+    pipe: Pipe
+
+    def fatter_than(self, limit: float) -> bool:
+        """Whether it holds more bytes of memory."""
+        try:
+            return bool(psutil.Process(self.process.pid).memory_info().rss > limit)
+        except psutil.NoSuchProcess:
+            return False
+
+    def end(self) -> None:
+        """End it at once: what it has not stored it would lose anyway, and what is stored is stored whole."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def measure_in_processes(
+    orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+) -> Iterator[Outcome]:
+    """Measure orders in processes of this machine; outcomes in the order in which they end.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Once ``interrupted`` is set.
+    """
+    count = min(settings.workers or CPU_COUNT, len(orders))
+    limit, by_value = _bytes_per_worker(settings, count), cloudpickle.dumps(stages)
+    waiting, deaths = deque(orders), Counter[str]()
+    idle: list[_Worker] = []
+    doing: dict[Pipe, tuple[_Worker, Order, float]] = {}
+    try:
+        while waiting or doing:
+            while waiting and len(doing) < count:
+                worker, order = idle.pop() if idle else _begun(by_value), waiting.popleft()
+                doing[worker.pipe] = worker, order, time.monotonic()
+                with contextlib.suppress(OSError):  # it died while it had nothing to do: seen at once below
+                    worker.pipe.send(order)
+            ended = connection.wait(list(doing), LOOK_S)
+            if interrupted.is_set():
+                raise KeyboardInterrupt
+            for worker, *_ in doing.values():
+                if worker.fatter_than(limit):
+                    worker.process.kill()
+            for pipe in [pipe for pipe in doing if pipe in ended]:
+                worker, order, started = doing.pop(pipe)
+                try:
+                    outcome = worker.pipe.recv()
+                except (EOFError, OSError):
+                    worker.end()
+                    deaths[order.name] += 1
+                    if deaths[order.name] <= settings.attempts:
+                        waiting.appendleft(order)  # whether it is to blame it knows itself, by the notes of attempts
+                    else:
+                        yield store_death(order, f"exit code: {worker.process.exitcode}", started)
+                else:
+                    idle.append(worker)
+                    yield outcome
+    finally:
+        for worker in (*idle, *(busy for busy, *_ in doing.values())):
+            worker.end()
+
+
+def _bytes_per_worker(settings: BatchSettings, count: int) -> float:
+    """Bytes of memory beyond which a worker is ended, before the system ends something else."""
+    if settings.memory_per_worker_gb:
+        return 1e9 * settings.memory_per_worker_gb
+    from distributed.system import MEMORY_LIMIT  # that of the container, where there is one; half a second to load
+
+    return float(SHARED * MEMORY_LIMIT / count)
+
+
+def _begun(by_value: bytes) -> _Worker:
+    """A new worker."""
+    here, there = SPAWN.Pipe()
+    process = SPAWN.Process(target=_work, args=(there, by_value), daemon=True)
+    with _inherited():
+        process.start()
+    there.close()  # the worker has its own; were this one open, its death would not end the pipe
+    return _Worker(process, here)
+
+
+@contextlib.contextmanager
+def _inherited() -> Iterator[None]:
+    """What a worker has from its first line on: one thread a library, and no Ctrl-C.
+
+    A terminal sends the interrupt to all processes of a command: the one in front ends the batch in order, and a worker
+    that took it too would say so at length.
+    """
+    unset = ONE_THREAD.keys() - os.environ.keys()
+    os.environ.update({name: ONE_THREAD[name] for name in unset})
+    masks = hasattr(signal, "pthread_sigmask")  # not on Windows
+    if masks:
+        resource_tracker.ensure_running()  # started by the first worker, it would unblock what is blocked here
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for name in unset:
+            del os.environ[name]
+
+
+def _work(pipe: Pipe, by_value: bytes) -> None:
+    """Measure what comes through the pipe, one after the other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    stages = pickle.loads(by_value)
+    with contextlib.suppress(EOFError, OSError):  # the parent closed its end
+        while True:
+            pipe.send(measure_order(pipe.recv(), stages))
+
+
+def _end_with_parent() -> None:
+    """End this process at once when the one that started it is gone: nobody would take the outcome."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,271 @@
+"""The row of a specimen in the index: a result in a few thousand bytes, stored in its ``entry.json``.
+
+`index_row` takes it from a result, `as_entry` and `from_entry` write and read it. What reads a batch as a whole (index,
+summary, mean of repeat specimens) reads rows alone: a result with its photos is a thousand times as large. SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pipeline.result import FindingPart, Result
+    from pipeline.settings.report import ReportSettings
+    from pipeline.visited import Visited
+
+Array = NDArray[np.float64]
+End = tuple[float, float, float]
+
+ROW = 1
+"""Version of what stands in an entry; another one is made anew from the result."""
+
+SHAPES, SHAPE_POINTS = 5, 11
+SHAPE_SIZE = (1100, 400)
+"""Of the picture of the shapes, in tenths of a px: whole numbers are short."""
+
+
+@dataclass(frozen=True)
+class RowCurve:
+    """The visited part of a characteristic on a few curvatures, equally spaced.
+
+    Attributes
+    ----------
+    kappa : (n,) 1/m
+    tangent, tangent_std : (n,) N m^2
+    factor : (n, r) N m^2
+        F with F F^T the covariance of the tangent; r = 0 where it is not known.
+    """
+
+    kappa: Array
+    tangent: Array
+    tangent_std: Array
+    factor: Array
+
+
+@dataclass(frozen=True)
+class IndexRow:
+    """What the index keeps of a specimen; SI units.
+
+    Attributes
+    ----------
+    id, type, status, verdict : str
+    causes : tuple of str
+        Named ones.
+    usable : bool
+    fault : str
+        Why it is not usable; empty if it is.
+    method : str
+        Which curve answers; empty without any.
+    low, high : (kappa, f_EI, std) or None
+        Ends of the visited range, 1/m and N m^2.
+    pre_curvature : (K0, std) or None
+        1/m.
+    rms_relative, compatible : float, bool or None
+        How far the two ways differ, and whether their bands allow it.
+    photos_used, photos_given, warnings, errors : int
+    worst, reason : str
+        Code and sentence of the worst finding; empty without warning or error.
+    shapes : str
+        SVG path of measured shapes in the chord frame, to one scale, bow downwards.
+    curve : RowCurve or None
+    report : str
+        Path of the report relative to the index; empty if there is none.
+    outlying : bool
+        Not usable because of the others of its type.
+    """
+
+    id: str
+    type: str
+    status: str
+    verdict: str
+    causes: tuple[str, ...]
+    usable: bool
+    fault: str
+    method: str
+    low: End | None
+    high: End | None
+    pre_curvature: tuple[float, float] | None
+    rms_relative: float | None
+    compatible: bool | None
+    photos_used: int
+    photos_given: int
+    warnings: int
+    errors: int
+    worst: str
+    reason: str
+    shapes: str
+    curve: RowCurve | None
+    report: str = ""
+    outlying: bool = False
+
+    @property
+    def state(self) -> str:
+        """What became of the specimen: its status, or ``unusable`` where numbers were measured that are not its own."""
+        return "unusable" if self.status != "failed" and self.method and not self.usable else self.status
+
+
+TEXTS = ("id", "type", "status", "verdict", "fault", "method", "worst", "reason", "shapes")
+COUNTS = ("photos_used", "photos_given", "warnings", "errors")
+STATUSES = ("measured", "partial", "failed")
+VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "underpowered")
+
+
+def index_row(result: Result, settings: ReportSettings) -> IndexRow:
+    """Row of one result, without its report."""
+    from pipeline.visited import answer, best
+
+    curve, told = best(result), answer(result)
+    worst = _worst(result.findings)
+    rest = (told.pre_curvature_per_m, told.pre_curvature_std_per_m)
+    return IndexRow(
+        id=result.specimen.id,
+        type=result.specimen.description.get("type", ""),
+        status=result.status,
+        verdict=result.diagnosis.verdict if result.diagnosis else "none",
+        causes=tuple(cause.name for cause in result.diagnosis.causes) if result.diagnosis else (),
+        usable=told.usable,
+        fault="" if told.usable else told.reason,
+        method=told.method or "",
+        low=None if curve is None else _end(curve, 0),
+        high=None if curve is None else _end(curve, -1),
+        pre_curvature=None if rest[0] is None or rest[1] is None else (rest[0], rest[1]),
+        rms_relative=result.agreement.rms_relative if result.agreement else None,
+        compatible=result.agreement.compatible if result.agreement else None,
+        photos_used=sum(photo.status == "traced" for photo in result.photos),
+        photos_given=len(result.photos),
+        warnings=sum(f.level == "warning" for f in result.findings),
+        errors=sum(f.level == "error" for f in result.findings),
+        worst="" if worst is None else worst.code,
+        reason="" if worst is None else worst.message,
+        shapes=_shapes(result),
+        curve=None if curve is None else _thinned(curve, settings.index_curve_points),
+    )
+
+
+def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
+    """The first error, else the first warning."""
+    levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
+    return levels["error"] or levels["warning"]
+
+
+def _end(curve: Visited, at: int) -> End:
+    return float(curve.kappa[at]), float(curve.tangent[at]), float(curve.tangent_std[at])
+
+
+def _thinned(curve: Visited, points: int) -> RowCurve:
+    """The curve on so many points."""
+    grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
+    columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
+    return RowCurve(
+        kappa=grid,
+        tangent=np.interp(grid, curve.kappa, curve.tangent),
+        tangent_std=np.interp(grid, curve.kappa, curve.tangent_std),
+        factor=np.column_stack([np.zeros((points, 0)), *columns]),
+    )
+
+
+def _shapes(result: Result) -> str:
+    """SVG path of some of the measured shapes, steps evenly chosen."""
+    traced = [photo for photo in result.photos if len(photo.x_m) > 1]
+    width = max((max(photo.x_m) for photo in traced), default=0.0)
+    if width <= 0.0:
+        return ""
+    scale = (SHAPE_SIZE[0] - 40) / width
+    parts = []
+    for place in sorted({round(i) for i in np.linspace(0, len(traced) - 1, min(SHAPES, len(traced)))}):
+        photo = traced[place]
+        at = np.linspace(0, len(photo.x_m) - 1, SHAPE_POINTS).round().astype(int)
+        points = np.column_stack([20 + scale * np.array(photo.x_m)[at], 40 + scale * np.array(photo.y_m)[at]])
+        points = np.clip(points, -9999, 9999).round().astype(int)
+        steps = np.diff(points, axis=0).ravel().tolist()
+        parts.append(f"M{points[0][0]} {points[0][1]}l{' '.join(map(str, steps))}")
+    return "".join(parts)
+
+
+def as_entry(row: IndexRow) -> dict[str, Any]:
+    """The row as plain values for ``entry.json``, without what is around it; nine digits, five of a covariance."""
+    plain = {name: value for name, value in asdict(row).items() if name not in ("curve", "report", "outlying")}
+    curve = row.curve
+    plain["curve"] = None if curve is None else {
+        "range": _digits([curve.kappa[0], curve.kappa[-1]], 9),
+        "tangent": _digits(curve.tangent, 9),
+        "tangent_std": _digits(curve.tangent_std, 9),
+        "factor": [_digits(column, 5) for column in curve.factor.T],
+    }  # fmt: skip
+    return {"version": ROW, **plain}
+
+
+def _digits(values: Iterable[float], digits: int) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in values]
+
+
+def from_entry(data: object) -> IndexRow:
+    """The row of an entry.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or one of another version.
+    """
+    if not isinstance(data, dict) or data.get("version") != ROW:
+        raise ValueError("no row of this version")
+    try:
+        row = IndexRow(
+            **{name: _typed(data[name], str) for name in TEXTS},
+            **{name: _typed(data[name], int) for name in COUNTS},
+            causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
+            usable=_typed(data["usable"], bool),
+            low=_end_of(data["low"]),
+            high=_end_of(data["high"]),
+            pre_curvature=None if data["pre_curvature"] is None else _numbers(data["pre_curvature"], 2),
+            rms_relative=None if data["rms_relative"] is None else _numbers([data["rms_relative"]], 1)[0],
+            compatible=None if data["compatible"] is None else _typed(data["compatible"], bool),
+            curve=None if data["curve"] is None else _curve(data["curve"]),
+        )
+    except (KeyError, TypeError, OverflowError) as error:
+        raise ValueError(f"no row: {error}") from error
+    if row.status not in STATUSES or row.verdict not in VERDICTS:
+        raise ValueError("no row: unknown status or verdict")
+    return row
+
+
+def _typed(value: Any, kind: type) -> Any:
+    """The value; `TypeError` if it is of another kind, which true and false are for numbers."""
+    if type(value) is not kind:
+        raise TypeError(f"{type(value).__name__} in place of {kind.__name__}")
+    return value.encode("utf-8", "replace").decode("utf-8") if isinstance(value, str) else value
+
+
+def _numbers(values: Any, count: int | None = None) -> tuple[Any, ...]:
+    """Finite numbers, so many of them."""
+    numbers = tuple(float(value) for value in values)
+    if (count is not None and len(numbers) != count) or not all(map(math.isfinite, numbers)):
+        raise ValueError("numbers that are not finite, or too few or many")
+    return numbers
+
+
+def _end_of(values: Any) -> End | None:
+    if values is None:
+        return None
+    kappa, tangent, std = _numbers(values, 3)
+    return kappa, tangent, std
+
+
+def _curve(data: Any) -> RowCurve:
+    tangent = np.array(_numbers(data["tangent"]))
+    (low, high), count = _numbers(data["range"], 2), tangent.size
+    if count < 2 or not low < high:
+        raise ValueError("a curve of nothing")
+    factor = [np.array(_numbers(column, count)) for column in data["factor"]]
+    return RowCurve(
+        kappa=np.linspace(low, high, count),
+        tangent=tangent,
+        tangent_std=np.array(_numbers(data["tangent_std"], count)),
+        factor=np.column_stack([np.zeros((count, 0)), *factor]),
+    )

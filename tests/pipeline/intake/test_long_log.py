@@ -1,0 +1,114 @@
+"""Long and wide force logs take time and memory in proportion to their length."""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.intake.columns import find_columns
+from pipeline.intake.forcelog import read_force_log
+from pipeline.intake.holds import Run, _hold
+from pipeline.intake.samples import Samples, _without_summary
+from pipeline.intake.specimenfile import LogSpec
+from pipeline.settings.intake import IntakeSettings
+
+SETTINGS = IntakeSettings()
+HEAD = "step,branch,time_s,displacement_mm,force_N,image\n"
+FOUR = 8.0
+"""Ratio of the times for four times the work: 4 where it is linear, 16 where it is quadratic; half-way between."""
+
+
+def spent(work, *arguments):
+    """Processor time of the quickest of three calls, s."""
+    taken = []
+    for _ in range(3):
+        started = time.process_time()
+        work(*arguments)
+        taken.append(time.process_time() - started)
+    return min(taken)
+
+
+def test_summary_rows_are_looked_for_once(tmp_path):
+    columns, _ = find_columns(HEAD + "0,loading,0,0,0,\n", LogSpec(), path=tmp_path, settings=SETTINGS)
+
+    def rows(count):
+        return [(k, ["0", "loading", "1", "2", "3", ""]) for k in range(count)]
+
+    short, long = rows(15_000), rows(60_000)
+    assert spent(_without_summary, long, columns) < FOUR * spent(_without_summary, short, columns)
+
+
+def test_rows_of_means_below_a_table_are_told_from_those_within(tmp_path):
+    columns, _ = find_columns(HEAD + "0,loading,0,0,0,\n", LogSpec(), path=tmp_path, settings=SETTINGS)
+    sample, mean, remark = (
+        ["0", "loading", "1", "2", "3", ""],
+        ["mean", "", "", "1", "2", ""],
+        ["", "", "", "", "x", ""],
+    )
+    data = [(line, cells) for line, cells in enumerate([sample, mean, sample, sample, remark, mean, mean], 1)]
+    kept, summary = _without_summary(data, columns)
+    assert [line for line, _ in kept] == [1, 2, 3, 4]
+    assert [line for line, _ in summary] == [5, 6, 7]
+    assert _without_summary(data[5:], columns) == (data[5:], [])  # nothing else is there: refused cell by cell
+
+
+@pytest.mark.parametrize("cell", ["[", "(", "( ", "[(", "/ ", "in ", "a[", "_", "_ "])
+def test_a_header_of_brackets_takes_time_in_proportion(cell, tmp_path):
+    def read(count):
+        text = f"force_N;displacement_mm;{cell * count}x\n1;2;3\n"
+        find_columns(text, LogSpec(), path=tmp_path, settings=SETTINGS)
+
+    assert spent(read, 16_000) < FOUR * spent(read, 4_000)
+
+
+def test_a_line_of_separators_alone_is_no_table_of_a_million_columns(tmp_path):
+    def read(count):
+        find_columns("a," * count + "\n" + HEAD + "0,loading,0,0,0,\n", LogSpec(), path=tmp_path, settings=SETTINGS)
+
+    assert spent(read, 40_000) < FOUR * spent(read, 10_000)
+    columns, rows = find_columns("a," * 10**5 + "\n" + HEAD, LogSpec(), path=tmp_path, settings=SETTINGS)
+    assert columns.header_line == 2
+    assert len(rows[0][1]) == 1001
+
+
+def test_more_steps_than_anybody_holds_are_refused(tmp_path):
+    path = tmp_path / "force.csv"
+    path.write_text("step,displacement_mm,force_N\n" + "".join(f"{k},{k},{k % 7}\n" for k in range(1, 12_000)))
+    with pytest.raises(InputError, match=r"holds 11999 steps, the limit is 10000; give all rows of one hold the same"):
+        read_force_log(path, LogSpec(), SETTINGS)
+
+
+def test_a_hold_without_times_keeps_its_own_numbers_alone():
+    """Each step kept the numbers of all samples: 50,000 steps of one row took 19 GB."""
+    lines, forces = tuple(range(1000)), np.ones(1000)
+    samples = Samples(lines, forces, forces, None, None, None, ("",) * 1000, 0.1, ())
+    times = _hold(samples, forces, Run(5, 8, 0)).times
+    assert list(times) == [5.0, 6.0, 7.0]
+    assert times.base is None or times.base.size == 3
+
+
+def test_zeros_with_an_absurd_power_of_ten_are_zeros(specimen_folder):
+    log = "step,displacement_mm,force_N,image\n0,0,0e999,step_0.png\n1,4,2e0,step_1.png\n2,8,3e0,step_2.png\n"
+    assert specimen_folder(log=log).read().steps[0].force_N == 0.0
+    path = specimen_folder(log="displacement_mm,force_N\n0,0e999\n4,0e999\n", name="zeros").path / "force.csv"
+    with pytest.raises(InputError):  # stands still, as a log of zeros does
+        read_force_log(path, LogSpec(), SETTINGS)
+
+
+def test_wild_forces_within_wild_forces_end(tmp_path):
+    """Each that is left out lowers the largest median, by which the next is wild: a chain as long as the log."""
+    level = [100.0 - 0.5 * k for k in range(60)]
+    wild = [300.0, *(here + (here + above) / 2.0 for above, here in pairwise(level))]
+    rows = [f"{k},{k},{force:.3f}" for k in range(60) for force in (0.0, 0.0, level[k], level[k], wild[k])]
+    path = tmp_path / "force.csv"
+    path.write_text("step,displacement_mm,force_N\n" + "\n".join(rows) + "\n")
+    log = read_force_log(path, LogSpec(), SETTINGS)
+    assert sum(finding.code == "log/wild-force" for finding in log.findings) == 10
+
+
+def test_a_complaint_about_a_long_header_is_short(tmp_path):
+    with pytest.raises(InputError) as refused:
+        find_columns("step," + "[" * 16_000 + "\n1,2\n", LogSpec(), path=tmp_path, settings=SETTINGS)
+    assert len(refused.value.message) < 500

@@ -1,0 +1,135 @@
+"""Whether an answer may be used: decided once, from findings and values, and heeded wherever results meet."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.compare import compare
+from pipeline.predict import predict
+from pipeline.report.answer import answer as first_screen
+from pipeline.report.frames import characteristic_frame
+from pipeline.report.words import Words
+from pipeline.result import FindingPart, ForceCorrectionPart, Result, SpecimenPart, from_json, to_json
+from pipeline.settings import ReportSettings
+from pipeline.visited import answer, decided
+from tests.pipeline.report.virtual_diagnosis import diagnosis_of
+from tests.pipeline.report.virtual_result import measured_result
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return measured_result()
+
+
+def found(result, code, level="warning"):
+    finding = FindingPart(code=code, level=level, message="the forces seem to be 1000 times too large")
+    return result.model_copy(update={"findings": [finding], "answer": None})
+
+
+def test_the_answer_says_which_curve_it_is_and_why(measured):
+    told = decided(measured)
+    assert (told.method, told.usable) == ("inverse", True)
+    assert told.pre_curvature_per_m == measured.inverse.pre_curvature_per_m
+    extended = measured.model_copy(update={"diagnosis": diagnosis_of("named", measured.photos)})
+    assert decided(extended).method == "extended"
+    assert decided(extended).reason != told.reason
+
+
+@pytest.mark.parametrize(
+    ("code", "level", "usable"),
+    [
+        ("size/force", "error", False),
+        ("size/force", "warning", False),
+        ("force/unit", "warning", False),
+        ("identify/force-sign", "warning", False),
+        ("force/sign", "warning", False),
+        ("force/factor", "error", True),  # corrected, and the bands know by what
+        ("force/dead", "warning", True),  # left out
+        ("photo/other-step", "warning", True),
+        ("diameter/seen", "error", True),
+        ("identify/misfit-shape", "warning", True),
+    ],
+)
+def test_faults_that_make_the_numbers_none_of_the_cable(measured, code, level, usable):
+    told = decided(found(measured, code, level))
+    assert told.usable == usable
+    assert ("1000 times" in told.reason) == (not usable)
+
+
+def test_a_sign_turned_midway_is_corrected_and_no_fault(measured):
+    correction = ForceCorrectionPart(steps=[5, 6], factor=-1.0, offset_N=0.0)
+    diagnosis = diagnosis_of("adequate", measured.photos).model_copy(update={"corrected_forces": [correction]})
+    assert decided(found(measured, "force/sign").model_copy(update={"diagnosis": diagnosis})).usable
+
+
+def test_photos_of_something_else(measured):
+    longer = [p.model_copy(update={"traced_length_m": 1.2 * p.traced_length_m}) for p in measured.photos]
+    told = decided(measured.model_copy(update={"photos": longer}))
+    assert not told.usable and "another cable" in told.reason
+    reversed_ = [p.model_copy(update={"chord_m": 0.18 + s.displacement_m}) for p, s in _with_steps(measured)]
+    told = decided(measured.model_copy(update={"photos": reversed_}))
+    assert not told.usable and "another test" in told.reason
+
+
+def _with_steps(result):
+    steps = {step.step: step for step in result.steps}
+    return [(photo, steps[photo.step]) for photo in result.photos]
+
+
+def test_a_stiffness_that_is_negative(measured):
+    curve = measured.inverse.curve
+    curve = curve.model_copy(update={"tangent_Nm2": [-v for v in curve.tangent_Nm2]})
+    told = decided(measured.model_copy(update={"inverse": measured.inverse.model_copy(update={"curve": curve})}))
+    assert not told.usable and "sign of the forces" in told.reason
+
+
+def test_without_a_curve_there_is_no_answer_and_its_reason_is_the_error():
+    message = "force.csv: the log is empty."
+    finding = FindingPart(code="log/empty", level="error", message=message)
+    told = decided(Result(status="failed", specimen=SpecimenPart(id="a", folder="a"), findings=[finding]))
+    assert (told.method, told.usable, told.reason) == (None, False, message)
+
+
+def test_what_is_stored_counts(measured):
+    stored = from_json(to_json(measured.model_copy(update={"answer": decided(found(measured, "size/force"))})))
+    assert not answer(stored).usable
+    assert answer(measured).usable
+
+
+@pytest.mark.parametrize(("language", "said"), [("en", "not usable"), ("de", "nicht verwendbar")])
+def test_the_first_sentence_of_the_report_says_so(measured, language, said):
+    wrong = found(measured, "size/force", "error")
+    words = Words(language)
+    assert said in first_screen(wrong, words, ReportSettings()).sentence.split(". ")[0]
+    assert said not in first_screen(measured, words, ReportSettings()).sentence
+
+
+def test_no_comparison_holds_it(measured):
+    wrong = found(measured, "size/force", "error")
+    for pair in ((measured, wrong), (wrong, measured)):
+        comparison = compare(*pair)
+        assert comparison.verdict == "not comparable"
+        assert "not usable: the forces seem to be 1000 times too large" in comparison.statement
+
+
+def test_a_prediction_with_it_says_so(measured):
+    findings = predict(found(measured, "size/force", "error"), [0.004]).findings
+    assert [f.level for f in findings if f.code == "predict/unusable"] == ["error"]
+    assert not [f for f in predict(measured, [0.004]).findings if f.code == "predict/unusable"]
+
+
+def test_one_curve_of_the_table_is_the_answer(measured):
+    for verdict, method in (("adequate", "inverse"), ("named", "extended")):
+        result = measured.model_copy(update={"diagnosis": diagnosis_of(verdict, measured.photos)})
+        table = characteristic_frame(result)
+        assert set(table[table.answer == 1].method) == {method}
+        assert np.isin(table.answer, (0, 1)).all() and (table.answer == 0).any()
+
+
+def test_fields_that_nobody_knows_are_passed_over(measured):
+    document = json.loads(to_json(measured))
+    document["tomorrow"] = {"a": [1, None]}
+    document["inverse"]["curve"]["tomorrow"] = [1.0]
+    document["photos"][0]["tomorrow"] = "x"
+    assert from_json(json.dumps(document)) == measured
