@@ -113,11 +113,6 @@ class Rod:
         return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
 
     @cached_property
-    def inverse_weights(self) -> Array:
-        """1 / `weights`, (n + 1,) 1/m."""
-        return np.asarray(1.0 / self.weights)
-
-    @cached_property
     def joints(self) -> Array:
         """Arc length from the left axis of axis, joints, axis, (n + 3,) m."""
         return np.concatenate(([0.0], np.cumsum(self.edges)))

@@ -1,7 +1,7 @@
 """Equilibrium of the discrete rod: from rod and imposed end to the shape of least energy, its reactions and an outcome.
 
-Newton's method on the reduced system of `rod.reduction`, with proof of the minimum by inertia; where a whole step is
-too far, along a path of minima (`rod.newton`). Which side the cable bows to is chosen by ``branch`` (`rod.branch`). A
+Newton's method on the reduced system of `rod.reduction` from a warm start, with proof of the minimum by inertia;
+otherwise along the path of equilibria from the force-free shape (`rod.path`). Which side the cable bows to is chosen by ``branch`` (`rod.branch`). A
 fit whose K0 may change sign wants ``up``, the side the photo shows.
 
 The result says in `Outcome` how far to trust it. Nothing raises for a shape that does not exist: that is nature's
@@ -24,11 +24,16 @@ from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.energy import Potential
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
-from rod.path import TURN_LIMIT, followed
+from rod.path import PATH_STEPS, followed
 from rod.reduction import Hold, System
 from rod.section import Memory, Section
 
 __all__ = ["Branch", "Equilibrium", "Outcome", "Start", "solve"]
+
+#: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
+NEAR = 0.8
+#: Newton steps on a path that is not followed patiently: enough for one that leads to a chord at once.
+HASTY = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +123,7 @@ def solve(
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see `rod.branch`.
     patient : bool
-        Else, with a warm start, no path is followed where neither that nor the force-free shape leads to the
-        equilibrium at once: most often there is none then, and to follow a path to its end costs fifty equilibria.
+        Else no path is followed to its end where a cable lacks an equilibrium, which costs fifty equilibria.
 
     Returns
     -------
@@ -130,55 +134,39 @@ def solve(
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
     first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, first, branch, patient=patient):
+    for attempt in _attempts(system, first, branch, most=PATH_STEPS if patient else HASTY):
         verdicts.append(attempt)
         if attempt.found:
             break
-    last = verdicts[-1]
+    last, steps = verdicts[-1], sum(trial.steps for trial in verdicts)
     falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
     if not last.found and falling:  # rather the state that has what was asked for, but for a moment that falls
-        met = next((trial for trial in falling if trial.negatives is not None), last)
-        last = met._replace(outcome=Outcome.LIMIT_POINT)
-    found = _record(system, last, sum(trial.steps for trial in verdicts))
-    if first is None or branch != "natural" or not patient or abs(rod.turn) < np.pi:
-        return found
-    # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
-    other = solve(rod, hold, memory=memory)
-    return other if other.good and not (found.good and found.energy <= other.energy) else found
+        last = next((trial for trial in falling if trial.negatives is not None), falling[-1])
+    return _record(system, last, steps)
 
 
-def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
-    """Ways to the equilibrium, the nearest first: warm start, path from it, path from the force-free shape, others."""
+def _attempts(system: System, first: Start | None, branch: Branch, *, most: int) -> Iterator[Trial]:
+    """Ways to the equilibrium: the warm start, the path from the force-free shape, that from the start, others."""
     rod = system.rod
     side = bow_side(rod, branch)
-    mounted = Start(rod.mounted.angles, np.zeros(2))
-    if first is not None:
-        # Where only the path can tell the side, a warm start keeps the one it has.
-        kept = side or int(np.sign(bow(rod, first.angles)))
+    # Where only the path can tell the side, a warm start keeps the one it has.
+    kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
+    # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
+    if first is not None and (branch != "natural" or abs(rod.turn) < np.pi):
         warm = newton(system, first)
-        near = float(np.abs(warm.angles - first.angles).max()) < TURN_LIMIT
-        verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
-        yield verdict
-        if warm.found and verdict.outcome is Outcome.LIMIT_POINT:
-            # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
-            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length) if warm.negatives else []:
-                yield judged(system, descended(system, beside), kept)
-            return
-        if not patient:
-            yield judged(system, newton(system, mounted), side)
-            return
-        verdict = judged(system, followed(system, first, side=side), kept)
-        yield verdict
-        if verdict.outcome is Outcome.LIMIT_POINT:
-            return
-    lost = judged(system, followed(system, side=side or 1), side if branch in ("up", "down", "opposite") else 0)
+        near = float(np.abs(warm.angles - first.angles).max()) < NEAR
+        yield judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
+    lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
-    if branch == "natural" or lost.outcome is Outcome.LIMIT_POINT:
-        return
-    if branch != "jump":
+    if first is not None:
+        yield judged(system, followed(system, first, side=side or 1, most=most), kept)
+    if branch == "jump":
+        for beside in tilted(system, lost):
+            yield judged(system, descended(system, beside), side)
+    elif branch != "natural" and most == PATH_STEPS:
         yield judged(system, _from_straight(system, side), side)
-    for beside in tilted(system, lost):
-        yield judged(system, descended(system, beside), side)
+        for beside in tilted(system, lost):
+            yield judged(system, descended(system, beside), side)
 
 
 def _from_straight(system: System, side: int) -> Trial:

@@ -143,7 +143,8 @@ def descended(system: System, start: Start) -> Trial:
     The Hessian is shifted until it is positive on all motions that the supports allow; the larger the shift, the
     shorter the step along the flow. Near a minimum no shift is needed and a step is Newton's.
     """
-    angles, R, mass = start.angles, system.hold.reaction(start.reaction), system.mass
+    angles, R = start.angles, system.hold.reaction(start.reaction)
+    mass = system.moment_scale * system.mass
     shift = 1.0
     for count in range(1, DESCENT_STEPS + 1):
         balance = system.balance(angles, R)
@@ -170,11 +171,11 @@ def softest(system: System, balance: Balance, mode: Array | None = None) -> tupl
 
     The mode has the root mean square 1 rad over the length.
     """
-    mass = system.mass / system.moment_scale
+    mass = system.mass
     mode = np.random.default_rng(0).standard_normal(mass.size) if mode is None else mode
     stiffness = np.inf
     for _ in range(12):
-        turn = system.solve(balance, (system.mass * mode)[:, None], np.zeros((2, 1)))[0][:, 0]
+        turn = system.solve(balance, (system.moment_scale * mass * mode)[:, None], np.zeros((2, 1)))[0][:, 0]
         before, stiffness = stiffness, float(mass @ (mode * mode) / (mass @ (mode * turn)))
         mode = turn / np.sqrt(mass @ (turn * turn))
         if abs(stiffness - before) <= 1e-4 * abs(stiffness):

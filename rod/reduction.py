@@ -21,15 +21,14 @@ Signs and units as in `rod.discretisation`; P = -R_x is the force along the chor
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import idamax
-from scipy.linalg.lapack import dgesv, dgtsv, dpttrf, dstebz
+from scipy.linalg.lapack import dgesv, dgtsv, dpttrf, dstebz, dsyev
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -120,17 +119,6 @@ class EdgeState(NamedTuple):
     across: Array
 
 
-class _End(NamedTuple):
-    """An end: its place among the angles, what holds it, its angles, the memory of friction, the sign of a moment."""
-
-    place: int
-    support: Support
-    mounted: float
-    rest: float
-    slip: float
-    sign: float
-
-
 class System:
     """Residuals and Newton steps of one rod, hold and memory; built once per equilibrium, immutable afterwards."""
 
@@ -139,12 +127,11 @@ class System:
         self.moment_scale = rod.stiffness_scale / rod.length
         self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
-        self._inverse_weights = rod.inverse_weights
+        self._inverse_weights, self._load_beyond = 1.0 / rod.weights, rod.load_beyond
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
-        self._ends = self._acting_ends()
         self._equal_softness = self._axial * rod.length * np.eye(2)
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
@@ -152,13 +139,21 @@ class System:
 
     @cached_property
     def mass(self) -> Array:
-        """Weight of every angle (n + 2,) N m in sums of squares of turns: its share of the length, times EI/L.
+        """Weight of every angle (n + 2,) in sums of squares of turns: its share of the length.
 
         A bearing without a rigid piece turns with half an element: without a weight it could not be held.
         """
         share = np.array(self.rod.edges)
         share[[0, -1]] = np.maximum(share[[0, -1]], self.rod.weights[[0, -1]])
-        return np.asarray(share * (self.moment_scale / self.rod.length))
+        return np.asarray(share / self.rod.length)
+
+    def under(self, share: float) -> System:
+        """The same system with a share of its dead load."""
+        if self._load_beyond is None or share == 1.0:
+            return self
+        other = copy(self)
+        other._load_beyond = share * self._load_beyond
+        return other
 
     def misfit(self, balance: Balance) -> float:
         """Largest residual, relative to EI/L and L."""
@@ -170,18 +165,14 @@ class System:
         """Moment and tangent (n,) of the cross-section at curvatures (n,), with the memory at the start of the step."""
         return self._response(K)
 
-    def edge_state(self, angles: Array, R: Array, share: float = 1.0) -> EdgeState:
+    def edge_state(self, angles: Array, R: Array) -> EdgeState:
         """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
         cos, sin = np.cos(angles), np.sin(angles)
-        beyond = self.rod.load_beyond
-        fx, fy = R.tolist() if beyond is None else R[:, None] + share * beyond
+        fx, fy = R.tolist() if self._load_beyond is None else R[:, None] + self._load_beyond
         return EdgeState(cos, sin, fx * cos + fy * sin, fy * cos - fx * sin)
 
-    def balance(self, angles: Array, R: Array, share: float = 1.0) -> Balance:
-        """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,).
-
-        Of loads, end moments, clamps turned and the chord's change from the mounted one, ``share`` is acting.
-        """
+    def balance(self, angles: Array, R: Array) -> Balance:
+        """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
         h = self.rod.edges
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
@@ -189,10 +180,10 @@ class System:
             border = np.empty((2, h.size))
             np.multiply(h, np.sin(angles), out=border[0])
             np.multiply(-h, np.cos(angles), out=border[1])
-            gradient, diagonal, gap = self._rigid(border, R, share)
+            gradient, diagonal, gap = self._rigid(border, R)
             softness = self._equal_softness
         else:
-            edge = self.edge_state(angles, R, share)
+            edge = self.edge_state(angles, R)
             gradient, diagonal = -h * self.turning(edge), h * self._restoring(edge)
             border, gap, softness = self.border(edge), -(self.directions(edge) @ h), self._softness(edge)
         gradient[:-1] += m
@@ -200,24 +191,18 @@ class System:
         off = -tangent * self._inverse_weights
         diagonal[:-1] -= off
         diagonal[1:] -= off
-        if (chord := self.hold.chord) is not None:
-            chord = chord if share == 1.0 else chord + (share - 1.0) * (chord - self.rod.mounted.chord)
-            gap[0] += chord - self.hold.compliance * R[0]
-        else:
-            gap[0] = 0.0
+        gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
         gap[1] *= self.hold.tip is None
-        for end in self._ends:
-            self._hold_end(end, share, angles, gradient, diagonal, off, border)
+        self._hold_ends(angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, softness, gap, K, m, tangent)
 
-    def _rigid(self, border: Array, R: Array, share: float) -> tuple[Array, Array, Array]:
+    def _rigid(self, border: Array, R: Array) -> tuple[Array, Array, Array]:
         """Turning moments and their slopes (n + 2,), and minus the extent of the chain (2,), for EA = GA."""
         gap = np.array((border[1].sum(), -border[0].sum())) - self._axial * self.rod.length * R
-        beyond = self.rod.load_beyond
-        if beyond is None:
+        if self._load_beyond is None:
             return R @ border, R[1] * border[0] - R[0] * border[1], gap
-        force = R[:, None] + share * beyond
-        gap -= self._axial * share * (beyond @ self.rod.edges)
+        force = R[:, None] + self._load_beyond
+        gap -= self._axial * (self._load_beyond @ self.rod.edges)
         return (force * border).sum(axis=0), force[1] * border[0] - force[0] * border[1], gap
 
     def directions(self, edge: EdgeState) -> Array:
@@ -254,42 +239,35 @@ class System:
     def _restoring(self, edge: EdgeState) -> Array:
         return edge.along + (edge.along**2 - edge.across**2) * self._difference
 
-    def _acting_ends(self) -> list[_End]:
-        """Ends where a clamp, a spring, friction or a moment acts; ideal bearings and free ends are left out."""
-        rod, memory, rest, mounted = self.rod, self.memory, self.rod.rest_angles, self.rod.mounted.angles
-        ends = (
-            _End(0, rod.left, float(mounted[0]), rest[0], memory.left_angle, -1.0),
-            _End(-1, rod.right, float(mounted[-1]), rest[1], memory.right_angle, 1.0),
-        )
-        return [
-            end
-            for end in ends
-            if end.support.kind == "clamp" or end.support.stiffness or end.support.friction_moment or end.support.moment
-        ]
+    def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
+        """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
+        for end, support, rest_angle, slip, sign in self._ends:
+            if support.kind == "clamp":
+                gradient[end] = self.moment_scale * (angles[end] - rest_angle)
+                diagonal[end], off[end], border[:, end] = self.moment_scale, 0.0, 0.0
+            else:
+                moment, slope = support.moment_at(float(angles[end]), rest_angle, slip)
+                gradient[end] += moment + sign * support.moment
+                diagonal[end] += slope
 
-    def _hold_end(
-        self, end: _End, share: float, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array
-    ) -> None:
-        """Spring, friction and moment on an end angle; a clamped angle keeps its value."""
-        at, support = end.place, end.support
-        rest = end.mounted + share * (end.rest - end.mounted)
-        if support.kind == "clamp":
-            gradient[at] = self.moment_scale * (angles[at] - rest)
-            diagonal[at], off[at], border[:, at] = self.moment_scale, 0.0, 0.0
-            return
-        moment, slope = support.moment_at(float(angles[at]), rest, end.slip)
-        gradient[at] += moment + share * end.sign * support.moment
-        diagonal[at] += slope
+    @cached_property
+    def _ends(self) -> list[tuple[int, Support, float, float, float]]:
+        """Ends where a clamp, a spring, friction or a moment acts: place, support, its angles, sign of its moment."""
+        rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
+        ends = (0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0)
+        return [e for e in ends if e[1].kind == "clamp" or e[1].stiffness or e[1].friction_moment or e[1].moment]
 
-    def clamps_turning(self, angles: Array, R: Array, tangent: Array) -> tuple[Array, Array]:
-        """Change of gradient (n + 2,) and gap (2,) per share by clamps that turn; the Hessian holds them at rest."""
+    def clamps_turning(self, here: Balance, angles: Array, R: Array, residual: Array) -> tuple[Array, Array]:
+        """Change of gradient (n + 2,) and gap (2,) while clamps turn by what they lack in ``residual`` (n + 2,) N m.
+
+        The Hessian of ``here`` holds them at rest.
+        """
         gradient, gap = np.zeros(angles.size), np.zeros(2)
-        for end in self._ends:
-            turn = end.rest - end.mounted
-            if end.support.kind == "clamp" and turn:
-                near, joint = (1, 0) if end.place == 0 else (-2, -1)
-                gradient[near] -= tangent[joint] * self._inverse_weights[joint] * turn
-                gap += self.border(self.edge_state(angles, R))[:, end.place] * turn
+        for end, support, *_ in self._ends:
+            if support.kind == "clamp" and (turn := -residual[end] / self.moment_scale):
+                near, joint = (1, 0) if end == 0 else (-2, -1)
+                gradient[near] -= here.tangent[joint] * self._inverse_weights[joint] * turn
+                gap += self.border(self.edge_state(angles, R))[:, end] * turn
         return gradient, gap
 
     def solve(self, balance: Balance, rhs: Array, gap: Array) -> tuple[Array, Array]:
@@ -342,35 +320,14 @@ class System:
 
     def negatives(self, made: Elimination) -> int:
         """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
-        low = negative_roots(made.schur)
-        return 1 if low is None else negative_pivots(made.diagonal, made.off) + low - len(self._imposed)
+        if not np.isfinite(made.schur[0, 0]):  # solved by a singular matrix: all or nothing is finite
+            return 1
+        low = int(np.count_nonzero(dsyev(made.schur, compute_v=0)[0] < 0.0))
+        return negative_pivots(made.diagonal, made.off) + low - len(self._imposed)
 
     def excess_negatives(self, balance: Balance) -> int:
         """As `negatives`, for a state that was not solved for."""
         return self.negatives(self.eliminated(balance, np.zeros((balance.gradient.size, 0))))
-
-
-def negative_roots(matrix: Array) -> int | None:
-    """Number of negative eigenvalues of a symmetric matrix of 1 to 3 rows; None if it is not finite.
-
-    All eigenvalues are real, so Descartes' rule of signs is exact: they are as many as the coefficients of the
-    characteristic polynomial at -lambda change their sign.
-    """
-    rows: list[list[float]] = matrix.tolist()
-    coefficients: tuple[float, ...]
-    if len(rows) == 1:
-        return int(rows[0][0] < 0.0) if isfinite(rows[0][0]) else None
-    (a, b, *c), (_, d, *e), *f = rows
-    if not f:
-        coefficients = (1.0, a + d, a * d - b * b)
-    else:
-        p, q, r = c[0], e[0], f[0][2]
-        minors = a * d - b * b, a * r - p * p, d * r - q * q
-        coefficients = (1.0, a + d + r, sum(minors), a * minors[2] - b * (b * r - p * q) + p * (b * q - d * p))
-    if not isfinite(coefficients[-1]):
-        return None
-    signs = [value > 0.0 for value in coefficients if value != 0.0]
-    return sum(left is not right for left, right in pairwise(signs))
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
