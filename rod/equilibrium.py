@@ -134,7 +134,7 @@ def solve(
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
     first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, first, branch, most=PATH_STEPS if patient else HASTY):
+    for attempt in _attempts(system, first, branch, patient=patient):
         verdicts.append(attempt)
         if attempt.found:
             break
@@ -145,9 +145,9 @@ def solve(
     return _record(system, last, steps)
 
 
-def _attempts(system: System, first: Start | None, branch: Branch, *, most: int) -> Iterator[Trial]:
+def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
     """Ways to the equilibrium: the warm start, the path from the force-free shape, that from the start, others."""
-    rod = system.rod
+    rod, most = system.rod, PATH_STEPS if patient else HASTY
     side = bow_side(rod, branch)
     # Where only the path can tell the side, a warm start keeps the one it has.
     kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
@@ -155,18 +155,22 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, most: int)
     if first is not None and (branch != "natural" or abs(rod.turn) < np.pi):
         warm = newton(system, first)
         near = float(np.abs(warm.angles - first.angles).max()) < NEAR
-        yield judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
+        verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
+        yield verdict
+        if patient and warm.negatives and verdict.outcome is Outcome.LIMIT_POINT:
+            # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
+            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
+                yield judged(system, descended(system, beside), kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
     if first is not None:
         yield judged(system, followed(system, first, side=side or 1, most=most), kept)
-    if branch == "jump":
-        for beside in tilted(system, lost):
-            yield judged(system, descended(system, beside), side)
-    elif branch != "natural" and most == PATH_STEPS:
+    if branch == "natural" or not patient:
+        return
+    if branch != "jump":
         yield judged(system, _from_straight(system, side), side)
-        for beside in tilted(system, lost):
-            yield judged(system, descended(system, beside), side)
+    for beside in tilted(system, lost):
+        yield judged(system, descended(system, beside), side)
 
 
 def _from_straight(system: System, side: int) -> Trial:

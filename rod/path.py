@@ -33,6 +33,8 @@ from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, root mean square of the turns of the edges, rad.
 LONGEST, SHORTEST = 0.5, 1e-5
+#: Steps shorter than this are no use where the moment falls ahead: the bend localises in one joint.
+FALLING = 1e-2
 #: Largest turn of an edge in one step of Newton's method, rad.
 TURN_LIMIT = 1.6
 #: How far a state may lie beside the tangent, relative to the step: a path bends, but another path is farther away.
@@ -145,6 +147,10 @@ class Ramp:
         mass = self.system.mass
         return there if mass @ off**2 < OFF**2 * (mass @ planned**2) + 0.01**2 else None
 
+    def falls_between(self, here: Point, there: Point) -> bool:
+        """Whether the moment of some joint falls half-way between two states."""
+        return bool(np.any(self.system.section(0.5 * (here.balance.K + there.balance.K))[1] <= 0.0))
+
     def negatives(self, point: Point) -> int:
         """Number of directions in which the state is unstable."""
         return self.system.excess_negatives(point.balance)
@@ -163,7 +169,7 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
     ramp = Ramp(system, start)
     here, length, leaps = ramp.begin, LONGEST, True
     way = ramp.tangent(here)
-    while ramp.steps < most and length > SHORTEST and way[-1] > 0.0:
+    while ramp.steps < most and way[-1] > 0.0 and length > (FALLING if _falls(ramp, here, way) else SHORTEST):
         there = _leap(ramp, here, way) if leaps else None
         leaps = False
         if there is None:
@@ -172,7 +178,7 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
             goal = here.state + length * way
             goal[-1] = 1.0 if last else goal[-1]
             there = ramp.reached(here, goal, ramp.along_share if last else way)
-        if there is None or there.share > 1.0:
+        if there is None or there.share > 1.0 or ramp.falls_between(here, there):
             length *= 0.5
             continue
         if ramp.negatives(there):
@@ -193,9 +199,13 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
 
 
 def _lost(ramp: Ramp, here: Point, way: Array, outcome: Outcome) -> Trial:
-    """The last stable state; where the moment falls a step ahead that is the reason, and all else follows from it."""
-    ahead = ramp.at(here.state + LONGEST * way)
-    return ramp.ended(here, Outcome.LIMIT_POINT if np.any(ahead.balance.tangent <= 0.0) else outcome)
+    """The last stable state; where the moment falls ahead that is the reason, and all else follows from it."""
+    return ramp.ended(here, Outcome.LIMIT_POINT if _falls(ramp, here, way) else outcome)
+
+
+def _falls(ramp: Ramp, here: Point, way: Array) -> bool:
+    """Whether the moment falls with curvature in some joint within a long step ahead."""
+    return bool(np.any(ramp.at(here.state + LONGEST * way).balance.tangent <= 0.0))
 
 
 def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:

@@ -31,15 +31,15 @@ def test_states_along_the_path_are_equilibria_and_their_rate_is_that_of_neighbou
     for _ in range(3):
         way = ramp.tangent(point, way)
         assert ramp.product(way, way, point.R) == pytest.approx(1.0)
-        found, _ = ramp.corrected(ramp.moved(point, way, 0.05), way)
-        assert found is not None
-        point = found
+        point = ramp.corrected(point.state + 0.05 * way, way)
+        assert point is not None
     assert point.share > 0.0
-    near, _ = ramp.corrected(ramp.moved(point, ramp.tangent(point, way), 1e-5), ramp.tangent(point, way))
-    rate = ramp.solve(point)[1]
+    way = ramp.tangent(point, way)
+    near = ramp.corrected(point.state + 1e-5 * way, way)
     by = near.share - point.share
-    assert np.allclose((near.angles - point.angles) / by, rate.angles, rtol=1e-3, atol=1e-3 * np.abs(rate.angles).max())
-    assert np.allclose((near.R - point.R) / by, rate.R, rtol=1e-3, atol=1e-3 * np.abs(rate.R).max())
+    quotient, rate = (near.state - point.state) / by, ramp.solve(point)[1]
+    for part in (slice(-3), slice(-3, -1)):
+        assert np.allclose(quotient[part], rate[part], rtol=1e-3, atol=1e-3 * np.abs(rate[part]).max())
     end = followed(ramp.system)
     assert end.outcome is Outcome.CONVERGED
     # the whole share is what was asked for: the same as without a path, from the end itself
@@ -55,9 +55,9 @@ def test_softest_stiffness_vanishes_at_the_critical_load(case):
     values = []
     for share in (0.5, 0.9, 1.1):
         R = np.array([-share * factor * EULER, 0.0])
-        stiffness, mode = softest(ramp.system, ramp.balance(np.zeros(test.rod.edges.size), R, share))
+        stiffness, mode = softest(ramp.system, ramp.at(np.r_[np.zeros(test.rod.edges.size), R, share]).balance)
         values.append(stiffness)
-        assert ramp.mass @ mode**2 == pytest.approx(1.0, abs=0.03)  # bearings count half an element
+        assert ramp.system.mass @ mode**2 == pytest.approx(1.0, abs=0.03)  # bearings count half an element
     # linear in the load, zero at the critical one: pi^2 (1 - share) for pinned ends (Rayleigh)
     assert values[2] < 0.0 < values[1] < values[0]
     assert values[1] == pytest.approx(-values[2], rel=0.02)
