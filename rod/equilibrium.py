@@ -163,6 +163,8 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
                 yield judged(system, descended(system, beside), kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
+    if lost.outcome is Outcome.LIMIT_POINT:
+        return
     if first is not None:
         yield judged(system, followed(system, first, side=side or 1, most=most), kept)
     if branch == "natural" or not patient:

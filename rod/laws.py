@@ -20,6 +20,9 @@ from rod.characteristic import Array, Characteristic, MomentCurve
 
 Function = Callable[[Array], ArrayLike]
 
+#: Largest bend of a law made of a function or a table, in turns of the cable, and the number of its control points.
+FARTHEST, POINTS = 10.0, 600
+
 
 @dataclass(frozen=True)
 class StickSlip:
@@ -85,45 +88,10 @@ class StickSlip:
         return np.asarray(0.5 * self.EI1 * D**2 + (self.EI0 - self.EI1) * self.kc**2 * log_cosh)
 
 
-@dataclass(frozen=True, eq=False)
-class MomentFunction:
-    """A law by its moment as a function of the bend D = K - K0, with derivative and energy per length.
-
-    Attributes
-    ----------
-    of_bend, slope, integral : functions of (n,) 1/m
-        Moment, N m; dm/dD, N m^2; int_0^D m, N.
-    stiffness_scale : N m^2
-    """
-
-    of_bend: Function
-    slope: Function
-    integral: Function
-    stiffness_scale: float
-
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment, N m."""
-        return np.asarray(self.of_bend(np.asarray(K, float) - np.asarray(K0, float)), float)
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent dm/dK, N m^2."""
-        return np.asarray(self.slope(np.asarray(K, float) - np.asarray(K0, float)), float)
-
-    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of K alone that returns moment and tangent."""
-        return lambda K: (self.moment(K, K0), self.tangent(K, K0))
-
-    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative dm/dK0 = -dm/dK, N m^2."""
-        return -self.tangent(K, K0)
-
-    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Energy per length, N."""
-        return np.asarray(self.integral(np.asarray(K, float) - np.asarray(K0, float)), float)
-
-
 def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) -> MomentCurve:
     """Law from a moment curve (as it is), a number, a function or a table.
+
+    Functions and tables become a spline of their secant m / D over bends D up to `FARTHEST` turns of the cable.
 
     Parameters
     ----------
@@ -131,61 +99,43 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
         A table that begins at (0, 0) holds for bending both ways; between its rows the moment rises where they do, and
         beyond them it goes on straight.
     length : m
-        Of the cable: what a bend is large or small against, where a function is differentiated.
+        Of the cable: what a bend is large or small against.
 
     Raises
     ------
     ValueError
-        If it is none of these, or a table whose bends do not increase.
+        If it is none of these, a table whose bends do not increase, or a moment that does not vanish at rest.
     """
     if hasattr(given, "bound"):
         return given  # type: ignore[return-value]  # a Protocol cannot be asked for at run time without its cost
-    if callable(given):
-        return _from_function(given, 1e-4 / length)
-    values = np.asarray(given, float)
-    if values.ndim == 0:
-        return Characteristic.constant(float(values))
-    if values.ndim != 2 or values.shape[1] != 2 or values.shape[0] < 2 or not np.all(np.diff(values[:, 0]) > 0.0):
-        raise ValueError(
-            f"a law is a number (EI), a function of the bend, or rows of bend and moment with increasing bend; got an "
-            f"array of shape {values.shape}: sort the rows, and give two columns"
-        )
-    return _from_table(values)
+    if not callable(given):
+        values = np.asarray(given, float)
+        if values.ndim == 0:
+            return Characteristic.constant(float(values))
+        if values.ndim != 2 or values.shape[1] != 2 or values.shape[0] < 2 or not np.all(np.diff(values[:, 0]) > 0.0):
+            raise ValueError(
+                f"a law is a number (EI), a function of the bend, or rows of bend and moment with increasing bend; got "
+                f"an array of shape {values.shape}: sort the rows, and give two columns"
+            )
+        given = _table(values)
+    # finest about rest, where laws bend most; an even number of points, so that none is 0
+    far = np.arcsinh(FARTHEST * 2.0 * np.pi / 0.5)
+    bend = 0.5 / length * np.sinh(np.linspace(-far, far, POINTS))
+    moment = np.asarray(given(bend), float)
+    if not np.abs(np.interp(0.0, bend, moment)) < 1e-6 * np.ptp(moment):
+        raise ValueError("the moment of a law must vanish at bend 0: measure the bend from the shape at rest")
+    return Characteristic.from_ordinates(bend, moment / bend, reading="secant", abscissa="excess")
 
 
-def _from_function(moment: Function, step: float) -> MomentFunction:
-    nodes, weights = np.polynomial.legendre.leggauss(24)  # exact for polynomials of degree 47
-
-    def slope(D: Array) -> Array:  # of fourth order: error below 1e-9 for a law that bends over a tenth of 1/length
-        near, far = (np.asarray(moment(D + k * step)) - np.asarray(moment(D - k * step)) for k in (1.0, 2.0))
-        return np.asarray((8.0 * near - far) / (12.0 * step))
-
-    def integral(D: Array) -> Array:
-        places = 0.5 * np.asarray(D)[..., None] * (nodes + 1.0)
-        return np.asarray(0.5 * np.asarray(D) * (np.asarray(moment(places)) @ weights))
-
-    return MomentFunction(moment, slope, integral, abs(float(slope(np.zeros(1))[0])))
-
-
-def _from_table(rows: Array) -> MomentFunction:
+def _table(rows: Array) -> Function:
+    """Monotone cubic through the rows, straight beyond them."""
     bend, m = rows.T
     if bend[0] == 0.0 == m[0]:
         bend, m = np.r_[-bend[:0:-1], bend], np.r_[-m[:0:-1], m]
     curve = PchipInterpolator(bend, m)
-    slope, integral = curve.derivative(), curve.antiderivative()
-    low, high = float(bend[0]), float(bend[-1])
-
-    def beyond(D: Array) -> tuple[Array, Array]:
-        inside = np.clip(D, low, high)
-        return inside, D - inside
 
     def moment(D: Array) -> Array:
-        inside, more = beyond(D)
-        return np.asarray(curve(inside) + slope(inside) * more)
+        inside = np.clip(D, bend[0], bend[-1])
+        return np.asarray(curve(inside) + curve(inside, 1) * (D - inside))
 
-    def energy(D: Array) -> Array:
-        inside, more = beyond(D)
-        return np.asarray(integral(inside) - integral(0.0) + (curve(inside) + 0.5 * slope(inside) * more) * more)
-
-    scale = float(np.max(np.abs(np.diff(m) / np.diff(bend))))
-    return MomentFunction(moment, lambda D: slope(np.clip(D, low, high)), energy, scale)
+    return moment
