@@ -51,48 +51,14 @@ Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulati
 "Eq. (n) of the paper" and say where they depart from it.
 """
 
-from __future__ import annotations
+from rod.bending_test import BendingTest, bend, simulate
+from rod.characteristic import Characteristic
+from rod.equilibrium import Equilibrium, Outcome, solve
+from rod.laws import StickSlip, as_law
+from rod.paper_fit import Virtual
+from rod.paper_fit import paper_fit as fit_characteristic
+from rod.reduction import Hold
+from rod.support import BEARING, CLAMP, FREE, Support
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from rod.bending_test import BendingTest as BendingTest
-    from rod.bending_test import bend as bend
-    from rod.bending_test import simulate as simulate
-    from rod.characteristic import Characteristic as Characteristic
-    from rod.equilibrium import Equilibrium as Equilibrium
-    from rod.equilibrium import Outcome as Outcome
-    from rod.equilibrium import solve as solve
-    from rod.laws import StickSlip as StickSlip
-    from rod.laws import as_law as as_law
-    from rod.paper_fit import Virtual as Virtual
-    from rod.paper_fit import paper_fit as fit_characteristic  # noqa: F401
-    from rod.reduction import Hold as Hold
-    from rod.support import BEARING as BEARING
-    from rod.support import CLAMP as CLAMP
-    from rod.support import FREE as FREE
-    from rod.support import Support as Support
-
-#: Where each exported name is; it is loaded when it is asked for, so that `import rod` alone costs nothing.
-_HOMES = {
-    "bending_test": ("BendingTest", "bend", "simulate"),
-    "characteristic": ("Characteristic",),
-    "equilibrium": ("Equilibrium", "Outcome", "solve"),
-    "laws": ("StickSlip", "as_law"),
-    "paper_fit": ("Virtual", "fit_characteristic"),
-    "reduction": ("Hold",),
-    "support": ("BEARING", "CLAMP", "FREE", "Support"),
-}
-_HOME = {name: module for module, names in _HOMES.items() for name in names}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"rod exports no {name!r}; it exports {', '.join(sorted(_HOME))}")
-    # `rod.paper_fit` is the module, so its function goes by another name
-    return getattr(import_module(f"rod.{_HOME[name]}"), "paper_fit" if name == "fit_characteristic" else name)
-
-
-def __dir__() -> list[str]:
-    return sorted(_HOME)
+__all__ = ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
+__all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]

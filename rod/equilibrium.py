@@ -22,7 +22,6 @@ import numpy as np
 from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.energy import Potential
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import PATH_STEPS, followed
 from rod.reduction import Hold, System
@@ -83,16 +82,6 @@ class Equilibrium:
     before: Memory
     after: Memory
     iterations: int
-
-    @property
-    def energy(self) -> float:
-        """Potential energy, J: that of Eq. (4), less imposed forces at the right end times its place."""
-        V = Potential(self.rod, self.before)
-        work = sum(
-            0.0 if imposed else float(R * place[-1])
-            for imposed, R, place in zip(self.hold.imposed, self.right_reaction, (self.x, self.y), strict=True)
-        )
-        return V.value(V.unknowns(self.angles, self.x, self.y)) - work
 
     @property
     def good(self) -> bool:

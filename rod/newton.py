@@ -99,12 +99,12 @@ class Trial(NamedTuple):
         return self.outcome is Outcome.CONVERGED
 
 
-def newton(system: System, start: Start, *, most: int = ITERATIONS) -> Trial:
+def newton(system: System, start: Start) -> Trial:
     """Newton's method from ``start``, with steps shortened where they turn an edge too far."""
     angles, R = start.angles, system.hold.reaction(start.reaction)
     balance = system.balance(angles, R)
     norm = system.misfit(balance)
-    for count in range(1, most + 1):
+    for count in range(1, ITERATIONS + 1):
         made = system.eliminated(balance, -balance.gradient[:, None])
         dalpha, dR = system.substituted(made, -balance.gap[:, None])
         step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
@@ -149,19 +149,15 @@ def descended(system: System, start: Start) -> Trial:
     for count in range(1, DESCENT_STEPS + 1):
         balance = system.balance(angles, R)
         shifted = balance._replace(diagonal=balance.diagonal + shift * mass)
-        if system.excess_negatives(shifted) > 0:
-            shift = 4.0 * max(shift, 0.1)
-            continue
         dalpha, dR = system.solve(shifted, -balance.gradient[:, None], -balance.gap[:, None])
-        step = float(np.abs(dalpha).max())
-        if not np.isfinite(step):
-            break
-        if step > DESCENT_LIMIT:
+        step = float(np.abs(dalpha).max()) if system.excess_negatives(shifted) == 0 else np.inf
+        if not step <= DESCENT_LIMIT:
             shift = 4.0 * max(shift, 0.1)
             continue
         angles, R = angles + dalpha[:, 0], R + dR[:, 0]
         if shift < 0.01 and step < 0.01:
-            return _added(newton(system, Start(angles, R)), count)
+            trial = newton(system, Start(angles, R))
+            return trial._replace(steps=trial.steps + count)
         shift *= 0.25 if step < 0.5 * DESCENT_LIMIT else 1.0
     return Trial(angles, R, system.balance(angles, R), DESCENT_STEPS, Outcome.STALLED)
 
@@ -199,7 +195,3 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
     elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH
     return trial._replace(outcome=outcome)
-
-
-def _added(trial: Trial, steps: int) -> Trial:
-    return trial._replace(steps=trial.steps + steps)

@@ -12,11 +12,10 @@ it ends at the limit point half-way.
 w has a unit and its sum depends on the number of vertices: the default of `rod.inverse` weights every residual by its
 standard deviation instead, and fits positions rather than curvatures. A method that stops has not converged for that:
 from half of all starts (EI = 0.03 N m^2, say) it ends at the edge of what has an equilibrium, far from any minimum. So
-the gradient decides, and further starts whose stiffness is scaled to the forces: the best end of all is the result, and
-`PaperFit.starts` tells how each of them ended. Nothing here keeps the stiffness positive: with
-K0 forced to zero the fit runs into negative stiffness at low curvature, which is the paper's Fig. 6. Trials whose
-moment falls anywhere but in the two end joints (curvature K0, no moment) have no shape that means anything and are
-refused.
+the gradient decides, and there are further starts whose stiffness is scaled to the forces: the best end is the result.
+Nothing here keeps the stiffness positive: with K0 forced to zero the fit runs into negative stiffness at low curvature,
+which is the paper's Fig. 6. Trials whose moment falls anywhere but in the two end joints (curvature K0, no moment) have
+no shape that means anything and are refused.
 
 Signs and units: chord frame, SI; displacement from the natural chord of the mounted cable, or from the length.
 """
@@ -71,34 +70,6 @@ class PaperIteration:
 
 
 @dataclass(frozen=True)
-class PaperStart:
-    """How the fit from one start ended.
-
-    Attributes
-    ----------
-    bending_stiffness : N m^2
-    pre_curvature : 1/m
-    objective : N^2
-        Infinite where the end has no equilibrium.
-    gradient : float
-        Largest cosine between the residuals and a column of their Jacobian: 0 at a minimum.
-    exact : bool
-        Whether the data are met to rounding: the gradient then says nothing.
-    """
-
-    bending_stiffness: float
-    pre_curvature: float
-    objective: float
-    gradient: float
-    exact: bool
-
-    @property
-    def at_minimum(self) -> bool:
-        """Whether this end is a minimum: by its gradient, or because nothing is left to fit."""
-        return bool(np.isfinite(self.objective)) and (self.exact or self.gradient < STATIONARY)
-
-
-@dataclass(frozen=True)
 class PaperFit:
     """Result of the paper's fit: the best end of all starts.
 
@@ -113,8 +84,10 @@ class PaperFit:
         At the result.
     outcome : Outcome or None
         Of the first simulated step that is not a stable equilibrium; None if all are.
-    starts : tuple of PaperStart
-        The start asked for, then others; none of these where the first met the data exactly.
+    gradient : float
+        Largest cosine between the residuals and a column of their Jacobian: 0 at a minimum, and where the data are met.
+    others : tuple of PaperFit
+        Ends of the other starts; none where the start asked for met the data exactly.
     """
 
     characteristic: Characteristic
@@ -123,12 +96,13 @@ class PaperFit:
     history: tuple[PaperIteration, ...]
     steps: tuple[Equilibrium, ...]
     outcome: Outcome | None
-    starts: tuple[PaperStart, ...]
+    gradient: float
+    others: tuple[PaperFit, ...] = ()
 
     @property
     def converged(self) -> bool:
-        """Whether the result is a minimum; with several starts also the best that was found."""
-        return min(self.starts, key=lambda start: start.objective).at_minimum
+        """Whether the result is a minimum; with others also the best that was found."""
+        return self.gradient < STATIONARY
 
     @property
     def iterations(self) -> int:
@@ -183,23 +157,16 @@ def paper_fit(
         raise ValueError(
             f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m: give a start nearer to the cable"
         )
-    ends = [first]
-    if not first[1].exact:
-        turns = (0.0,) if pre_curvature is not None else FURTHER_TURNS
-        others = (_from_start(problem, problem.scaled_start(turn / data.length), tolerance) for turn in turns)
-        ends += [end for end in others if end is not None]
-    (history, end), _ = min(ends, key=lambda found: found[1].objective)
-    outcome = next((step.outcome for step in end.steps if not step.good), None)
-    last = history[-1]
-    law = Characteristic.from_ordinates(at, last.ordinates, reading=reading)
-    starts = tuple(told for _, told in ends)
-    return PaperFit(law, last.pre_curvature, last.objective, tuple(history), end.steps, outcome, starts)
+    if first.gradient == 0.0:
+        return first
+    turns = (0.0,) if pre_curvature is not None else FURTHER_TURNS
+    further = (_from_start(problem, problem.scaled_start(turn / data.length), tolerance) for turn in turns)
+    best, *others = sorted((first, *(end for end in further if end)), key=lambda end: end.objective)
+    return replace(best, others=tuple(others))
 
 
-def _from_start(
-    problem: _Problem, start: tuple[float, float], tolerance: float
-) -> tuple[tuple[list[PaperIteration], _Simulation], PaperStart] | None:
-    """The fit from one start: states on the way, last simulation, and how it ended; None without an equilibrium."""
+def _from_start(problem: _Problem, start: tuple[float, float], tolerance: float) -> PaperFit | None:
+    """The fit from one start; None if that has no equilibrium."""
     k, fixed = problem.knots.size, problem.fixed is not None
     begin = np.ones(k + (not fixed))
     unit = np.r_[np.full(k, start[0]), [start[1] or 1.0] * (not fixed)]
@@ -231,12 +198,14 @@ def _from_start(
         )
     end = problem.simulate(found.x * unit, accepted.steps)
     history.append(problem.iteration(found.x * unit, end))
-    size = float(np.linalg.norm(end.residual))
-    gradient, exact = np.inf, size < EXACT * problem.data_norm
-    if np.isfinite(size) and not exact:
+    size, gradient = float(np.linalg.norm(end.residual)), np.inf
+    if size < EXACT * problem.data_norm:
+        gradient = 0.0
+    elif np.isfinite(size):
         J = problem.jacobian(end)
         gradient = float(np.max(np.abs(J.T @ end.residual) / np.linalg.norm(J, axis=0))) / size
-    return (history, end), PaperStart(*start, history[-1].objective, gradient, exact)
+    outcome = next((step.outcome for step in end.steps if not step.good), None)
+    return PaperFit(*problem.split(found.x * unit), size**2, tuple(history), end.steps, outcome, gradient)
 
 
 def _means_something(test: BendingTest, step: Equilibrium) -> bool:

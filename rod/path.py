@@ -28,15 +28,13 @@ from scipy.optimize import brentq
 
 from rod.branch import bow
 from rod.characteristic import Array
-from rod.newton import RESIDUAL_TOLERANCE, STEP_TOLERANCE, Outcome, Start, Trial, softest
+from rod.newton import RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
 from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, root mean square of the turns of the edges, rad.
 LONGEST, SHORTEST = 0.5, 1e-5
 #: Steps shorter than this are no use where the moment falls ahead: the bend localises in one joint.
 FALLING = 1e-2
-#: Largest turn of an edge in one step of Newton's method, rad.
-TURN_LIMIT = 1.6
 #: How far a state may lie beside the tangent, relative to the step: a path bends, but another path is farther away.
 OFF = 0.6
 #: Largest turn of an edge by which a path is followed at once to an imposed chord, rad. At 2.405, the zero of J0, the
@@ -131,9 +129,7 @@ class Ramp:
                 return None
             move = step - self.product(step, normal, R) / along * rate
             largest = float(np.abs(move[:-3]).max())
-            if not largest < TURN_LIMIT:
-                return None
-            point = self.at(point.state + move)
+            point = self.at(point.state + STEP_LIMIT / max(largest, STEP_LIMIT) * move)
             if largest <= STEP_TOLERANCE and self.system.misfit(point.balance) <= RESIDUAL_TOLERANCE:
                 return point
         return None
