@@ -21,18 +21,19 @@ Branch = Literal["natural", "opposite", "up", "down", "jump"]
 
 def bow(rod: Rod, angles: Array) -> float:
     """Mean height of a shape over its chord, relative to the length: positive if it bows toward +y."""
-    return float(rod.lever @ np.sin(angles)) / rod.length**2
+    h = rod.edges
+    y = np.cumsum(h * np.sin(angles))
+    return float(h @ y / rod.length**2)
 
 
 def bow_side(rod: Rod, branch: Branch) -> int:
     """Side asked for: +1 up, -1 down, 0 if only following the path from the force-free shape can tell."""
     if branch in ("up", "down"):
         return 1 if branch == "up" else -1
-    if branch == "opposite":
-        return -natural_side(rod)
-    return 0 if branch == "jump" or rod.open_side else natural_side(rod)
-
-
-def natural_side(rod: Rod) -> int:
-    """Side to which the force-free shape is bowed; a straight one counts as up."""
-    return 1 if float(rod.lever @ np.sin(rod.mounted.angles)) >= 0.0 else -1
+    K0 = rod.section.pre_curvature
+    low, high = float(K0.min()), float(K0.max())
+    driven = rod.load[1] != 0.0 or any(end.moment or end.angle for end in (rod.left, rod.right))
+    if branch != "opposite" and (branch == "jump" or low < 0.0 < high or (driven and low == high == 0.0)):
+        return 0
+    natural = 1 if bow(rod, rod.mounted.angles) >= 0.0 else -1
+    return -natural if branch == "opposite" else natural

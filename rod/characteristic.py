@@ -27,7 +27,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
@@ -240,18 +239,13 @@ class Characteristic:
             return np.asarray(evaluate(p.F, p.cardinal, u) * D - rise)
         return np.asarray(rise - evaluate(p.F, p.cardinal, u0) * D)
 
-    @cached_property
-    def _table(self) -> Array:
-        """Coefficients of f and its primitive on all segments, (9, q + 1)."""
-        return np.vstack([self._pieces.f, self._pieces.F])
-
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """`moment` and `tangent` as one function of K (n,) for fixed pre-curvature (n,) or (1,): Newton's inner call.
 
         One look-up of the segments, 12 microseconds for 100 points.
         """
         p, excess, secant = self._pieces, self.abscissa == "excess", self.reading == "secant"
-        table = self._table
+        table = np.vstack([p.f, p.F])
         rest = evaluate(p.F, p.cardinal, np.zeros(1) if excess else K0)
 
         def moment_and_tangent(K: Array) -> tuple[Array, Array]:

@@ -113,26 +113,9 @@ class Rod:
         return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
 
     @cached_property
-    def joints(self) -> Array:
-        """Arc length from the left axis of axis, joints, axis, (n + 3,) m."""
-        return np.concatenate(([0.0], np.cumsum(self.edges)))
-
-    @cached_property
     def length_beyond(self) -> Array:
         """Length to the right of each edge's middle, (n + 2,) m."""
         return np.asarray(0.5 * self.edges + (self.length - np.cumsum(self.edges)))
-
-    @cached_property
-    def lever(self) -> Array:
-        """What a unit of sin(angle) of each edge adds to the area under the cable, (n + 2,) m^2."""
-        return np.asarray(self.edges * (self.length_beyond + 0.5 * self.edges))
-
-    @cached_property
-    def open_side(self) -> bool:
-        """Whether the force-free shape does not tell the side to which the cable bows: bent both ways, or driven."""
-        K0 = self.section.pre_curvature
-        driven = self.load[1] != 0.0 or any(end.moment or end.angle for end in (self.left, self.right))
-        return float(K0.min()) < 0.0 < float(K0.max()) or (driven and not np.any(K0))
 
     @cached_property
     def stiffness_scale(self) -> float:
@@ -179,11 +162,6 @@ class Rod:
         relative = -np.concatenate(([0.0], np.cumsum(self.weights * self.section.pre_curvature)))
         X, Y = float(self.edges @ np.cos(relative)), float(self.edges @ np.sin(relative))
         return Mounted(relative - np.arctan2(Y, X), float(np.hypot(X, Y)))
-
-    @cached_property
-    def turn(self) -> float:
-        """Angle by which the force-free rod turns from end to end, rad; beyond pi it is a coil."""
-        return float(self.weights @ self.section.pre_curvature)
 
     @cached_property
     def rest_angles(self) -> tuple[float, float]:

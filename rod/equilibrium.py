@@ -22,7 +22,7 @@ import numpy as np
 from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
+from rod.newton import RESIDUAL_TOLERANCE, Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import PATH_STEPS, followed
 from rod.reduction import Hold, System
 from rod.section import Memory, Section
@@ -130,7 +130,7 @@ def solve(
     last, steps = verdicts[-1], sum(trial.steps for trial in verdicts)
     falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
     if not last.found and falling:  # rather the state that has what was asked for, but for a moment that falls
-        last = next((trial for trial in falling if trial.negatives is not None), falling[-1])
+        last = next((trial for trial in falling if system.misfit(trial.balance) <= RESIDUAL_TOLERANCE), falling[-1])
     return _record(system, last, steps)
 
 
@@ -141,12 +141,13 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     # Where only the path can tell the side, a warm start keeps the one it has.
     kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
     # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
-    if first is not None and (branch != "natural" or abs(rod.turn) < np.pi):
+    turn = float(rod.mounted.angles[0] - rod.mounted.angles[-1])
+    if first is not None and (branch != "natural" or abs(turn) < np.pi):
         warm = newton(system, first)
         near = float(np.abs(warm.angles - first.angles).max()) < NEAR
         verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
         yield verdict
-        if patient and warm.negatives and verdict.outcome is Outcome.LIMIT_POINT:
+        if patient and warm.found and verdict.outcome is Outcome.LIMIT_POINT and system.excess_negatives(warm.balance):
             # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
             for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
                 yield judged(system, descended(system, beside), kept)
@@ -200,7 +201,7 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     keep = slice(0 if h[0] else 1, n + 1 if h[-1] else n)
     load = rod.vertex_load
     return Equilibrium(
-        s=rod.joints[keep],
+        s=np.concatenate(([0.0], np.cumsum(h)))[keep],
         x=path[0, keep],
         y=path[1, keep],
         theta=theta[keep],

@@ -81,17 +81,13 @@ class Start(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """A state, its residuals, the steps of Newton's method that led there, and how that ended.
-
-    ``negatives``: directions in which it is unstable, where the last step tells (it turned no edge by more than 1e-7).
-    """
+    """A state, its residuals, the steps of Newton's method that led there, and how that ended."""
 
     angles: Array
     R: Array
     balance: Balance
     steps: int
     outcome: Outcome
-    negatives: int | None = None
 
     @property
     def found(self) -> bool:
@@ -105,8 +101,7 @@ def newton(system: System, start: Start) -> Trial:
     balance = system.balance(angles, R)
     norm = system.misfit(balance)
     for count in range(1, ITERATIONS + 1):
-        made = system.eliminated(balance, -balance.gradient[:, None])
-        dalpha, dR = system.substituted(made, -balance.gap[:, None])
+        dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
         step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
         if not np.isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
@@ -123,7 +118,7 @@ def newton(system: System, start: Start) -> Trial:
         if not np.isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
-            return Trial(angles, R, balance, count, Outcome.CONVERGED, system.negatives(made))
+            return Trial(angles, R, balance, count, Outcome.CONVERGED)
     localised = bool(np.any(balance.tangent <= 0.0))
     return Trial(angles, R, balance, count, Outcome.LIMIT_POINT if localised else Outcome.STALLED)
 
@@ -190,7 +185,7 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
     between = system.section(middle)[1]
     if min(float(trial.balance.tangent.min()), float(between.min())) <= 0.0:
         outcome = Outcome.LIMIT_POINT
-    elif (system.excess_negatives(trial.balance) if trial.negatives is None else trial.negatives) != 0:
+    elif system.excess_negatives(trial.balance) != 0:
         outcome = Outcome.UNSTABLE
     elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH

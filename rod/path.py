@@ -153,7 +153,7 @@ class Ramp:
 
     def ended(self, point: Point, outcome: Outcome) -> Trial:
         """The last stable state of a path and how it ended."""
-        return Trial(point.angles, point.R, point.balance, self.steps, outcome, 0)
+        return Trial(point.angles, point.R, self.system.balance(point.angles, point.R), self.steps, outcome)
 
 
 def followed(system: System, start: Start | None = None, *, side: int = 1, most: int = PATH_STEPS) -> Trial:

@@ -97,19 +97,6 @@ class Balance(NamedTuple):
     tangent: Array
 
 
-class Elimination(NamedTuple):
-    """Angles eliminated: border columns and right-hand sides solved by the stiffened H, what is left, and that H.
-
-    ``solved`` (n + 2, k + 1 + p); ``schur`` (k + 1, k + 1) scaled; ``low`` (k + 1, p); ``diagonal``, ``off`` of H.
-    """
-
-    solved: Array
-    schur: Array
-    low: Array
-    diagonal: Array
-    off: Array
-
-
 class EdgeState(NamedTuple):
     """Directions of the edges and the force in them along and across, (n + 2,) each; N."""
 
@@ -132,7 +119,6 @@ class System:
         self._difference = self._axial - self._shear
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
-        self._equal_softness = self._axial * rod.length * np.eye(2)
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
@@ -176,34 +162,20 @@ class System:
         h = self.rod.edges
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
-        if self._difference == 0.0:  # strains do not depend on direction: sums over the edges take a dot product each
-            border = np.empty((2, h.size))
-            np.multiply(h, np.sin(angles), out=border[0])
-            np.multiply(-h, np.cos(angles), out=border[1])
-            gradient, diagonal, gap = self._rigid(border, R)
-            softness = self._equal_softness
-        else:
-            edge = self.edge_state(angles, R)
-            gradient, diagonal = -h * self.turning(edge), h * self._restoring(edge)
-            border, gap, softness = self.border(edge), -(self.directions(edge) @ h), self._softness(edge)
+        edge = self.edge_state(angles, R)
+        gradient = -h * self.turning(edge)
         gradient[:-1] += m
         gradient[1:] -= m
         off = -tangent * self._inverse_weights
+        diagonal = h * (edge.along if self._difference == 0.0 else self._restoring(edge))
         diagonal[:-1] -= off
         diagonal[1:] -= off
+        border = self.border(edge)
+        gap = -(self.directions(edge) @ h)
         gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
         gap[1] *= self.hold.tip is None
         self._hold_ends(angles, gradient, diagonal, off, border)
-        return Balance(gradient, diagonal, off, border, softness, gap, K, m, tangent)
-
-    def _rigid(self, border: Array, R: Array) -> tuple[Array, Array, Array]:
-        """Turning moments and their slopes (n + 2,), and minus the extent of the chain (2,), for EA = GA."""
-        gap = np.array((border[1].sum(), -border[0].sum())) - self._axial * self.rod.length * R
-        if self._load_beyond is None:
-            return R @ border, R[1] * border[0] - R[0] * border[1], gap
-        force = R[:, None] + self._load_beyond
-        gap -= self._axial * (self._load_beyond @ self.rod.edges)
-        return (force * border).sum(axis=0), force[1] * border[0] - force[0] * border[1], gap
+        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
 
     def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
@@ -234,6 +206,9 @@ class System:
         return np.array((h * (cos * along - sin * across), h * (sin * along + cos * across)))
 
     def _softness(self, edge: EdgeState) -> Array:
+        if self._difference == 0.0:
+            soft = self._axial * self.rod.length
+            return np.array(((soft, 0.0), (0.0, soft)))
         return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
 
     def _restoring(self, edge: EdgeState) -> Array:
@@ -285,10 +260,28 @@ class System:
         dalpha : (n + 2, p) rad, dR : (2, p) N
             Not a number if the matrix is singular.
         """
-        return self.substituted(self.eliminated(balance, rhs), gap)
+        columns, solved, schur = self._eliminated(balance, rhs)
+        k, p = len(self._imposed), rhs.shape[1]
+        low = columns[:, : k + 1].T @ -solved[:, k + 1 :]
+        low[:k] += gap if k == 2 else gap[self._imposed]
+        _, _, multipliers, info = dgesv(schur, self._scale * low)
+        multipliers = self._scale * multipliers if info == 0 else np.full((k + 1, p), np.nan)
+        dR = np.zeros((2, p))
+        dR[self._imposed] = multipliers[:k]
+        return (solved.T[k + 1 :] - multipliers.T @ solved.T[: k + 1]).T, dR
 
-    def eliminated(self, balance: Balance, rhs: Array) -> Elimination:
-        """The angles eliminated from the bordered system: what `substituted` and `negatives` go on from."""
+    def excess_negatives(self, balance: Balance) -> int:
+        """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
+        _, _, schur = self._eliminated(balance, np.zeros((balance.gradient.size, 0)))
+        if not np.all(np.isfinite(schur)):
+            return 1
+        diagonal = balance.diagonal.copy()
+        diagonal[self._middle] += self._spring
+        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(dsyev(schur, compute_v=0)[0] < 0.0))
+        return count - len(self._imposed)
+
+    def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
+        """Border columns and right-hand sides, both solved by the stiffened H, and the scaled Schur complement."""
         k, p = len(self._imposed), rhs.shape[1]
         columns = np.zeros((rhs.shape[0], k + 1 + p), order="F")
         columns[:, :k] = balance.border.T if k == 2 else balance.border[self._imposed].T
@@ -299,35 +292,13 @@ class System:
         *_, solved, info = dgtsv(balance.off, diagonal, balance.off, columns)
         if info != 0:
             solved = np.full_like(columns, np.nan)
-        low = columns[:, : k + 1].T @ solved
-        schur = -low[:, : k + 1]
-        schur[:k, :k] -= balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
+        schur = columns[:, : k + 1].T @ -solved[:, : k + 1]
+        softness = balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
+        schur[:k, :k] -= softness
         if self.hold.compliance:
             schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
-        return Elimination(solved, schur * self._scales, low[:, k + 1 :], diagonal, balance.off)
-
-    def substituted(self, made: Elimination, gap: Array) -> tuple[Array, Array]:
-        """Solution of the bordered system for (2, p) gaps, as `solve` returns it."""
-        k = len(self._imposed)
-        low = -made.low
-        low[:k] += gap if k == 2 else gap[self._imposed]
-        _, _, multipliers, info = dgesv(made.schur, self._scale * low)
-        multipliers = self._scale * multipliers if info == 0 else np.full(low.shape, np.nan)
-        dR = np.zeros((2, low.shape[1]))
-        dR[self._imposed] = multipliers[:k]
-        return made.solved[:, k + 1 :] - made.solved[:, : k + 1] @ multipliers, dR
-
-    def negatives(self, made: Elimination) -> int:
-        """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
-        if not np.isfinite(made.schur[0, 0]):  # solved by a singular matrix: all or nothing is finite
-            return 1
-        low = int(np.count_nonzero(dsyev(made.schur, compute_v=0)[0] < 0.0))
-        return negative_pivots(made.diagonal, made.off) + low - len(self._imposed)
-
-    def excess_negatives(self, balance: Balance) -> int:
-        """As `negatives`, for a state that was not solved for."""
-        return self.negatives(self.eliminated(balance, np.zeros((balance.gradient.size, 0))))
+        return columns, solved, schur * self._scales
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:

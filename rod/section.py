@@ -137,7 +137,7 @@ class Section:
 
     def _elastic(self) -> Response:
         """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
-        bound = self.law.bound(self.rest)
+        bound = self.law.bound(self.rest())
         if self.profile is None:
             return bound
         profile = self.profile
@@ -148,7 +148,6 @@ class Section:
 
         return scaled
 
-    @cached_property
     def rest(self) -> Array:
         """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
         K0 = self.pre_curvature

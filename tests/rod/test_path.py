@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rod.bending_test import simulate
-from rod.branch import natural_side
+from rod.branch import bow_side
 from rod.equilibrium import Outcome, Start, solve
 from rod.newton import descended, softest
 from rod.path import Ramp, followed
@@ -76,6 +76,8 @@ def test_descent_ends_at_a_minimum_and_goes_downhill():
 
 
 def test_natural_side_of_a_straight_cable_is_up():
-    assert natural_side(STRAIGHT.rod) == 1
-    assert natural_side(arch(0.0).rod) == 1
-    assert natural_side(replace(STRAIGHT, pre_curvature=-1.0).rod) == -1
+    assert bow_side(STRAIGHT.rod, "natural") == 1
+    assert bow_side(arch(0.0).rod, "natural") == 1
+    assert bow_side(replace(STRAIGHT, pre_curvature=-1.0).rod, "natural") == -1
+    assert bow_side(replace(STRAIGHT, pre_curvature=-1.0).rod, "opposite") == 1
+    assert bow_side(replace(STRAIGHT, load=(0.0, -1.0)).rod, "natural") == 0
