@@ -1,8 +1,8 @@
 """Equilibrium of the discrete rod: from rod and imposed end to the shape of least energy, its reactions and an outcome.
 
 Newton's method on the reduced system of `rod.reduction` from a warm start, with proof of the minimum by inertia;
-otherwise along the path of equilibria from the force-free shape (`rod.path`). Which side the cable bows to is chosen by ``branch`` (`rod.branch`). A
-fit whose K0 may change sign wants ``up``, the side the photo shows.
+otherwise along the path of equilibria from the force-free shape (`rod.path`). Which side the cable bows to is chosen by
+``branch`` (`rod.branch`). A fit whose K0 may change sign wants ``up``, the side the photo shows.
 
 The result says in `Outcome` how far to trust it. Nothing raises for a shape that does not exist: that is nature's
 refusal and a value.
@@ -142,18 +142,18 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
     # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
     turn = float(rod.mounted.angles[0] - rod.mounted.angles[-1])
+    warm = None
     if first is not None and (branch != "natural" or abs(turn) < np.pi):
         warm = newton(system, first)
         near = float(np.abs(warm.angles - first.angles).max()) < NEAR
-        verdict = judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
-        yield verdict
-        if patient and warm.found and verdict.outcome is Outcome.LIMIT_POINT and system.excess_negatives(warm.balance):
-            # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
-            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
-                yield judged(system, descended(system, beside), kept)
+        yield judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
     if lost.outcome is Outcome.LIMIT_POINT:
+        # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
+        if patient and warm is not None and warm.found and system.excess_negatives(warm.balance):
+            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
+                yield judged(system, descended(system, beside), kept)
         return
     if first is not None:
         yield judged(system, followed(system, first, side=side or 1, most=most), kept)

@@ -57,14 +57,9 @@ class Point(NamedTuple):
     balance: Balance
 
     @property
-    def angles(self) -> Array:
-        """Edge angles, (n + 2,) rad."""
-        return self.state[:-3]
-
-    @property
-    def R(self) -> Array:
-        """Right reaction, (2,) N."""
-        return self.state[-3:-1]
+    def start(self) -> Start:
+        """Edge angles and reaction."""
+        return Start(self.state[:-3], self.state[-3:-1])
 
     @property
     def share(self) -> float:
@@ -97,9 +92,10 @@ class Ramp:
     def solve(self, point: Point) -> tuple[Array, Array]:
         """Newton's step at a fixed share, and what the state changes by per share."""
         # residuals are at most quadratic in the share: their derivative is a central difference of any width
-        forth = np.r_[np.zeros(point.angles.size), 0.5 * self.pull, 0.5]
+        at = point.start
+        forth = np.r_[np.zeros(at.angles.size), 0.5 * self.pull, 0.5]
         ahead, behind, here = self.at(point.state + forth).balance, self.at(point.state - forth).balance, point.balance
-        turning, gap_turning = self.system.clamps_turning(here, point.angles, point.R, self.residual.gradient)
+        turning, gap_turning = self.system.clamps_turning(here, *at, self.residual.gradient)
         rate, gap_rate = ahead.gradient - behind.gradient + turning, ahead.gap - behind.gap + gap_turning
         angles, R = self.system.solve(
             here, -np.column_stack((here.gradient, rate)), -np.column_stack((here.gap, gap_rate))
@@ -107,27 +103,27 @@ class Ramp:
         self.steps += 1
         return np.r_[angles[:, 0], R[:, 0], 0.0], np.r_[angles[:, 1], R[:, 1] + self.pull, 1.0]
 
-    def product(self, a: Array, b: Array, R: Array) -> float:
-        """Inner product of two directions near a state of reaction ``R``."""
-        unit = REACTION * self.system.force_scale + 0.5 * float(np.hypot(*R))
+    def product(self, a: Array, b: Array, near: Array) -> float:
+        """Inner product of two directions near a state."""
+        unit = REACTION * self.system.force_scale + 0.5 * float(np.hypot(*near[-3:-1]))
         turns = self.system.mass @ (a[:-3] * b[:-3])
         return float(turns + a[-3:-1] @ b[-3:-1] / unit**2 + 1e-4 * a[-1] * b[-1])
 
     def tangent(self, point: Point, last: Array | None = None) -> Array:
         """Direction of the path, of length 1, onward from ``last`` (None: toward larger shares)."""
         way = self.solve(point)[1]
-        way = way / np.sqrt(self.product(way, way, point.R))
-        return way if last is None or self.product(way, last, point.R) >= 0.0 else -way
+        way /= np.sqrt(self.product(way, way, point.state))
+        return way if last is None or self.product(way, last, point.state) >= 0.0 else -way
 
     def corrected(self, state: Array, normal: Array) -> Point | None:
         """Newton's method on the plane through ``state`` across ``normal``; None if it fails."""
-        point, R = self.at(state), state[-3:-1]
+        point = self.at(state)
         for _ in range(8):
             step, rate = self.solve(point)
-            along = self.product(rate, normal, R)
+            along = self.product(rate, normal, state)
             if not np.isfinite(along) or along == 0.0:
                 return None
-            move = step - self.product(step, normal, R) / along * rate
+            move = step - self.product(step, normal, state) / along * rate
             largest = float(np.abs(move[:-3]).max())
             point = self.at(point.state + STEP_LIMIT / max(largest, STEP_LIMIT) * move)
             if largest <= STEP_TOLERANCE and self.system.misfit(point.balance) <= RESIDUAL_TOLERANCE:
@@ -153,7 +149,7 @@ class Ramp:
 
     def ended(self, point: Point, outcome: Outcome) -> Trial:
         """The last stable state of a path and how it ended."""
-        return Trial(point.angles, point.R, self.system.balance(point.angles, point.R), self.steps, outcome)
+        return Trial(*point.start, self.system.balance(*point.start), self.steps, outcome)
 
 
 def followed(system: System, start: Start | None = None, *, side: int = 1, most: int = PATH_STEPS) -> Trial:
@@ -210,19 +206,21 @@ def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
     Along the turns themselves the chord changes as it does when the cable bends more; along the tangent of the share it
     would soon be far off, and the reaction farther. None if that is not the same path.
     """
-    h, goal, turns = ramp.system.rod.edges, ramp.system.hold.chord, way[:-3]
+    rod, goal, begin, turns = ramp.system.rod, ramp.system.hold.chord, here.start.angles, way[:-3]
     largest = float(np.abs(turns).max())
     if goal is None or largest < 1e-9:
         return None
 
     def beyond(by: float) -> float:
-        return float(h @ np.cos(here.angles + by * turns)) - goal
+        return float(rod.edges @ np.cos(begin + by * turns)) - goal
 
     if beyond(0.0) * beyond(LEAP / largest) >= 0.0:
         return None
-    angles = here.angles + brentq(beyond, 0.0, LEAP / largest, rtol=1e-4) * turns
+    angles = begin + brentq(beyond, 0.0, LEAP / largest, rtol=1e-4) * turns
     still = ramp.system.balance(angles, np.zeros(2))
-    R = np.linalg.lstsq(still.border.T / ramp.system.rod.length, -still.gradient / ramp.system.rod.length, rcond=None)[0]
+    R = np.linalg.lstsq(still.border.T / ramp.system.rod.length, -still.gradient / ramp.system.rod.length, rcond=None)[
+        0
+    ]
     there = ramp.reached(here, np.r_[angles, R, 1.0], ramp.along_share)
     return None if there is None or ramp.negatives(there) else there
 
@@ -245,8 +243,8 @@ def _critical(ramp: Ramp, here: Point, there: Point, way: Array) -> tuple[Point,
 
 def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Point | None:
     """The first state on the branch that leaves a bifurcation, on the side asked for; None if it is not stable."""
-    rod = ramp.system.rod
-    lift = bow(rod, here.angles + 1e-3 * mode) - bow(rod, here.angles - 1e-3 * mode)
+    angles = here.start.angles
+    lift = bow(ramp.system.rod, angles + 1e-3 * mode) - bow(ramp.system.rod, angles - 1e-3 * mode)
     own = float(ramp.system.mass @ (way[:-3] * mode))
     sign = -1.0 if (own if abs(own) > 1e-3 else side * lift) < -1e-9 else 1.0
     aside = np.r_[sign * mode, np.zeros(3)]

@@ -30,7 +30,7 @@ def test_states_along_the_path_are_equilibria_and_their_rate_is_that_of_neighbou
     point, way = ramp.begin, None
     for _ in range(3):
         way = ramp.tangent(point, way)
-        assert ramp.product(way, way, point.R) == pytest.approx(1.0)
+        assert ramp.product(way, way, point.state) == pytest.approx(1.0)
         point = ramp.corrected(point.state + 0.05 * way, way)
         assert point is not None
     assert point.share > 0.0
