@@ -22,7 +22,7 @@ import numpy as np
 from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import RESIDUAL_TOLERANCE, Outcome, Start, Trial, descended, judged, newton, tilted
+from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import PATH_STEPS, followed
 from rod.reduction import Hold, System
 from rod.section import Memory, Section
@@ -127,11 +127,10 @@ def solve(
         verdicts.append(attempt)
         if attempt.found:
             break
-    last, steps = verdicts[-1], sum(trial.steps for trial in verdicts)
-    falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
-    if not last.found and falling:  # rather the state that has what was asked for, but for a moment that falls
-        last = next((trial for trial in falling if system.misfit(trial.balance) <= RESIDUAL_TOLERANCE), falling[-1])
-    return _record(system, last, steps)
+    last = verdicts[-1]
+    if not last.found and any(trial.outcome is Outcome.LIMIT_POINT for trial in verdicts):
+        last = last._replace(outcome=Outcome.LIMIT_POINT)
+    return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
 def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:

@@ -14,8 +14,7 @@ standard deviation instead, and fits positions rather than curvatures. A method 
 from half of all starts (EI = 0.03 N m^2, say) it ends at the edge of what has an equilibrium, far from any minimum. So
 the gradient decides, and there are further starts whose stiffness is scaled to the forces: the best end is the result.
 Nothing here keeps the stiffness positive: with K0 forced to zero the fit runs into negative stiffness at low curvature,
-which is the paper's Fig. 6. Trials whose moment falls anywhere but in the two end joints (curvature K0, no moment) have
-no shape that means anything and are refused.
+which is the paper's Fig. 6. Trials without a stable equilibrium are refused.
 
 Signs and units: chord frame, SI; displacement from the natural chord of the mounted cable, or from the length.
 """
@@ -32,7 +31,7 @@ from scipy.optimize import least_squares
 
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic, Reading
-from rod.equilibrium import Equilibrium, Outcome
+from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
 
 Array = NDArray[np.float64]
@@ -57,16 +56,12 @@ class Virtual:
 
 @dataclass(frozen=True)
 class PaperIteration:
-    """State of the fit at one iteration: control points (k,) N m^2, K0 1/m, objective N^2.
-
-    ``forces`` (steps,) N and ``curvatures`` (steps, elements + 1) 1/m are those simulated.
-    """
+    """State of the fit at one iteration: control points (k,) N m^2, K0 1/m, objective N^2, and the steps simulated."""
 
     ordinates: Array
     pre_curvature: float
     objective: float
-    forces: Array
-    curvatures: Array
+    steps: tuple[Equilibrium, ...]
 
 
 @dataclass(frozen=True)
@@ -82,8 +77,6 @@ class PaperFit:
         From the start that led there to the result.
     steps : tuple of Equilibrium
         At the result.
-    outcome : Outcome or None
-        Of the first simulated step that is not a stable equilibrium; None if all are.
     gradient : float
         Largest cosine between the residuals and a column of their Jacobian: 0 at a minimum, and where the data are met.
     others : tuple of PaperFit
@@ -95,7 +88,6 @@ class PaperFit:
     objective: float
     history: tuple[PaperIteration, ...]
     steps: tuple[Equilibrium, ...]
-    outcome: Outcome | None
     gradient: float
     others: tuple[PaperFit, ...] = ()
 
@@ -204,17 +196,7 @@ def _from_start(problem: _Problem, start: tuple[float, float], tolerance: float)
     elif np.isfinite(size):
         J = problem.jacobian(end)
         gradient = float(np.max(np.abs(J.T @ end.residual) / np.linalg.norm(J, axis=0))) / size
-    outcome = next((step.outcome for step in end.steps if not step.good), None)
-    return PaperFit(*problem.split(found.x * unit), size**2, tuple(history), end.steps, outcome, gradient)
-
-
-def _means_something(test: BendingTest, step: Equilibrium) -> bool:
-    """Whether a step is an equilibrium, stable but for a falling moment in the end joints."""
-    if step.good:
-        return True
-    falling = test.characteristic.tangent(step.kappa, step.rod.section.pre_curvature) <= 0.0
-    reached = abs(step.chord - (step.hold.chord or 0.0)) < 1e-6 * test.length
-    return step.outcome is Outcome.LIMIT_POINT and reached and not bool(np.any(falling[1:-1]))
+    return PaperFit(*problem.split(found.x * unit), size**2, tuple(history), end.steps, gradient)
 
 
 @dataclass(frozen=True)
@@ -224,11 +206,6 @@ class _Simulation:
     test: BendingTest
     steps: tuple[Equilibrium, ...]
     residual: Array
-
-    @property
-    def forces(self) -> Array:
-        """P of all steps, (n,) N."""
-        return np.array([step.force for step in self.steps])
 
 
 @dataclass(frozen=True)
@@ -256,7 +233,8 @@ class _Problem:
 
     def scaled_start(self, K0: float) -> tuple[float, float]:
         """The constant stiffness that meets the forces best with this pre-curvature, N m^2; and that, 1/m."""
-        forces = self.simulate(np.r_[np.ones(self.knots.size), [K0] * (self.fixed is None)], None).forces
+        steps = self.simulate(np.r_[np.ones(self.knots.size), [K0] * (self.fixed is None)], None).steps
+        forces = np.array([step.force for step in steps])
         scale = float(forces @ self.data.forces / (forces @ forces))
         return (abs(scale) if np.isfinite(scale) and scale else PAPER_START[0]), K0
 
@@ -264,7 +242,7 @@ class _Problem:
         law, K0 = self.split(parameters)
         test = BendingTest(self.data.length, law, K0, zero=self.zero, elements=self.elements)
         steps = simulate(test, chords=test.zero_chord - self.data.displacements, branch="up", starts=warm)
-        reached = all(_means_something(test, step) for step in steps)
+        reached = all(step.good for step in steps)
         forces = np.array([step.force for step in steps]) - self.data.forces
         rows = [forces]
         if self.data.curvatures is not None:
@@ -273,9 +251,7 @@ class _Problem:
         return _Simulation(test, steps, value if reached else np.full(value.size, np.inf))
 
     def jacobian(self, here: _Simulation) -> Array:
-        """Exact; an equilibrium whose moment falls somewhere (negative stiffness) has derivatives too."""
-        steps = [replace(step, outcome=Outcome.CONVERGED) for step in here.steps]
-        slopes = derivatives(here.test, steps, ("ordinates", "pre_curvature", "chord"))
+        slopes = derivatives(here.test, here.steps, ("ordinates", "pre_curvature", "chord"))
         k = self.knots.size
         chain = np.eye(k + 2)[:, : k + (self.fixed is None)]
         if self.fixed is None:
@@ -296,5 +272,4 @@ class _Problem:
 
     def iteration(self, parameters: Array, here: _Simulation) -> PaperIteration:
         law, K0 = self.split(parameters)
-        bends = np.array([step.kappa for step in here.steps])
-        return PaperIteration(law.ordinates, K0, float(here.residual @ here.residual), here.forces, bends)
+        return PaperIteration(law.ordinates, K0, float(here.residual @ here.residual), here.steps)

@@ -149,7 +149,7 @@ class Ramp:
 
     def ended(self, point: Point, outcome: Outcome) -> Trial:
         """The last stable state of a path and how it ended."""
-        return Trial(*point.start, self.system.balance(*point.start), self.steps, outcome)
+        return Trial(*point.start, point.balance, self.steps, outcome)
 
 
 def followed(system: System, start: Start | None = None, *, side: int = 1, most: int = PATH_STEPS) -> Trial:

@@ -146,7 +146,8 @@ def numbers(paper: Paper) -> dict[str, Any]:
 
 def force_errors(paper: Paper) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Forces of the fit with K0 = 0 less those of Table 1's cable, (3,) N."""
-    return np.array([step.force for step in paper.straight.steps]) - paper.inverse.history[-1].forces
+    both = zip(paper.straight.steps, paper.inverse.steps, strict=True)
+    return np.array([forced.force - free.force for forced, free in both])
 
 
 def iterations_to(fit: PaperFit, relative: float) -> int | None:
@@ -163,7 +164,7 @@ def statements(paper: Paper) -> list[Statement]:
     inverse, low = paper.inverse, 1e3 * paper.straight.characteristic.ordinates[0]
     errors = force_errors(paper)
     off = ", ".join(f"{1e3 * error:+.0f}" for error in errors)
-    largest = 100.0 * float(np.max(np.abs(errors / inverse.history[-1].forces)))
+    largest = 100.0 * float(np.max(np.abs(errors / [step.force for step in inverse.steps])))
     causes = ", ".join(f"{d.cause} {100 * d.share:.0f} % ({100 * d.rms:.0f} % rms alone)" for d in paper.causes[:-1])
     forces = {r: ", ".join(f"{f:.4f}" for f in paper.experiments[r, False].forces) for r in READINGS}
     counts = "; ".join(

@@ -54,7 +54,10 @@ def draw_responses(fit: PaperFit, figure: Area) -> Axes:
     """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of the last step."""
     above, below = _halves(figure)
     axes = plot_area(above, top=ONE_ROW)
-    count, forces = np.arange(len(fit.history)), np.array([state.forces for state in fit.history])
+    count, forces = (
+        np.arange(len(fit.history)),
+        np.array([[step.force for step in state.steps] for state in fit.history]),
+    )
     for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
         axes.axhline(values[-1], color=colour, lw=0.8, ls=":")
         axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"step {number}")
@@ -63,7 +66,7 @@ def draw_responses(fit: PaperFit, figure: Area) -> Axes:
     s = 1e3 * fit.steps[-1].s
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         name = {0: "start", len(fit.history) - 1: "end, step 3"}.get(number)
-        bends.plot(s, state.curvatures[-1], color=colour, lw=1.4, label=name)
+        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=name)
     return finish(bends, x="arc length s [mm]", y=CURVATURE, decimal=".", legend=2)
 
 
