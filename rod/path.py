@@ -79,8 +79,7 @@ class Ramp:
         self.pull = system.hold.reaction(R) - R
         self.residual = system.under(float(not self.fresh)).balance(angles, R)
         self.begin = self.at(np.r_[angles, R, 0.0])
-        self.along_share = np.zeros(self.begin.state.size)
-        self.along_share[-1] = 1.0
+        self.along_share = np.r_[np.zeros(angles.size + 2), 1.0]
 
     def at(self, state: Array) -> Point:
         """The state with its residuals."""
@@ -91,8 +90,8 @@ class Ramp:
 
     def solve(self, point: Point) -> tuple[Array, Array]:
         """Newton's step at a fixed share, and what the state changes by per share."""
-        # residuals are at most quadratic in the share: their derivative is a central difference of any width
         at = point.start
+        # residuals are at most quadratic in the share: their derivative is a central difference of any width
         forth = np.r_[np.zeros(at.angles.size), 0.5 * self.pull, 0.5]
         ahead, behind, here = self.at(point.state + forth).balance, self.at(point.state - forth).balance, point.balance
         turning, gap_turning = self.system.clamps_turning(here, *at, self.residual.gradient)
@@ -131,25 +130,27 @@ class Ramp:
         return None
 
     def reached(self, here: Point, goal: Array, normal: Array) -> Point | None:
-        """The state on the plane through ``goal``, if it lies so near that it is on the same path as ``here``."""
+        """The state on the plane through ``goal`` if it is on the same path: near, and no moment falls in between."""
         there = self.corrected(goal, normal)
-        if there is None:
+        if there is None or there.share > 1.0:
             return None
-        planned, off = (goal - here.state)[:-3], (there.state - goal)[:-3]
-        mass = self.system.mass
-        return there if mass @ off**2 < OFF**2 * (mass @ planned**2) + 0.01**2 else None
-
-    def falls_between(self, here: Point, there: Point) -> bool:
-        """Whether the moment of some joint falls half-way between two states."""
-        return bool(np.any(self.system.section(0.5 * (here.balance.K + there.balance.K))[1] <= 0.0))
+        planned, off, mass = (goal - here.state)[:-3], (there.state - goal)[:-3], self.system.mass
+        near = mass @ off**2 < OFF**2 * (mass @ planned**2) + 0.01**2
+        between = self.system.section(0.5 * (here.balance.K + there.balance.K))[1]
+        return there if near and np.all(between > 0.0) else None
 
     def negatives(self, point: Point) -> int:
         """Number of directions in which the state is unstable."""
         return self.system.excess_negatives(point.balance)
 
-    def ended(self, point: Point, outcome: Outcome) -> Trial:
-        """The last stable state of a path and how it ended."""
-        return Trial(*point.start, point.balance, self.steps, outcome)
+    def falls(self, here: Point, way: Array) -> bool:
+        """Whether the moment falls with curvature in some joint within a long step ahead."""
+        return bool(np.any(self.at(here.state + LONGEST * way).balance.tangent <= 0.0))
+
+    def ended(self, here: Point, way: Array, outcome: Outcome) -> Trial:
+        """The last stable state and how the path ends: where the moment falls ahead all else follows from that."""
+        falls = outcome is not Outcome.CONVERGED and self.falls(here, way)
+        return Trial(*here.start, here.balance, self.steps, Outcome.LIMIT_POINT if falls else outcome)
 
 
 def followed(system: System, start: Start | None = None, *, side: int = 1, most: int = PATH_STEPS) -> Trial:
@@ -161,7 +162,7 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
     ramp = Ramp(system, start)
     here, length, leaps = ramp.begin, LONGEST, True
     way = ramp.tangent(here)
-    while ramp.steps < most and way[-1] > 0.0 and length > (FALLING if _falls(ramp, here, way) else SHORTEST):
+    while ramp.steps < most and way[-1] > 0.0 and length > (FALLING if ramp.falls(here, way) else SHORTEST):
         there = _leap(ramp, here, way) if leaps else None
         leaps = False
         if there is None:
@@ -170,7 +171,7 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
             goal = here.state + length * way
             goal[-1] = 1.0 if last else goal[-1]
             there = ramp.reached(here, goal, ramp.along_share if last else way)
-        if there is None or there.share > 1.0 or ramp.falls_between(here, there):
+        if there is None:
             length *= 0.5
             continue
         if ramp.negatives(there):
@@ -182,22 +183,12 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
             branch = _branched(ramp, here, way, mode, side)
             if branch is None:
                 turned = ramp.tangent(there, way)[-1] < 0.0
-                return _lost(ramp, here, way, Outcome.TURNING_POINT if turned else Outcome.BIFURCATION)
+                return ramp.ended(here, way, Outcome.TURNING_POINT if turned else Outcome.BIFURCATION)
             there, leaps = branch, True
         if there.share == 1.0:
-            return ramp.ended(there, Outcome.CONVERGED)
+            return ramp.ended(there, way, Outcome.CONVERGED)
         way, here, length = ramp.tangent(there, there.state - here.state), there, min(LONGEST, 2.0 * length)
-    return _lost(ramp, here, way, Outcome.STALLED if way[-1] > 0.0 else Outcome.TURNING_POINT)
-
-
-def _lost(ramp: Ramp, here: Point, way: Array, outcome: Outcome) -> Trial:
-    """The last stable state; where the moment falls ahead that is the reason, and all else follows from it."""
-    return ramp.ended(here, Outcome.LIMIT_POINT if _falls(ramp, here, way) else outcome)
-
-
-def _falls(ramp: Ramp, here: Point, way: Array) -> bool:
-    """Whether the moment falls with curvature in some joint within a long step ahead."""
-    return bool(np.any(ramp.at(here.state + LONGEST * way).balance.tangent <= 0.0))
+    return ramp.ended(here, way, Outcome.STALLED if way[-1] > 0.0 else Outcome.TURNING_POINT)
 
 
 def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
@@ -218,9 +209,7 @@ def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
         return None
     angles = begin + brentq(beyond, 0.0, LEAP / largest, rtol=1e-4) * turns
     still = ramp.system.balance(angles, np.zeros(2))
-    R = np.linalg.lstsq(still.border.T / ramp.system.rod.length, -still.gradient / ramp.system.rod.length, rcond=None)[
-        0
-    ]
+    R = np.linalg.lstsq(still.border.T / rod.length, -still.gradient / rod.length, rcond=None)[0]
     there = ramp.reached(here, np.r_[angles, R, 1.0], ramp.along_share)
     return None if there is None or ramp.negatives(there) else there
 
@@ -230,9 +219,9 @@ def _critical(ramp: Ramp, here: Point, there: Point, way: Array) -> tuple[Point,
 
     None if no stiffness vanishes in between.
     """
-    low, stable, span, normal = 0.0, here, there.state - here.state, way
+    low, stable, span = 0.0, here, there.state - here.state
     for halving in range(1, LOCATING + 1):
-        middle = ramp.corrected(here.state + (low + 0.5**halving) * span, normal)
+        middle = ramp.corrected(here.state + (low + 0.5**halving) * span, way)
         if middle is None:
             break
         if ramp.negatives(middle) == 0:
