@@ -127,9 +127,8 @@ def solve(
         verdicts.append(attempt)
         if attempt.found:
             break
-    last = verdicts[-1]
-    if not last.found and any(trial.outcome is Outcome.LIMIT_POINT for trial in verdicts):
-        last = last._replace(outcome=Outcome.LIMIT_POINT)
+    falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
+    last = verdicts[-1] if verdicts[-1].found or not falling else falling[-1]
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
@@ -139,18 +138,19 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     side = bow_side(rod, branch)
     # Where only the path can tell the side, a warm start keeps the one it has.
     kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
+    warm = None
     # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
     turn = float(rod.mounted.angles[0] - rod.mounted.angles[-1])
-    warm = None
     if first is not None and (branch != "natural" or abs(turn) < np.pi):
         warm = newton(system, first)
-        near = float(np.abs(warm.angles - first.angles).max()) < NEAR
-        yield judged(system, warm if near else warm._replace(outcome=Outcome.STALLED), kept)
+        if np.abs(warm.angles - first.angles).max() > NEAR:
+            warm = warm._replace(outcome=Outcome.STALLED)
+        yield judged(system, warm, kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
     if lost.outcome is Outcome.LIMIT_POINT:
         # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
-        if patient and warm is not None and warm.found and system.excess_negatives(warm.balance):
+        if patient and warm and warm.found and system.excess_negatives(warm.balance):
             for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
                 yield judged(system, descended(system, beside), kept)
         return

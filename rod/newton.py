@@ -119,8 +119,7 @@ def newton(system: System, start: Start) -> Trial:
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
             return Trial(angles, R, balance, count, Outcome.CONVERGED)
-    localised = bool(np.any(balance.tangent <= 0.0))
-    return Trial(angles, R, balance, count, Outcome.LIMIT_POINT if localised else Outcome.STALLED)
+    return Trial(angles, R, balance, count, Outcome.STALLED)
 
 
 def tilted(system: System, trial: Trial, mode: Array | None = None) -> list[Start]:
@@ -154,7 +153,7 @@ def descended(system: System, start: Start) -> Trial:
             trial = newton(system, Start(angles, R))
             return trial._replace(steps=trial.steps + count)
         shift *= 0.25 if step < 0.5 * DESCENT_LIMIT else 1.0
-    return Trial(angles, R, system.balance(angles, R), DESCENT_STEPS, Outcome.STALLED)
+    return Trial(*start, system.balance(*start), DESCENT_STEPS, Outcome.STALLED)
 
 
 def softest(system: System, balance: Balance, mode: Array | None = None) -> tuple[float, Array]:
