@@ -54,10 +54,8 @@ def draw_responses(fit: PaperFit, figure: Area) -> Axes:
     """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of the last step."""
     above, below = _halves(figure)
     axes = plot_area(above, top=ONE_ROW)
-    count, forces = (
-        np.arange(len(fit.history)),
-        np.array([[step.force for step in state.steps] for state in fit.history]),
-    )
+    count = np.arange(len(fit.history))
+    forces = np.array([[step.force for step in state.steps] for state in fit.history])
     for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
         axes.axhline(values[-1], color=colour, lw=0.8, ls=":")
         axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"step {number}")
