@@ -81,3 +81,11 @@ def test_natural_side_of_a_straight_cable_is_up():
     assert bow_side(replace(STRAIGHT, pre_curvature=-1.0).rod, "natural") == -1
     assert bow_side(replace(STRAIGHT, pre_curvature=-1.0).rod, "opposite") == 1
     assert bow_side(replace(STRAIGHT, load=(0.0, -1.0)).rod, "natural") == 0
+
+
+@pytest.mark.parametrize(("K0", "chord"), [(0.5, 0.19), (2.0, 0.195), (2.0, 0.12), (5.0, 0.15)])
+def test_a_bowed_cable_is_brought_to_its_chord_at_once(K0, chord):
+    """A tangent, then Newton's method from as far along its turns as the chord needs: no path in small steps."""
+    step = simulate(replace(STRAIGHT, pre_curvature=K0), chords=[chord])[0]
+    assert step.good
+    assert step.iterations <= 9  # one for the tangent, at most eight of Newton's method
