@@ -30,14 +30,7 @@ def bow_side(rod: Rod, branch: Branch) -> int:
     """Side asked for: +1 up, -1 down, 0 if only following the path from the force-free shape can tell."""
     if branch in ("up", "down"):
         return 1 if branch == "up" else -1
-    K0 = rod.section.pre_curvature
-    low, high = float(K0.min()), float(K0.max())
-    if branch == "jump" or (branch == "natural" and (low < 0.0 < high or (low == high == 0.0 and _driven(rod)))):
-        return 0
-    natural = 1 if bow(rod, rod.mounted.angles) >= 0.0 else -1
-    return -natural if branch == "opposite" else natural
-
-
-def _driven(rod: Rod) -> bool:
-    """Whether loads, end moments or turned ends bend even a straight cable."""
-    return rod.load[1] != 0.0 or any(end.moment or end.angle for end in (rod.left, rod.right))
+    side, certain = rod.leaning
+    if branch == "opposite":
+        return -side
+    return side if certain and branch != "jump" else 0

@@ -117,6 +117,7 @@ class System:
         self._inverse_weights, self._load_beyond = 1.0 / rod.weights, rod.load_beyond
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
+        self._even_softness = self._axial * rod.length * np.eye(2)
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
@@ -171,11 +172,18 @@ class System:
         diagonal[:-1] -= off
         diagonal[1:] -= off
         border = self.border(edge)
-        gap = -(self.directions(edge) @ h)
+        gap = self._shortfall(edge, border, R)
         gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
         gap[1] *= self.hold.tip is None
         self._hold_ends(angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
+
+    def _shortfall(self, edge: EdgeState, border: Array, R: Array) -> Array:
+        """Minus the extent of the chain, (2,) m; with EA = GA strains do not depend on direction and sums do."""
+        if self._difference != 0.0:
+            return np.asarray(-(self.directions(edge) @ self.rod.edges))
+        beyond = 0.0 if self._load_beyond is None else self._load_beyond @ self.rod.edges
+        return np.array((border[1].sum(), -border[0].sum())) - self._axial * (self.rod.length * R + beyond)
 
     def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
@@ -207,8 +215,7 @@ class System:
 
     def _softness(self, edge: EdgeState) -> Array:
         if self._difference == 0.0:
-            soft = self._axial * self.rod.length
-            return np.array(((soft, 0.0), (0.0, soft)))
+            return self._even_softness
         return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
 
     def _restoring(self, edge: EdgeState) -> Array:
