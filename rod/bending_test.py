@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike
 from rod.characteristic import Array, Characteristic, MomentCurve, Reading
 from rod.discretisation import Along, Rod, joint_values
 from rod.equilibrium import Branch, Equilibrium, Start, solve
+from rod.laws import Function, as_law
 from rod.reduction import Hold
 from rod.section import InternalFriction, Section
 from rod.support import BEARING, Support
@@ -52,7 +53,7 @@ class BendingTest:
     length : m
         Between the bearing axes, rigid pieces included.
     characteristic : MomentCurve
-        `Characteristic`, or a law in closed form.
+        `Characteristic`, a law in closed form, or a number, function or table as of `rod.laws.as_law`.
     pre_curvature : 1/m
         K0: a number, (elements + 1,) values at the joints, or a function of the relative position 0..1 along the free
         cable.
@@ -96,6 +97,9 @@ class BendingTest:
     axial_stiffness: float | None = None
     shear_stiffness: float | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "characteristic", as_law(self.characteristic, length=self.length))
+
     @cached_property
     def rod(self) -> Rod:
         """The discrete rod of this test."""
@@ -136,6 +140,50 @@ class BendingTest:
             chord = self.zero_chord - (value + self.displacement_offset)
             return Hold(chord=chord, compliance=self.compliance, from_zero=True)
         return Hold(chord=value) if control == "chords" else Hold(force=value)
+
+
+def bend(
+    length: float,
+    law: MomentCurve | float | Function | ArrayLike,
+    *,
+    displacement: float | None = None,
+    chord: float | None = None,
+    force: float | None = None,
+    tip: tuple[float, float] | None = None,
+    branch: Branch = "natural",
+    start: Equilibrium | Start | None = None,
+    **cable: Any,
+) -> Equilibrium:
+    """Equilibrium of one cable under one load, in one call.
+
+    Parameters
+    ----------
+    length : m
+    law : as of `rod.laws.as_law`
+        EI as a number, moment as a function of the bend, a table of both, or a moment curve.
+    displacement, chord, force, tip : m, m, N, (2,) N
+        Exactly one: by how much the bearings approach, their distance, P between them, or the force on a free end.
+    branch : {"natural", "opposite", "up", "down", "jump"}
+    start : Equilibrium, Start or None
+    **cable
+        Everything else of `BendingTest`: ``pre_curvature``, ``left``, ``right``, ``load``, ``elements`` ...
+
+    Raises
+    ------
+    ValueError
+        If not exactly one of displacement, chord, force and tip is given, or a tip force without a free end.
+    """
+    given = {"displacements": displacement, "chords": chord, "forces": force}
+    controls = [(name, value) for name, value in given.items() if value is not None]
+    if len(controls) + (tip is not None) != 1:
+        raise ValueError("give exactly one of displacement, chord, force and tip")
+    test = BendingTest(length, law, **cable)  # type: ignore[arg-type]  # __post_init__ makes a moment curve of it
+    if (tip is not None) != (test.right.kind == "free"):
+        raise ValueError("tip is the force on a free end: give it with right=FREE, and only there")
+    if tip is not None:
+        return solve(test.rod, Hold(tip=tip), start=start, branch=branch)
+    name, value = controls[0]
+    return simulate(test, **{name: [value]}, branch=branch, starts=None if start is None else [start])[0]
 
 
 def simulate(

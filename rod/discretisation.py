@@ -164,6 +164,18 @@ class Rod:
         return Mounted(relative - np.arctan2(Y, X), float(np.hypot(X, Y)))
 
     @cached_property
+    def leaning(self) -> tuple[int, bool]:
+        """Side to which the force-free shape is bowed, +1 or -1, a straight one up, and whether the cable bows there.
+
+        That is uncertain where it is bent both ways, or straight and driven by loads, end moments or turned ends.
+        """
+        K0, h = self.section.pre_curvature, self.edges
+        driven = self.load[1] != 0.0 or any(end.moment or end.angle for end in (self.left, self.right))
+        low, high = float(K0.min()), float(K0.max())
+        side = 1 if float(h @ np.cumsum(h * np.sin(self.mounted.angles))) >= 0.0 else -1
+        return side, not (low < 0.0 < high or (driven and low == high == 0.0))
+
+    @cached_property
     def rest_angles(self) -> tuple[float, float]:
         """Rest angle of the springs, or the angle of a clamp, left and right, rad."""
         angles = self.mounted.angles

@@ -1,8 +1,8 @@
 """Equilibrium of the discrete rod: from rod and imposed end to the shape of least energy, its reactions and an outcome.
 
-Newton's method on the reduced system of `rod.reduction`, with proof of the minimum by inertia; where a whole step is
-too far, along a path of minima (`rod.newton`). Which side the cable bows to is chosen by ``branch`` (`rod.branch`). A
-fit whose K0 may change sign wants ``up``, the side the photo shows.
+Newton's method on the reduced system of `rod.reduction` from a warm start, with proof of the minimum by inertia;
+otherwise along the path of equilibria from the force-free shape (`rod.path`). Which side the cable bows to is chosen by
+``branch`` (`rod.branch`). A fit whose K0 may change sign wants ``up``, the side the photo shows.
 
 The result says in `Outcome` how far to trust it. Nothing raises for a shape that does not exist: that is nature's
 refusal and a value.
@@ -15,18 +15,24 @@ Source: Secs. 2.1 and 2.2 of the paper ("equilibria are minima of Eq. (4) under 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rod.branch import Branch, Start, bow, bow_side, bowed_start
+from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import Outcome, Trial, followed, judged, newton
+from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
+from rod.path import PATH_STEPS, followed
 from rod.reduction import Hold, System
-from rod.section import Memory
+from rod.section import Memory, Section
 
 __all__ = ["Branch", "Equilibrium", "Outcome", "Start", "solve"]
+
+#: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
+NEAR = 0.8
+#: Newton steps on a path that is not followed patiently: enough for one that leads to a chord at once.
+HASTY = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +109,10 @@ def solve(
         At the start of the step; None for the mounted cable.
     start : Start or Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape.
-    branch : {"natural", "opposite", "up", "down"}
+    branch : {"natural", "opposite", "up", "down", "jump"}
+        Side of the bow, see `rod.branch`.
     patient : bool
-        Else, with a warm start, no path is followed where neither that nor a bowed guess leads to the equilibrium: most
-        often there is none then, and to follow a path to its end costs fifty equilibria.
+        Else no path is followed to its end where a cable lacks an equilibrium, which costs fifty equilibria.
 
     Returns
     -------
@@ -115,46 +121,65 @@ def solve(
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
-    side = bow_side(rod, branch)
+    first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
     verdicts: list[Trial] = []
-    for attempt in _attempts(system, start, side, branch, patient=patient):
+    for attempt in _attempts(system, first, branch, patient=patient):
         verdicts.append(attempt)
         if attempt.found:
             break
-    last = verdicts[-1]
-    if not last.found and any(trial.outcome is Outcome.LIMIT_POINT for trial in verdicts):
-        last = last._replace(outcome=Outcome.LIMIT_POINT)
+    falling = [trial for trial in verdicts if trial.outcome is Outcome.LIMIT_POINT]
+    last = verdicts[-1] if verdicts[-1].found or not falling else falling[-1]
     return _record(system, last, sum(trial.steps for trial in verdicts))
 
 
-def _attempts(
-    system: System, start: Start | Equilibrium | None, side: int, branch: Branch, *, patient: bool
-) -> Iterator[Trial]:
-    """Ways to the equilibrium, the cheapest first: warm start, bowed guess, path from the force-free shape or guess."""
-    first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
+def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
+    """Ways to the equilibrium: the warm start, the path from the force-free shape, that from the start, others."""
+    rod, most = system.rod, PATH_STEPS if patient else HASTY
+    side = bow_side(rod, branch)
+    # Where only the path can tell the side, a warm start keeps the one it has.
+    kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
+    warm = None
+    # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
+    turn = float(rod.mounted.angles[0] - rod.mounted.angles[-1])
+    if first is not None and (branch != "natural" or abs(turn) < np.pi):
+        warm = newton(system, first)
+        if np.abs(warm.angles - first.angles).max() > NEAR:
+            warm = warm._replace(outcome=Outcome.STALLED)
+        yield judged(system, warm, kept)
+    lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
+    yield lost
+    if lost.outcome is Outcome.LIMIT_POINT:
+        # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
+        if patient and warm and warm.found and system.excess_negatives(warm.balance):
+            for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
+                yield judged(system, descended(system, beside), kept)
+        return
     if first is not None:
-        # Where only the path can tell the side, a warm start may keep the one it has; otherwise it is followed.
-        yield judged(system, newton(system, first), side or int(np.sign(bow(system.rod, first.angles))))
-    bowed = bowed_start(system, side) if side and system.hold.tip is None else None
-    if bowed is not None:
-        yield judged(system, newton(system, bowed), side)
-        if first is not None and not patient:
-            return
-    if first is not None:
-        yield judged(system, followed(system, first), side)
-    straight = not np.any(system.rod.section.pre_curvature)
-    if bowed is None or (branch == "natural" and not straight):
-        # Every state on this path is a proven minimum: it is the natural branch, to whichever side it bows.
-        yield judged(system, followed(system, Start(system.rod.mounted.angles, np.zeros(2))), 0)
-    else:
-        yield judged(system, followed(system, bowed), side)
+        yield judged(system, followed(system, first, side=side or 1, most=most), kept)
+    if branch == "natural" or not patient:
+        return
+    if branch != "jump":
+        yield judged(system, _from_straight(system, side), side)
+    for beside in tilted(system, lost):
+        yield judged(system, descended(system, beside), side)
+
+
+def _from_straight(system: System, side: int) -> Trial:
+    """The path from a straight cable without load that bows to the side asked for: its bend and loads fade in."""
+    rod, hold = system.rod, system.hold
+    section = Section(rod.section.law, np.zeros_like(rod.section.pre_curvature), rod.section.profile)
+    straight = replace(rod, section=section, load=(0.0, 0.0))
+    bowed = followed(System(straight, replace(hold, from_zero=False), straight.virgin), side=side)
+    trial = followed(system, Start(bowed.angles, bowed.R), side=side)
+    return trial._replace(steps=trial.steps + bowed.steps)
 
 
 def _admissible(rod: Rod, hold: Hold) -> bool:
     """Whether the chord asked for can exist: positive, and not beyond the length of a cable that hardly stretches."""
     if hold.chord is None or hold.compliance:
         return True
-    return hold.chord > 0.0 and (hold.chord < rod.length or rod.axial_stiffness is not None)
+    straight = abs(hold.chord - rod.mounted.chord) <= 1e-12 * rod.length
+    return hold.chord > 0.0 and (hold.chord < rod.length or straight or rod.axial_stiffness is not None)
 
 
 def _force_free(system: System) -> Trial:
@@ -165,24 +190,22 @@ def _force_free(system: System) -> Trial:
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     """Shape at the vertices from the edge angles; the bearing axes join in where rigid pieces are."""
     rod, memory, angles, R = system.rod, system.memory, trial.angles, trial.R
-    h = rod.edges
-    path = np.concatenate(
-        (np.zeros((2, 1)), np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1)), axis=1
-    )
-    inner = h[1:-1]
-    theta = np.empty(h.size - 1)
-    theta[1:-1] = (angles[1:-2] * inner[1:] + angles[2:-1] * inner[:-1]) / (inner[:-1] + inner[1:])
-    theta[0], theta[-1] = angles[0], angles[-1]
-    K, m = trial.balance.K, trial.balance.m
-    keep = slice(0 if h[0] else 1, h.size + 1 if h[-1] else h.size)
+    h, n = rod.edges, rod.edges.size
+    path, (theta, kappa, moment) = np.zeros((2, n + 1)), np.zeros((3, n + 1))
+    np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1, out=path[:, 1:])
+    theta[2:-2] = (angles[1:-2] * h[2:-1] + angles[2:-1] * h[1:-2]) / (h[1:-2] + h[2:-1])
+    theta[:2], theta[-2:] = angles[0], angles[-1]
+    kappa[1:-1], moment[1:-1] = trial.balance.K, trial.balance.m
+    moment[0], moment[-1] = moment[1], moment[-2]
+    keep = slice(0 if h[0] else 1, n + 1 if h[-1] else n)
     load = rod.vertex_load
     return Equilibrium(
         s=np.concatenate(([0.0], np.cumsum(h)))[keep],
         x=path[0, keep],
         y=path[1, keep],
-        theta=np.concatenate((angles[:1], theta, angles[-1:]))[keep],
-        kappa=np.concatenate(([0.0], K, [0.0]))[keep],
-        moment=np.concatenate((m[:1], m, m[-1:]))[keep],
+        theta=theta[keep],
+        kappa=kappa[keep],
+        moment=moment[keep],
         force=-float(R[0]),
         chord=float(path[0, -1]),
         outcome=trial.outcome,

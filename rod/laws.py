@@ -2,8 +2,9 @@
 
 A law answers as `rod.characteristic.MomentCurve`: K and K0 in 1/m to moment in N m, tangent in N m^2, energy in N.
 
-`StickSlip` is the usual picture of a cable whose wires stick to each other while hardly bent (stiffness EI0) and slip
-when bent more (EI1 < EI0): f(K) = EI1 + (EI0 - EI1) / cosh^2((K - K0) / kc), tangent reading.
+`as_law` makes one of whatever describes a cable: a number, a function or a table. `StickSlip` is the usual picture of a
+cable whose wires stick to each other while hardly bent (stiffness EI0) and slip when bent more (EI1 < EI0):
+f(K) = EI1 + (EI0 - EI1) / cosh^2((K - K0) / kc), tangent reading.
 """
 
 from __future__ import annotations
@@ -13,8 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
 
-from rod.characteristic import Array
+from rod.characteristic import Array, Characteristic, MomentCurve
+
+Function = Callable[[Array], ArrayLike]
+
+#: Largest bend of a law made of a function or a table, in turns of the cable, and the number of its control points.
+FARTHEST, POINTS = 10.0, 600
 
 
 @dataclass(frozen=True)
@@ -79,3 +86,56 @@ class StickSlip:
         u = np.abs(D) / self.kc
         log_cosh = u + np.log1p(np.exp(-2.0 * u)) - np.log(2.0)
         return np.asarray(0.5 * self.EI1 * D**2 + (self.EI0 - self.EI1) * self.kc**2 * log_cosh)
+
+
+def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) -> MomentCurve:
+    """Law from a moment curve (as it is), a number, a function or a table.
+
+    Functions and tables become a spline of their secant m / D over bends D up to `FARTHEST` turns of the cable.
+
+    Parameters
+    ----------
+    given : MomentCurve, EI in N m^2, function from bend (n,) 1/m to moment (n,) N m, or (n, 2) bend and moment
+        A table that begins at (0, 0) holds for bending both ways; between its rows the moment rises where they do, and
+        beyond them it goes on straight.
+    length : m
+        Of the cable: what a bend is large or small against.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these, a table whose bends do not increase, or a moment that does not vanish at rest.
+    """
+    if hasattr(given, "bound"):
+        return given  # type: ignore[return-value]  # a Protocol cannot be asked for at run time without its cost
+    if not callable(given):
+        values = np.asarray(given, float)
+        if values.ndim == 0:
+            return Characteristic.constant(float(values))
+        if values.ndim != 2 or values.shape[1] != 2 or values.shape[0] < 2 or not np.all(np.diff(values[:, 0]) > 0.0):
+            raise ValueError(
+                f"a law is a number (EI), a function of the bend, or rows of bend and moment with increasing bend; got "
+                f"an array of shape {values.shape}: sort the rows, and give two columns"
+            )
+        given = _table(values)
+    # finest about rest, where laws bend most; an even number of points, so that none is 0
+    far = np.arcsinh(FARTHEST * 2.0 * np.pi / 0.5)
+    bend = 0.5 / length * np.sinh(np.linspace(-far, far, POINTS))
+    moment = np.asarray(given(bend), float)
+    if moment[POINTS // 2 - 1] * moment[POINTS // 2] > 0.0:
+        raise ValueError("the moment of a law must vanish at bend 0: measure the bend from the shape at rest")
+    return Characteristic.from_ordinates(bend, moment / bend, reading="secant", abscissa="excess")
+
+
+def _table(rows: Array) -> Function:
+    """Monotone cubic through the rows, straight beyond them."""
+    bend, m = rows.T
+    if bend[0] == 0.0 == m[0]:
+        bend, m = np.r_[-bend[:0:-1], bend], np.r_[-m[:0:-1], m]
+    curve = PchipInterpolator(bend, m)
+
+    def moment(D: Array) -> Array:
+        inside = np.clip(D, bend[0], bend[-1])
+        return np.asarray(curve(inside) + curve(inside, 1) * (D - inside))
+
+    return moment

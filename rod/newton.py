@@ -1,8 +1,7 @@
-"""Newton's method on the reduced system: from a state to start from to an equilibrium, and a verdict on it.
+"""Newton's method on the reduced system: from a state near an equilibrium to the equilibrium, and a verdict on it.
 
-`newton` is the plain method, quadratic. `followed` takes the residual of its start back bit by bit (Newton homotopy;
-for a changed chord that is the path of displacement), halving where Newton fails, and accepts only proven minima close
-to each other: it stays on its branch. `judged` checks what was found: falling moment, minimum, side of the bow.
+`newton` is the plain method, quadratic. `descended` goes downhill in energy from a state that is no minimum to the one
+where the cable comes to rest. `judged` checks what was found: falling moment, minimum, side of the bow.
 
 Units: rad, N, m; tolerances are relative to EI and length.
 """
@@ -13,8 +12,9 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.blas import idamax
 
-from rod.branch import Start, bow
+from rod.branch import bow
 from rod.characteristic import Array
 from rod.reduction import Balance, System
 
@@ -22,11 +22,13 @@ from rod.reduction import Balance, System
 STEP_TOLERANCE = 1e-7
 #: Largest residual accepted, relative to EI/L (moments) and L (gaps): rounding of 3200 elements stays below it.
 RESIDUAL_TOLERANCE = 1e-9
-#: Largest turn of an edge in one Newton step, and in one accepted increment of a path, rad.
-STEP_LIMIT, INCREMENT_LIMIT = 0.8, 0.8
+#: Largest turn of an edge in one Newton step, rad.
+STEP_LIMIT = 0.8
 ITERATIONS = 25
-#: A path gives up below this share of the way, or after so many Newton steps; a shallow arch (K0 L = 0.002) needs 100.
-SMALLEST_INCREMENT, PATH_STEPS = 2.0**-12, 300
+#: Largest turn of an edge in a step downhill, rad, and how many such steps a cable takes at most to come to rest.
+DESCENT_LIMIT, DESCENT_STEPS = 0.3, 300
+#: How far beside an unstable equilibrium the way down begins, rad (root mean square).
+TILT = 1e-2
 
 
 class Outcome(Enum):
@@ -37,6 +39,16 @@ class Outcome(Enum):
         "the moment falls with curvature (dm/dK <= 0) within the visited range, so the bend localises and the shape "
         "means nothing; this usually means that f_EI is too low at high curvature or read as a secant where it is a "
         "tangent; raise the last control points or bend less"
+    )
+    TURNING_POINT = (
+        "the equilibria from the force-free shape on end at a limit point before what was asked for, where the cable "
+        "jumps; the shape is the last stable one; ask for less, control the displacement instead of the force, or ask "
+        "for the branch 'jump' to see where the cable comes to rest"
+    )
+    BIFURCATION = (
+        "the equilibria from the force-free shape on lose their stability at a bifurcation and no stable ones branch "
+        "off, so the cable jumps sideways; the shape is the last stable one; ask for less, or for the branch 'jump' to "
+        "see where the cable comes to rest"
     )
     STALLED = (
         "Newton's method did not converge even in the shortest steps; if the data are sound, start from the result of "
@@ -61,15 +73,21 @@ class Outcome(Enum):
         return str(self.value)
 
 
+class Start(NamedTuple):
+    """A state to start from: edge angles (n + 2,) rad and right reaction (2,) N."""
+
+    angles: Array
+    reaction: Array
+
+
 class Trial(NamedTuple):
-    """A state found by Newton's method, its residuals, the steps it took, how that ended, and the first step (rad)."""
+    """A state, its residuals, the steps of Newton's method that led there, and how that ended."""
 
     angles: Array
     R: Array
     balance: Balance
     steps: int
     outcome: Outcome
-    first_step: float = 0.0
 
     @property
     def found(self) -> bool:
@@ -77,26 +95,22 @@ class Trial(NamedTuple):
         return self.outcome is Outcome.CONVERGED
 
 
-def newton(
-    system: System, start: Start, *, fade: float = 0.0, residual: Balance | None = None, most: int = ITERATIONS
-) -> Trial:
-    """Newton's method from ``start``; the residuals are driven to ``fade`` times those of ``residual`` instead of 0."""
+def newton(system: System, start: Start) -> Trial:
+    """Newton's method from ``start``, with steps shortened where they turn an edge too far."""
     angles, R = start.angles, system.hold.reaction(start.reaction)
-    moment_scale, length = system.moment_scale, system.rod.length
-    balance = _faded(system.balance(angles, R), residual, fade)
-    norm, first_step = _norm(balance, moment_scale, length), 0.0
-    for count in range(1, most + 1):
+    balance = system.balance(angles, R)
+    norm = system.misfit(balance)
+    for count in range(1, ITERATIONS + 1):
         dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
-        step = float(np.abs(dalpha).max())
+        step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
         if not np.isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
-        first_step = first_step or step
         share = min(1.0, STEP_LIMIT / step) if step else 1.0
         # Friction makes the residual piecewise linear: a step across a kink may overshoot and is then shortened.
         for _ in range(4):
             angles_new, R_new = angles + share * dalpha[:, 0], R + share * dR[:, 0]
-            tried = _faded(system.balance(angles_new, R_new), residual, fade)
-            norm_new = _norm(tried, moment_scale, length)
+            tried = system.balance(angles_new, R_new)
+            norm_new = system.misfit(tried)
             if norm_new <= 2.0 * norm or norm_new < RESIDUAL_TOLERANCE or step > 0.1:
                 break
             share *= 0.5
@@ -104,45 +118,59 @@ def newton(
         if not np.isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
-            return Trial(angles, R, balance, count, Outcome.CONVERGED, first_step)
-    localised = bool(np.any(balance.tangent <= 0.0))
-    return Trial(angles, R, balance, count, Outcome.LIMIT_POINT if localised else Outcome.STALLED)
+            return Trial(angles, R, balance, count, Outcome.CONVERGED)
+    return Trial(angles, R, balance, count, Outcome.STALLED)
 
 
-def followed(system: System, start: Start) -> Trial:
-    """Newton homotopy: take the residual of ``start`` back in increments, each one a proven minimum near the last."""
-    R = system.hold.reaction(start.reaction)
-    begin = system.balance(start.angles, R)
-    here = Trial(start.angles, R, begin, 0, Outcome.CONVERGED)
-    reached, increment, steps = 0.0, 0.25, 0
-    failed: Trial | None = None
-    while reached < 1.0 and increment >= SMALLEST_INCREMENT and steps < PATH_STEPS:
-        goal = min(1.0, reached + increment)
-        trial = newton(system, Start(here.angles, here.R), fade=1.0 - goal, residual=begin, most=12)
-        steps += trial.steps
-        turned = float(np.abs(trial.angles - here.angles).max())
-        # The first step is the tangent of the path: who ends far beyond it may have left the branch.
-        near = turned < min(INCREMENT_LIMIT, 2.0 * trial.first_step + STEP_TOLERANCE)
-        if trial.found and near and system.excess_negatives(trial.balance) == 0:
-            here, reached, increment = trial, goal, 2.0 * increment
-        else:
-            failed = trial
-            increment *= 0.5
-    if reached >= 1.0 or failed is None:
-        return here._replace(steps=steps)
-    return here._replace(steps=steps, outcome=_reason(system, start, here, failed, begin, reached))
+def tilted(system: System, trial: Trial, mode: Array | None = None) -> list[Start]:
+    """Where to go downhill from an unstable equilibrium: beside it along its softest mode, to either side.
+
+    ``mode`` picks one of several that are equally soft, the one most like it.
+    """
+    mode = softest(system, trial.balance, mode)[1]
+    return [Start(trial.angles + sign * TILT * mode, trial.R) for sign in (1.0, -1.0)]
 
 
-def _reason(system: System, start: Start, here: Trial, failed: Trial, begin: Balance, reached: float) -> Outcome:
-    """Why a path ends at ``here``: the moment falls, the path turns back or loses its minimum, or Newton stalls."""
-    if failed.outcome is Outcome.LIMIT_POINT:
-        return Outcome.LIMIT_POINT
-    if failed.found or system.excess_negatives(failed.balance) != 0:
-        return Outcome.UNSTABLE
-    # Where a smooth path turns back the state changes without bound: far faster than on the way so far.
-    rate, _ = system.solve(here.balance, -begin.gradient[:, None], -begin.gap[:, None])
-    usual = float(np.abs(here.angles - start.angles).max()) / reached if reached else np.inf
-    return Outcome.STALLED if float(np.abs(rate).max()) < 5.0 * usual else Outcome.UNSTABLE
+def descended(system: System, start: Start) -> Trial:
+    """Downhill in energy from ``start`` to a minimum: gradient flow in implicit steps that end as Newton's method.
+
+    The Hessian is shifted until it is positive on all motions that the supports allow; the larger the shift, the
+    shorter the step along the flow. Near a minimum no shift is needed and a step is Newton's.
+    """
+    angles, R = start.angles, system.hold.reaction(start.reaction)
+    mass = system.moment_scale * system.mass
+    shift = 1.0
+    for count in range(1, DESCENT_STEPS + 1):
+        balance = system.balance(angles, R)
+        shifted = balance._replace(diagonal=balance.diagonal + shift * mass)
+        dalpha, dR = system.solve(shifted, -balance.gradient[:, None], -balance.gap[:, None])
+        step = float(np.abs(dalpha).max()) if system.excess_negatives(shifted) == 0 else np.inf
+        if not step <= DESCENT_LIMIT:
+            shift = 4.0 * max(shift, 0.1)
+            continue
+        angles, R = angles + dalpha[:, 0], R + dR[:, 0]
+        if shift < 0.01 and step < 0.01:
+            trial = newton(system, Start(angles, R))
+            return trial._replace(steps=trial.steps + count)
+        shift *= 0.25 if step < 0.5 * DESCENT_LIMIT else 1.0
+    return Trial(*start, system.balance(*start), DESCENT_STEPS, Outcome.STALLED)
+
+
+def softest(system: System, balance: Balance, mode: Array | None = None) -> tuple[float, Array]:
+    """Smallest stiffness in absolute value, relative to EI/L, and its mode (n + 2,), by inverse iteration.
+
+    The mode has the root mean square 1 rad over the length.
+    """
+    mass = system.mass
+    mode = np.random.default_rng(0).standard_normal(mass.size) if mode is None else mode
+    stiffness = np.inf
+    for _ in range(12):
+        turn = system.solve(balance, (system.moment_scale * mass * mode)[:, None], np.zeros((2, 1)))[0][:, 0]
+        before, stiffness = stiffness, float(mass @ (mode * mode) / (mass @ (mode * turn)))
+        mode = turn / np.sqrt(mass @ (turn * turn))
+        if abs(stiffness - before) <= 1e-4 * abs(stiffness):
+            break
+    return stiffness, np.asarray(mode)
 
 
 def judged(system: System, trial: Trial, side: int) -> Trial:
@@ -151,7 +179,9 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
         return trial
     outcome = Outcome.CONVERGED
     K = trial.balance.K
-    between = system.section(np.concatenate((K[:1], 0.5 * (K[1:] + K[:-1]))))[1]
+    middle = K.copy()
+    middle[1:] = 0.5 * (K[1:] + K[:-1])
+    between = system.section(middle)[1]
     if min(float(trial.balance.tangent.min()), float(between.min())) <= 0.0:
         outcome = Outcome.LIMIT_POINT
     elif system.excess_negatives(trial.balance) != 0:
@@ -159,15 +189,3 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
     elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH
     return trial._replace(outcome=outcome)
-
-
-def _faded(balance: Balance, residual: Balance | None, fade: float) -> Balance:
-    if residual is None or fade == 0.0:
-        return balance
-    return balance._replace(gradient=balance.gradient - fade * residual.gradient, gap=balance.gap - fade * residual.gap)
-
-
-def _norm(balance: Balance, moment_scale: float, length: float) -> float:
-    """Largest residual, relative."""
-    g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
-    return float(max(g.max() / moment_scale, -g.min() / moment_scale, abs(gap_x) / length, abs(gap_y) / length))

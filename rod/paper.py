@@ -1,10 +1,16 @@
 """The paper's virtual experiments as numbers: what can be checked of it without a real cable.
 
-* `table_one`: forces and curvature ranges of Table 1 for both readings and both zeros of displacement (Fig. 3).
-* `virtual_inverse`: Eq. (7) on Table 1's data with its evolution (Figs. 4 and 5). Data and fit share the grid, as in
+* `table_one`: forces and curvature ranges of Table 1 for both readings and both zeros of displacement, and the shapes
+  with that of the initial rod, which is already slightly bent (Fig. 3).
+* `virtual_inverse`: Eq. (7) on Table 1's data with its evolution: control points and characteristic (Fig. 4), forces
+  and curvatures (Fig. 5). Data and fit share the grid, as in
   the paper: it shows that the parameters can be identified, and validates nothing.
-* `forced_straight`: the same data fitted with K0 = 0 (Fig. 6): negative stiffness at low curvature. Displacement is
-  counted from where the true cable was mounted, for the machine knows that and not the model's K0.
+* `forced_straight`: the same data fitted with K0 = 0 (Fig. 6), by the forces alone (Eq. (6)), which are met with wrong
+  values, and with the curvatures (Eq. (7)): negative stiffness at low curvature. Displacement is counted from where the
+  true cable was mounted, for the machine knows that and not the model's K0. Where the paper speaks of small deviations,
+  the forces of this fit are off by -36, +14 and +16 mN of 430 to 450 mN. Its minimum depends on the number of nodes,
+  because the sum over curvatures does and the end joints are bent without a moment: f_EI(0) is -0.61 mN m^2 with the
+  101 nodes here (two other solvers agree), -0.69 with 50 and -0.53 with 400.
 * `iteration_costs`: the iterative method of Sec. 2.3 beside Newton's method on the nonlinear energy.
 * `disagreement`: what makes the two curves of Fig. 7 differ. Each cause is switched on alone in a virtual test of
   Table 1's cable, the inverse problem and the pointwise graph of Eq. (14) are compared as the paper compares them, and
@@ -18,7 +24,7 @@ Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulati
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,6 +33,7 @@ from scipy.signal import savgol_filter
 
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, BendingTest, simulate, table_1
 from rod.characteristic import Reading
+from rod.elastica import UniformEquilibrium, pure_bending
 from rod.equilibrium import Equilibrium, solve
 from rod.iteration import iterate
 from rod.paper_fit import PaperFit, Virtual, paper_fit
@@ -52,6 +59,12 @@ class TableOne:
     def largest_curvatures(self) -> Array:
         """Curvature at mid-span (3,) 1/m; the smallest is K0, at the ends."""
         return np.array([np.max(step.kappa) for step in self.steps])
+
+    @property
+    def initial(self) -> UniformEquilibrium:
+        """The rod before the first step, free of force."""
+        rod = self.steps[0].rod
+        return pure_bending(float(rod.section.pre_curvature[0]), length=rod.length)
 
 
 @dataclass(frozen=True)
@@ -83,7 +96,9 @@ class Difference:
     cause : str
     kappa : (n,) 1/m
     inverse, balance : (n,) N m^2
-        Both f_EI as the paper would print them.
+        Both f_EI as the paper would print them, the latter as the median of the graphs.
+    graphs : (3,) of ((m,) 1/m, (m,) N m^2)
+        The graph of Eq. (14) of each photo.
     rms : relative
     share : relative
         Of the sum of squares over all causes; NaN for all causes together.
@@ -93,6 +108,7 @@ class Difference:
     kappa: Array
     inverse: Array
     balance: Array
+    graphs: tuple[tuple[Array, Array], ...]
     rms: float
     share: float = float("nan")
 
@@ -149,9 +165,10 @@ def virtual_inverse(reading: Reading = "secant") -> PaperFit:
     return paper_fit(virtual_data(table_1(reading)), TABLE_1_KNOTS, reading=reading)
 
 
-def forced_straight(reading: Reading = "secant") -> PaperFit:
-    """The same fit with K0 = 0, which the cable does not have (Fig. 6)."""
+def forced_straight(reading: Reading = "secant", *, curvatures: bool = True) -> PaperFit:
+    """The same fit with K0 = 0, which the cable does not have (Fig. 6): Eq. (7), or without curvatures Eq. (6)."""
     data = virtual_data(table_1(reading), from_length=True)
+    data = data if curvatures else replace(data, curvatures=None)
     return paper_fit(data, TABLE_1_KNOTS, reading=reading, zero="length", pre_curvature=0.0)
 
 
@@ -184,7 +201,7 @@ def disagreement(conditions: Conditions | None = None) -> tuple[Difference, ...]
     )
     total = sum(part.rms**2 for part in alone)
     together = _difference("all together", _with_wave("secant", wave), "secant", differentiated)
-    shares = (Difference(d.cause, d.kappa, d.inverse, d.balance, d.rms, d.rms**2 / total) for d in alone)
+    shares = (replace(d, share=d.rms**2 / total) for d in alone)
     return (*shares, together)
 
 
@@ -198,8 +215,8 @@ def _difference(
 ) -> Difference:
     """Fit, take the graph of the photos, and compare both where both were; the graph by its median over curvature."""
     fit = paper_fit(virtual_data(test), TABLE_1_KNOTS, reading=reading)
-    points = [pointwise(step) for step in simulate(test, displacements=STEPS)]
-    kappa, ratio = (np.concatenate(columns) for columns in zip(*points, strict=True))
+    graphs = tuple(pointwise(step) for step in simulate(test, displacements=STEPS))
+    kappa, ratio = (np.concatenate(columns) for columns in zip(*graphs, strict=True))
     # 12 bins between the 5th and 95th percentile: wide enough for a median in each, narrow against the bend of f
     low, high = np.percentile(kappa, (5.0, 95.0))
     edges = np.linspace(low, high, 13)
@@ -208,7 +225,7 @@ def _difference(
     balance = np.array([np.median(ratio[chosen]) for chosen in inside])
     inverse = fit.characteristic.f(middle)
     rms = float(np.sqrt(np.mean((balance / inverse - 1.0) ** 2)))
-    return Difference(cause, middle, inverse, balance, rms)
+    return Difference(cause, middle, inverse, balance, graphs, rms)
 
 
 def _exact(step: Equilibrium) -> tuple[Array, Array]:

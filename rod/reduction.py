@@ -21,15 +21,19 @@ Signs and units as in `rod.discretisation`; P = -R_x is the force along the chor
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dgtsv, dpttrf
+from scipy.linalg.blas import idamax
+from scipy.linalg.lapack import dgesv, dgtsv, dpttrf, dstebz, dsyev
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.section import Memory
+from rod.support import Support
 
 
 @dataclass(frozen=True)
@@ -110,14 +114,39 @@ class System:
         self.moment_scale = rod.stiffness_scale / rod.length
         self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
-        self._inverse_weights = 1.0 / rod.weights
+        self._inverse_weights, self._load_beyond = 1.0 / rod.weights, rod.load_beyond
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
+        self._even_softness = self._axial * rod.length * np.eye(2)
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
         self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
         units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
+
+    @cached_property
+    def mass(self) -> Array:
+        """Weight of every angle (n + 2,) in sums of squares of turns: its share of the length.
+
+        A bearing without a rigid piece turns with half an element: without a weight it could not be held.
+        """
+        share = np.array(self.rod.edges)
+        share[[0, -1]] = np.maximum(share[[0, -1]], self.rod.weights[[0, -1]])
+        return np.asarray(share / self.rod.length)
+
+    def under(self, share: float) -> System:
+        """The same system with a share of its dead load."""
+        if self._load_beyond is None or share == 1.0:
+            return self
+        other = copy(self)
+        other._load_beyond = share * self._load_beyond
+        return other
+
+    def misfit(self, balance: Balance) -> float:
+        """Largest residual, relative to EI/L and L."""
+        g, (gap_x, gap_y) = balance.gradient, balance.gap.tolist()
+        moment = abs(g[idamax(g)]) / self.moment_scale
+        return float(max(moment, abs(gap_x) / self.rod.length, abs(gap_y) / self.rod.length))
 
     def section(self, K: Array) -> tuple[Array, Array]:
         """Moment and tangent (n,) of the cross-section at curvatures (n,), with the memory at the start of the step."""
@@ -126,8 +155,7 @@ class System:
     def edge_state(self, angles: Array, R: Array) -> EdgeState:
         """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
         cos, sin = np.cos(angles), np.sin(angles)
-        beyond = self.rod.load_beyond
-        fx, fy = R.tolist() if beyond is None else R[:, None] + beyond
+        fx, fy = R.tolist() if self._load_beyond is None else R[:, None] + self._load_beyond
         return EdgeState(cos, sin, fx * cos + fy * sin, fy * cos - fx * sin)
 
     def balance(self, angles: Array, R: Array) -> Balance:
@@ -144,11 +172,18 @@ class System:
         diagonal[:-1] -= off
         diagonal[1:] -= off
         border = self.border(edge)
-        gap = -(self.directions(edge) @ h)
+        gap = self._shortfall(edge, border, R)
         gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
         gap[1] *= self.hold.tip is None
         self._hold_ends(angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
+
+    def _shortfall(self, edge: EdgeState, border: Array, R: Array) -> Array:
+        """Minus the extent of the chain, (2,) m; with EA = GA strains do not depend on direction and sums do."""
+        if self._difference != 0.0:
+            return np.asarray(-(self.directions(edge) @ self.rod.edges))
+        beyond = 0.0 if self._load_beyond is None else self._load_beyond @ self.rod.edges
+        return np.array((border[1].sum(), -border[0].sum())) - self._axial * (self.rod.length * R + beyond)
 
     def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
@@ -180,8 +215,7 @@ class System:
 
     def _softness(self, edge: EdgeState) -> Array:
         if self._difference == 0.0:
-            soft = self._axial * self.rod.length
-            return np.array(((soft, 0.0), (0.0, soft)))
+            return self._even_softness
         return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
 
     def _restoring(self, edge: EdgeState) -> Array:
@@ -189,16 +223,34 @@ class System:
 
     def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
         """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
-        rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
-        ends = ((0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0))
-        for end, support, rest_angle, slip, sign in ends:
+        for end, support, rest_angle, slip, sign in self._ends:
             if support.kind == "clamp":
                 gradient[end] = self.moment_scale * (angles[end] - rest_angle)
                 diagonal[end], off[end], border[:, end] = self.moment_scale, 0.0, 0.0
-            elif support.stiffness or support.friction_moment or support.moment:
+            else:
                 moment, slope = support.moment_at(float(angles[end]), rest_angle, slip)
                 gradient[end] += moment + sign * support.moment
                 diagonal[end] += slope
+
+    @cached_property
+    def _ends(self) -> list[tuple[int, Support, float, float, float]]:
+        """Ends where a clamp, a spring, friction or a moment acts: place, support, its angles, sign of its moment."""
+        rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
+        ends = (0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0)
+        return [e for e in ends if e[1].kind == "clamp" or e[1].stiffness or e[1].friction_moment or e[1].moment]
+
+    def clamps_turning(self, here: Balance, angles: Array, R: Array, residual: Array) -> tuple[Array, Array]:
+        """Change of gradient (n + 2,) and gap (2,) while clamps turn by what they lack in ``residual`` (n + 2,) N m.
+
+        The Hessian of ``here`` holds them at rest.
+        """
+        gradient, gap = np.zeros(angles.size), np.zeros(2)
+        for end, support, *_ in self._ends:
+            if support.kind == "clamp" and (turn := -residual[end] / self.moment_scale):
+                near, joint = (1, 0) if end == 0 else (-2, -1)
+                gradient[near] -= here.tangent[joint] * self._inverse_weights[joint] * turn
+                gap += self.border(self.edge_state(angles, R))[:, end] * turn
+        return gradient, gap
 
     def solve(self, balance: Balance, rhs: Array, gap: Array) -> tuple[Array, Array]:
         """Solve the bordered system for several right-hand sides.
@@ -232,7 +284,7 @@ class System:
             return 1
         diagonal = balance.diagonal.copy()
         diagonal[self._middle] += self._spring
-        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
+        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(dsyev(schur, compute_v=0)[0] < 0.0))
         return count - len(self._imposed)
 
     def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
@@ -258,14 +310,7 @@ class System:
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
     """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
-    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist, as on nearly every state a fit meets
+    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist: none
         return 0
-    count, pivot = 0, 1.0
-    squares = np.concatenate(([0.0], off**2)).tolist()
-    smallest = float(np.finfo(float).tiny) * max(1.0, *squares)  # a pivot of 0 is moved so far that nothing overflows
-    for d, b2 in zip(diagonal.tolist(), squares, strict=True):
-        pivot = d - b2 / pivot
-        if abs(pivot) < smallest:
-            pivot = smallest
-        count += int(pivot < 0.0)
-    return count
+    bound = 4.0 * float(np.abs(diagonal).max() + np.abs(off).max())  # Gershgorin: no eigenvalue lies below minus this
+    return int(dstebz(diagonal, off, 1, -bound, 0.0, 1, 1, bound, "E")[0])

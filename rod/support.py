@@ -84,3 +84,5 @@ class Support:
 
 #: The ideal, moment-free bearing.
 BEARING = Support()
+#: A clamp along the chord, and a free end (right end only).
+CLAMP, FREE = Support("clamp", angle=0.0), Support("free")

@@ -19,6 +19,7 @@ ROD = [
     ("energy", "reduction"),
     ("branch",),
     ("newton",),
+    ("path",),
     ("equilibrium",),
     ("iteration", "bending_test"),
     ("parameters",),
@@ -211,7 +212,7 @@ def test_the_files_of_a_package_have_an_order_too(package):
                 assert order[target] < order[here], f"{here} imports {name}, which is not to its left"
 
 
-STANDARD = {"__future__", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"}
+STANDARD = {"__future__", "collections", "copy", "dataclasses", "enum", "functools", "itertools", "math", "typing"}
 
 
 @pytest.mark.parametrize(

@@ -16,57 +16,90 @@ from rod.paper import Difference, TableOne
 from rod.paper_fit import PaperFit
 
 KAPPA = np.linspace(0.0, 10.0, 101)  # 1/m, the range of Table 1
+ITERATION = Ruling("iteration", whole=True)
 CURVATURE, STIFFNESS = "curvature κ [1/m]", "f_EI [mN m²]"
 
 
 def draw_shapes(experiment: TableOne, figure: Area) -> Axes:
-    """Fig. 3: the cable at the three steps, in the chord frame with the same scale on both axes."""
-    axes = plot_area(figure, top=ONE_ROW)
+    """Fig. 3: the initial rod and the cable at the three steps, in the chord frame, same scale on both axes."""
+    axes = plot_area(figure, top=TWO_ROWS)
+    initial = experiment.initial
+    axes.plot(1e3 * initial.x, 1e3 * initial.y, color=LIGHT["muted"], ls=":", label="initial rod: no force")
     for number, (step, colour) in enumerate(zip(experiment.steps, step_colours(3), strict=True), start=1):
-        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=f"{number}: {step.force:.4f} N")
+        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=f"step {number}: {step.force:.4f} N")
     axes.set_aspect("equal", adjustable="datalim")
-    return finish(axes, x="x [mm]", y="y [mm]", decimal=".", legend=3)
+    return finish(axes, x="x [mm]", y="y [mm]", decimal=".", legend=2)
 
 
 def draw_evolution(fit: PaperFit, figure: Area) -> Axes:
-    """Fig. 4: control points and K0 relative to Table 1."""
-    axes = plot_area(figure)
+    """Fig. 4: above, control points and K0 relative to Table 1; below, the characteristic, from dark to bright."""
+    above, below = _halves(figure)
+    axes = plot_area(above)
     count = np.arange(len(fit.history))
     values = np.array([[*state.ordinates, state.pre_curvature] for state in fit.history])
     truth = np.array([*TABLE_1_ORDINATES, TABLE_1["pre_curvature"]])
     names = [*(f"f_EI({knot:g} 1/m)" for knot in TABLE_1_KNOTS), "K0"]
     for column, (name, colour, mark) in enumerate(zip(names, step_colours(4), "osD^", strict=True)):
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
-    return finish(axes, x=Ruling("iteration", whole=True), y="relative to Table 1", decimal=".", legend=2)
-
-
-def draw_iterates(fit: PaperFit, figure: Area) -> Axes:
-    """Fig. 5: the characteristic after each iteration, from dark to bright, and the truth."""
-    axes = plot_area(figure)
+    finish(axes, x=ITERATION, y="relative to Table 1", decimal=".", legend=2)
+    laws = plot_area(below, top=ONE_ROW)
     for state, colour in zip(fit.history, step_colours(len(fit.history)), strict=True):
         law = Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates)
-        axes.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4)
-    _truth(axes)
-    return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=1)
+        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4)
+    _truth(laws)
+    return finish(laws, x=CURVATURE, y=STIFFNESS, decimal=".", legend=1)
 
 
-def draw_straight(fit: PaperFit, figure: Area) -> Axes:
-    """Fig. 6: the fit with K0 = 0 beside the truth."""
-    axes = plot_area(figure)
-    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    axes.plot(KAPPA, 1e3 * fit.characteristic.f(KAPPA), color=LIGHT["alarm"], label="fit with K0 = 0")
-    _truth(axes)
-    return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=2)
+def draw_responses(fit: PaperFit, figure: Area) -> Axes:
+    """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of the last step."""
+    above, below = _halves(figure)
+    axes = plot_area(above, top=ONE_ROW)
+    count = np.arange(len(fit.history))
+    forces = np.array([[step.force for step in state.steps] for state in fit.history])
+    for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
+        axes.axhline(values[-1], color=colour, lw=0.8, ls=":")
+        axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"step {number}")
+    finish(axes, x=ITERATION, y="force P [N]", decimal=".", legend=3)
+    bends = plot_area(below, top=ONE_ROW)
+    s = 1e3 * fit.steps[-1].s
+    for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
+        name = {0: "start", len(fit.history) - 1: "end, step 3"}.get(number)
+        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=name)
+    return finish(bends, x="arc length s [mm]", y=CURVATURE, decimal=".", legend=2)
+
+
+def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, figure: Area) -> Axes:
+    """Fig. 6: fits with K0 = 0 by the forces alone (above) and with the curvatures (below), beside that of free K0."""
+    for part, forced, name in zip(
+        _halves(figure),
+        (forces_alone, fit),
+        ("K0 = 0, forces alone, Eq. (6)", "K0 = 0, with curvatures, Eq. (7)"),
+        strict=True,
+    ):
+        axes = plot_area(part)
+        axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+        axes.plot(KAPPA, 1e3 * forced.characteristic.f(KAPPA), color=LIGHT["alarm"], label=name)
+        axes.plot(KAPPA, 1e3 * free.characteristic.f(KAPPA), color=LIGHT["inverse"], ls="--", label="K0 free")
+        _truth(axes)
+        finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=2)
+    return axes
 
 
 def draw_difference(cause: Difference, figure: Area) -> Axes:
-    """Fig. 7: both ways with one cause of disagreement, and the rms of their difference."""
+    """Fig. 7: both ways with one cause of disagreement: the graph of each of the three photos, and their median."""
     axes = plot_area(figure, top=TWO_ROWS)
+    for number, ((kappa, ratio), colour) in enumerate(zip(cause.graphs, step_colours(3), strict=True), start=1):
+        axes.plot(kappa, 1e3 * ratio, ".", color=colour, ms=2.5, label=f"photo {number}")
     axes.plot(cause.kappa, 1e3 * cause.inverse, color=LIGHT["inverse"], label="inverse problem")
-    label = f"balance equations ({100 * cause.rms:.0f} % rms)"
+    label = f"median ({100 * cause.rms:.0f} % rms)"
     axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)
-    axes.set_ylim(bottom=0.0)
-    return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=1)
+    axes.set_ylim(0.0, 2e3 * float(max(cause.inverse.max(), cause.balance.max())))
+    return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=3)
+
+
+def _halves(figure: Area) -> list[Area]:
+    """Upper and lower half of a figure."""
+    return list(np.atleast_1d(np.asarray(figure.subfigures(2, 1))))
 
 
 def _truth(axes: Axes) -> None:

@@ -38,8 +38,27 @@ def test_forcing_k0_to_zero_makes_stiffness_negative_at_low_curvature():
     np.testing.assert_allclose((middle, high), (1.73e-3, 1.61e-3), rtol=0.05)
 
 
+def test_figures_have_the_states_of_every_iteration_the_initial_rod_and_one_graph_a_photo():
+    fit = virtual_inverse()
+    assert all(step.kappa.shape == (101,) for state in fit.history for step in state.steps)
+    begin, end = (np.array([step.force for step in state.steps]) for state in (fit.history[0], fit.history[-1]))
+    assert begin.min() > 3.0 * end.max()  # the start is far too stiff
+    np.testing.assert_allclose(end, (0.4267, 0.4463, 0.4384), atol=1e-4)
+    initial = table_one("secant").initial
+    assert initial.chord == pytest.approx(0.198669, abs=5e-7)
+    assert initial.y.max() == pytest.approx((1.0 - np.cos(0.2)) / 2.0, rel=1e-9)  # height of the arc of K0 = 2 1/m
+
+
+def test_forces_alone_are_met_with_wrong_values_by_a_straight_cable():
+    fit = forced_straight(curvatures=False)
+    assert fit.converged
+    assert fit.objective < 1e-16
+    assert np.abs(fit.characteristic.ordinates / (5e-3, 3e-3, 2e-3) - 1.0).max() > 0.2
+
+
 def test_the_readings_make_most_of_the_disagreement_of_fig_7():
     *causes, together = disagreement()
+    assert all(len(cause.graphs) == 3 for cause in causes)
     assert sum(cause.share for cause in causes) == pytest.approx(1.0)
     assert max(causes, key=lambda cause: cause.share).cause == "secant against tangent"
     assert together.rms > 0.1

@@ -23,6 +23,9 @@ def test_numbers_have_the_contracts_names(folder):
     assert len(numbers["inverse"]["history"]) == numbers["inverse"]["iterations"] + 1
     assert numbers["inverse"]["pre_curvature_per_m"] == pytest.approx(2.0)
     assert numbers["forced_straight"]["ordinates_Nm2"][0] < 0.0
+    assert numbers["forced_straight"]["converged"]
+    # physics notes: -36, +14 and +16 mN, where the paper says "small deviations"
+    assert numbers["forced_straight"]["force_error_N"] == pytest.approx([-0.036, 0.014, 0.016], abs=6e-4)
     steps = numbers["rediscovery"]
     assert [step["cause"] for step in steps] == ["nonlinear_stiffness", "pre_curvature"]
     assert steps[1]["heldout_excess_removed"] > 0.99  # without noise nothing but the model's own grid is left
@@ -33,6 +36,16 @@ def test_figures_stand_alone_and_on_the_page(folder):
     page = (folder / "paper.html").read_text(encoding="utf-8")
     assert "http://" not in page.replace("http://www.w3.org/", "") and "https://" not in page
     assert "&#" not in page.partition("<style>")[2].partition("</style>")[0]  # escaped quotes end a style sheet
+    assert "-36, +14, +16 mN" in page
+    for said in (
+        "initial rod",
+        "forces and curvatures over the iterations",
+        "Eq. (6)",
+        "Eq. (7)",
+        "K0 free",
+        "photo 3",
+    ):
+        assert said in page
     figures = sorted(path.stem for path in folder.glob("*.svg"))
     assert figures == ["fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "fig7d"]
     for name in figures:
