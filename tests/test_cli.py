@@ -378,9 +378,8 @@ def test_design_ranks_causes_and_says_what_stays_invisible():
 def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
     (cheap / "batch/b").rename(cheap / "b")
     deep = cheap / "batch/1/2/3"
-    deep.mkdir(parents=True)
+    (deep / "empty").mkdir(parents=True)
     (cheap / "b").rename(deep / "b")
-    (deep / "with \x1b[2Jescape").mkdir()
     assert call("check", "batch").stderr == ""
     done = call("check", "batch", "--set", "intake.search_depth=3")
     assert done.stderr == (
@@ -389,8 +388,7 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
     )
     assert "2 of 2 specimens would run" in done.stdout
     done = call("check", "batch/1", "--set", "intake.search_depth=2")
-    assert done.exit_code == 3
-    assert "not searched (2, first batch/1/2/3/b)" in done.stderr
+    assert done.exit_code == 3 and "not searched (2, first batch/1/2/3/b)" in done.stderr
 
 
 def test_folders_without_description_are_told(cheap):
