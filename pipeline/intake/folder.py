@@ -25,7 +25,7 @@ from pipeline.settings.intake import IntakeSettings
 
 LOG_NAME = "force.csv"
 LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
-Kind = Literal["specimen", "none", "too deep"]
+Kind = Literal["specimen", "none", "deep"]
 
 
 def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
@@ -93,7 +93,7 @@ def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Pa
 
 def find_too_deep(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Folders so far below the given ones that they are not searched."""
-    return _of_kind("too deep", paths, settings)
+    return _of_kind("deep", paths, settings)
 
 
 def _of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
@@ -129,7 +129,7 @@ def _search(folder: Path, seen: set[tuple[int, int]], depth: int) -> Iterator[tu
     if described or identity not in seen:
         yield folder, "specimen" if described else "none"
     if depth == 0:
-        yield from ((folder / name, "too deep") for name in below)
+        yield from ((folder / name, "deep") for name in below)
     elif not described:
         seen.add(identity)
         for name in below:
