@@ -40,7 +40,7 @@ class InputError(Exception):
     def sentence(self) -> str:
         """One readable sentence: place, trouble, remedy; a single line, and nothing in it that a terminal obeys."""
         place = "" if self.path is None else f"{self.path}{'' if self.line is None else f', line {self.line}'}: "
-        return _printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
+        return printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
         return (_rebuild, (self.message, self.path, self.line, self.code, self.remedy))
@@ -50,7 +50,7 @@ def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 100]} ... {text[-95:]}"
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
     return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
 

@@ -155,8 +155,8 @@ def predict(
     Raises
     ------
     ValueError
-        For no displacement, one that is not finite or as long as the cable, a length of no cable, or a result whose
-        numbers are none of a cable.
+        For no displacement, one that is not finite or as long as the cable, a length of no cable, a result that is not
+        usable, or one whose numbers are none of a cable.
     """
     settings = settings or PredictSettings()
     length = result.specimen.length_m if length_m is None else length_m
@@ -165,6 +165,8 @@ def predict(
     model = identified_model(result)
     if model is None:
         return None
+    if not (told := answer(result)).usable:
+        raise ValueError(f"{result.specimen.id} is not usable, nor is what follows from it: {told.reason.rstrip('.')}")
     if length is None or not (np.isfinite(length) and length > 0.0):
         raise ValueError(f"a cable cannot be {length} m long")
     _check_sizes(length, displacements_m, model)
@@ -343,10 +345,6 @@ def _difference(here: Equilibrium, there: Equilibrium, by: float) -> dict[str, A
 def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
     """What a reader of the prediction must know about the model it was made with."""
     found = []
-    told = answer(result)
-    if not told.usable:
-        message = f"The result is not usable, and so is what follows from it: {told.reason.rstrip('.')}."
-        found.append(Finding("predict/unusable", "error", message))
     if model.method == "balance":
         message = "The fit did not converge; the prediction rests on the balance equations, whose bands are wider."
         found.append(Finding("predict/balance", "warning", message))

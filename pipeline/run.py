@@ -15,8 +15,6 @@ from pipeline.diagnosis import diagnose, with_corrected_forces
 from pipeline.identify import Identification, identify, identify_without
 from pipeline.intake.folder import read_specimen
 from pipeline.records import Finding
-from pipeline.report.document import write_report
-from pipeline.report.pdf import write_pdf
 from pipeline.report.tables import write_result, write_tables
 from pipeline.result import DiagnosisPart, Result
 from pipeline.settings import Settings
@@ -78,5 +76,8 @@ def write(result: Result, folder: Path, settings: Settings | None = None) -> Non
     write_result(result, folder)
     write_tables(result, folder, settings.report)
     if settings.batch.reports:
+        from pipeline.report.document import write_report  # matplotlib: half a second that a run without does not need
+        from pipeline.report.pdf import write_pdf
+
         write_report(result, folder, settings.report)
         write_pdf(result, folder, settings.report)

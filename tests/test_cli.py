@@ -297,6 +297,11 @@ def test_settings_from_file_and_assignments(tmp_path):
         ("[vision.photo]\nmax_megabyte = 5\n", "settings/unknown-key", 2, "the nearest one is vision.photo."),
         ("[report]\nlanguage = 'fr'\n", "settings/wrong-value", 2, 'the default is "en"'),
         ("[intake\n", "toml/syntax", 1, ""),
+        # integers of 6,000 digits: Python does not write them, be it into a message or into a result
+        (f"[intake]\nphotos_max = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "photos_max = an endless number"),
+        (f"intake = 0x{'F' * 5000}\n", "settings/wrong-value", None, "intake = an endless number"),
+        (f"[intake]\nlength_range_mm = [0x{'F' * 5000}, 1]\n", "settings/wrong-value", None, "an endless number"),
+        (f"[report]\nlanguage = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "language = an endless number"),
     ],
 )
 def test_settings_that_are_refused(text, code, line, hint, tmp_path):
@@ -370,8 +375,26 @@ def test_design_ranks_causes_and_says_what_stays_invisible():
     assert call("design", "--step-mm", -1).exit_code == 2
 
 
+def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
+    (cheap / "batch/b").rename(cheap / "b")
+    deep = cheap / "batch/1/2/3"
+    (deep / "empty").mkdir(parents=True)
+    (cheap / "b").rename(deep / "b")
+    assert call("check", "batch").stderr == ""
+    done = call("check", "batch", "--set", "intake.search_depth=3")
+    assert done.stderr == (
+        "cablebend: folders more than 3 levels below the one given were not searched (2, first batch/1/2/3/b); "
+        "give a folder nearer to them, or raise intake.search_depth.\n"
+    )
+    assert "2 of 2 specimens would run" in done.stdout
+    done = call("check", "batch/1", "--set", "intake.search_depth=2")
+    assert done.exit_code == 3 and "not searched (2, first batch/1/2/3/b)" in done.stderr
+
+
 def test_folders_without_description_are_told(cheap):
     (cheap / "batch/b/specimen.toml").unlink()
     done = call("check", "batch")
     assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
     assert "2 of 2 specimens would run" in done.stdout
+    (cheap / "batch/b").rename(cheap / "batch/b\x1b[2J")
+    assert "batch/b\\x1b[2J: has photos" in call("check", "batch").stderr  # a name does not command the terminal

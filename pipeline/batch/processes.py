@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import connection, resource_tracker
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 
 import cloudpickle
 import psutil
@@ -31,6 +32,8 @@ from pipeline.threads import ONE_THREAD
 
 LOOK_S = 0.2  # between two looks at Ctrl-C and at the memory of the workers while nothing ended
 SHARED = 0.95  # of the memory of this machine, by the workers; the rest is for this process
+# Where Linux tells a container its limit of memory, in control groups of the second and the first version
+CONTAINER = tuple(Path("/sys/fs/cgroup") / name for name in ("memory.max", "memory/memory.limit_in_bytes"))
 # A worker is begun anew, not forked: a fork would take over locks that threads of libraries hold at that moment.
 SPAWN = multiprocessing.get_context("spawn")
 Pipe = connection.Connection
@@ -108,9 +111,19 @@ def _bytes_per_worker(settings: BatchSettings, count: int) -> float:
     """Bytes of memory beyond which a worker is ended, before the system ends something else."""
     if settings.memory_per_worker_gb:
         return 1e9 * settings.memory_per_worker_gb
-    from distributed.system import MEMORY_LIMIT  # that of the container, where there is one; half a second to load
+    return SHARED * _memory() / count
 
-    return float(SHARED * MEMORY_LIMIT / count)
+
+def _memory() -> int:
+    """Bytes of memory of this machine, or of the container it is.
+
+    As `distributed.system` tells it, which takes half a second and 17 MB of this process to load.
+    """
+    limits = [int(psutil.virtual_memory().total)]
+    for path in CONTAINER:
+        with contextlib.suppress(OSError, ValueError):  # not there; "max", which is none
+            limits.append(int(path.read_text()))
+    return min(limits)
 
 
 def _begun(by_value: bytes) -> _Worker:

@@ -14,10 +14,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from pipeline.errors import InputError
-from pipeline.intake.tomltable import TomlFile, nearest, read_toml
+from pipeline.intake.tomltable import TomlFile, nearest, read_toml, shown
 from pipeline.settings import Settings
 
 SETTINGS_MAX_BYTES = 10_000_000  # a settings file is written by its user; the limit only stops a wrong file early
+LARGEST = 2**63  # integers of TOML end there; of 5,000 digits, given in hexadecimal, Python writes none into a result
 
 
 def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
@@ -33,7 +34,7 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
     if file is not None:
         source = read_toml(file, limit=SETTINGS_MAX_BYTES)
         tables = source.tables
-        _check_names(tables, Settings, (), source)
+        _check_tables(tables, Settings, (), source)
     for assignment in assignments:
         tables = _assigned(tables, assignment)
     try:
@@ -41,13 +42,18 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
     except ValidationError as error:
         first = error.errors()[0]
         place = [str(part) for part in first["loc"]]
-        raise InputError(
-            f"{'.'.join(place)} = {first['input']!r} cannot be used ({first['msg'][:1].lower()}{first['msg'][1:]})",
-            path=file,
-            line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
-            code="settings/wrong-value",
-            remedy=f"the default is {_default(place)}, and `cablebend init --settings` says what it means",
-        ) from error
+        raise _wrong_value(place, first["input"], f"{first['msg'][:1].lower()}{first['msg'][1:]}", source) from error
+
+
+def _wrong_value(place: Sequence[str], value: Any, why: str, source: TomlFile | None) -> InputError:
+    """The error for a setting that cannot have this value."""
+    return InputError(
+        f"{'.'.join(place)} = {shown(value)} cannot be used ({why})",
+        path=None if source is None else source.path,
+        line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
+        code="settings/wrong-value",
+        remedy=f"the default is {_default(place)}, and `cablebend init --settings` says what it means",
+    )
 
 
 def _default(place: Sequence[str]) -> str:
@@ -58,10 +64,10 @@ def _default(place: Sequence[str]) -> str:
     return "a table" if isinstance(value, BaseModel) else _toml(value)
 
 
-def _check_names(
+def _check_tables(
     values: dict[str, Any], model: type[BaseModel], above: tuple[str, ...], source: TomlFile | None
 ) -> None:
-    """Refuse names that are no settings, at any depth."""
+    """Refuse names that are no settings, and integers that are none of TOML, at any depth."""
     for name, value in values.items():
         if name not in model.model_fields:
             place, full = ".".join(above), ".".join((*above, name))
@@ -75,9 +81,11 @@ def _check_names(
                 code="settings/unknown-key",
                 remedy=f"the nearest one is {near}",
             )
+        if isinstance(value, int) and abs(value) > LARGEST:
+            raise _wrong_value((*above, name), value, "it is larger than any count", source)
         inner = model.model_fields[name].annotation
         if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, BaseModel):
-            _check_names(value, inner, (*above, name), source)
+            _check_tables(value, inner, (*above, name), source)
 
 
 def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
@@ -95,7 +103,7 @@ def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
     change: dict[str, Any] = {keys[-1]: value}
     for key in reversed(keys[:-1]):
         change = {key: change}
-    _check_names(change, Settings, (), None)
+    _check_tables(change, Settings, (), None)
     return _merged(tables, change)
 
 

@@ -58,14 +58,21 @@ def predict(
 
     RESULT is a result.json or its folder. Steps that bend the cable more than it was ever bent are refused.
 
+    A result that is not usable is refused: its numbers are none of the cable's.
+
     Exit codes: 0 all steps predicted; 1 some were refused; 3 nothing could be predicted.
     """
     from pipeline.cli.configuration import read_settings
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
+    from pipeline.visited import answer
 
     settings = read_settings(settings_file, assignments)
     measured = read_result(result)
+    told = answer(measured)
+    if told.method is not None and not told.usable:
+        click.echo(f"cablebend: {measured.specimen.id} is not usable: {told.reason.rstrip('.')}.", err=True)
+        ctx.exit(MISSING)
     if length_mm is None and measured.specimen.length_m is None:
         raise click.UsageError("the result tells no length: give --length-mm")
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, chosen_language, language_option, settings_options
-from pipeline.errors import InputError
+from pipeline.errors import InputError, printable
 
 if TYPE_CHECKING:
     from pipeline.batch import Store, Tally
@@ -77,7 +77,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
     from pipeline.intake.access import is_folder
-    from pipeline.intake.folder import find_specimens, find_undescribed, misnamed
+    from pipeline.intake.folder import find_specimens, find_too_deep, find_undescribed, misnamed
 
     specimens: dict[Path, None] = {}
     refused = []
@@ -87,14 +87,21 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
         except InputError as error:
             refused.append(error)
             click.echo(f"cablebend: {error.sentence}", err=True)
-    for folder in find_undescribed((folder for folder in folders if is_folder(folder)), settings):
+    there = [folder for folder in folders if is_folder(folder)]
+    if deep := find_too_deep(there, settings):
+        told = (
+            f"folders more than {settings.search_depth} levels below the one given were not searched ({len(deep)}, "
+            f"first {deep[0]}); give a folder nearer to them, or raise intake.search_depth."
+        )
+        click.echo(f"cablebend: {printable(told)}", err=True)
+    for folder in find_undescribed(there, settings):
         other = misnamed(folder)
         if other is not None and folder in folders:
             continue  # said above
         told = (
             f"{folder}: has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`."
         )
-        click.echo(f"cablebend: {told if other is None else other.sentence}", err=True)
+        click.echo(f"cablebend: {printable(told) if other is None else other.sentence}", err=True)
     return list(specimens), refused
 
 

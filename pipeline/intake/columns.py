@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.intake.dialect import SEPARATORS, Row, cells, column_names, looks_like_number
+from pipeline.intake.dialect import SEPARATORS, Row, Rows, column_names, head_rows, looks_like_number
 from pipeline.intake.specimenfile import MEASURED, ROLES, LogSpec
 from pipeline.settings.intake import IntakeSettings
 
@@ -78,7 +78,7 @@ class Columns:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettings) -> tuple[Columns, list[Row]]:
+def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettings) -> tuple[Columns, Rows]:
     """Find the separator, the header and the meaning of the columns.
 
     Parameters
@@ -90,8 +90,8 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
 
     Returns
     -------
-    Columns, list of Row
-        And all rows that are not blank, split.
+    Columns, Rows
+        And all rows that are not blank.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
         ``log/empty``, ``log/no-header``, ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
     """
     separators = (spec.separator,) if spec.separator else SEPARATORS
-    heads = {separator: cells(text, separator, most=settings.header_search_lines) for separator in separators}
+    heads = {separator: head_rows(text, separator, settings.header_search_lines) for separator in separators}
     best: tuple[int, int, str] | None = None
     for separator, head in heads.items():
         if not head:
@@ -112,8 +112,8 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
         rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
         raise _no_header(rows, path)
     _, row, separator = best
-    rows = cells(text, separator)
-    return _columns(rows, row, separator, spec, path), rows
+    whole = Rows.of(text, separator)
+    return _columns(whole, row, spec, path), whole
 
 
 def _no_header(rows: list[Row], path: Path) -> InputError:
@@ -174,13 +174,13 @@ def _role_of_component(cell: str) -> str | None:
     return "force" if COMPONENT.fullmatch(_split_unit(cell)[0]) else None
 
 
-def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Path) -> Columns:
+def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
     line, header = rows[row]
     places = _roles(header, spec)
     for role in ("force", "displacement"):
         if role not in places:
             raise InputError(
-                f"no column of {role} among {column_names(rows[row:])}",
+                f"no column of {role} among {column_names([rows[row]])}",
                 path=path,
                 line=line,
                 code="log/no-column",
@@ -212,7 +212,7 @@ def _columns(rows: list[Row], row: int, separator: str, spec: LogSpec, path: Pat
         index=index,
         names={role: header[place] for role, place in index.items()},
         factor={role: factor_of(role, unit, path, line) for role, unit in units.items()},
-        separator=separator,
+        separator=rows.separator,
         header_line=line,
         first_row=row + (0 if headless else 2 if unit_row else 1),
         assumed=tuple(role for role, unit in units.items() if not unit),

@@ -10,7 +10,9 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Callable, Iterable, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -104,25 +106,70 @@ def _no_text(path: Path) -> InputError:
     )
 
 
-def cells(text: str, separator: str, *, most: int | None = None) -> list[Row]:
-    """Lines that are not blank, the first ``most`` of them or all, split into stripped cells.
+@dataclass(frozen=True)
+class Rows:
+    """Lines of a log that are not blank, split into stripped cells whenever they are asked for.
 
-    Line by line, so that a stray quotation mark cannot swallow the rest of the file.
+    Line by line, so that a stray quotation mark cannot swallow the rest of the file. What is split is not kept: the
+    cells of a million rows take ten times the memory of their text.
+
+    Attributes
+    ----------
+    text, separator : str
+    begins : array of int
+        Where each row begins in the text.
+    lines : array of int
+        Its line, from 1.
     """
-    rows: list[Row] = []
-    if most is not None:
-        text = text[:HEAD_CHARACTERS]
-    for number, line in enumerate(text.split("\n"), 1):
-        if not line.strip(" \t;,"):
-            continue
-        if len(rows) == most:
-            break
-        if '"' in line and len(line) < csv.field_size_limit():
-            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])[: MOST_COLUMNS + 1]
-        else:
-            parts = line.split(separator, MOST_COLUMNS)
-        rows.append((number, [part.strip() for part in parts]))
-    return rows
+
+    text: str
+    separator: str
+    begins: array[int]
+    lines: array[int]
+
+    @classmethod
+    def of(cls, text: str, separator: str) -> Rows:
+        """All rows of a text."""
+        begins, lines, begin = array("q"), array("q"), 0
+        for number, line in enumerate(_lines(text), 1):
+            if line.strip(" \t;,"):
+                begins.append(begin)
+                lines.append(number)
+            begin += len(line) + 1
+        return cls(text, separator, begins, lines)
+
+    def __len__(self) -> int:
+        """Count of rows."""
+        return len(self.begins)
+
+    def __getitem__(self, place: int) -> Row:
+        """Line number and cells of a row."""
+        begin = self.begins[place]
+        end = self.text.find("\n", begin)
+        return self.lines[place], _cells(self.text[begin : None if end < 0 else end], self.separator)
+
+
+def _lines(text: str) -> Iterator[str]:
+    """Lines of a text one after the other; all at once take three times its memory."""
+    begin = 0
+    while (end := text.find("\n", begin)) >= 0:
+        yield text[begin:end]
+        begin = end + 1
+    yield text[begin:]
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if '"' in line and len(line) < csv.field_size_limit():
+        parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])[: MOST_COLUMNS + 1]
+    else:
+        parts = line.split(separator, MOST_COLUMNS)
+    return [part.strip() for part in parts]
+
+
+def head_rows(text: str, separator: str, most: int) -> list[Row]:
+    """The first rows of a log, where its header is looked for."""
+    rows = Rows.of(text[:HEAD_CHARACTERS], separator)
+    return [rows[place] for place in range(min(most, len(rows)))]
 
 
 def smooth(cell: str) -> str:
@@ -166,19 +213,20 @@ def decimal_sign(
     marked = [token for token in tokens if ("." in token or "," in token) and not is_missing(token)]
     if not marked or (separator == "," and not any("," in token for token in marked)):
         return "."
-    marked = [smooth(token) for token in marked]
-    point = [token for token in marked if not _fits(POINT, token)]
-    comma = [token for token in marked if not _fits(COMMA, token)]
+    point = comma = 0  # cells that are no number with a decimal point, with a decimal comma
+    for token in map(smooth, marked):
+        point += not _fits(POINT, token)
+        comma += not _fits(COMMA, token)
     if bool(point) != bool(comma):
         return "," if point else "."
     if point:  # neither fits everywhere: the majority; the cells that do not fit are complained about one by one
-        return "." if len(point) <= len(comma) else ","
+        return "." if point <= comma else ","
     # Both fit: every one with a mark looks like 1,234 or 1.234, a thousand or a fraction
     told = {_decisive(cell) for cell in others()} - {None}
     if len(told) == 1:
         return "," if "," in told else "."
     raise InputError(
-        f"{marked[0]!r} may be a fraction or a thousand, and no other number of the file decides",
+        f"{smooth(marked[0])!r} may be a fraction or a thousand, and no other number of the file decides",
         path=path,
         code="log/ambiguous-decimal",
         remedy='set decimal = "," or decimal = "." in [force_log] of specimen.toml',

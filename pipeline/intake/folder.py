@@ -11,6 +11,7 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Literal
 
 from pipeline.errors import InputError
 from pipeline.intake.access import inside, is_folder, outside, sha256, unreadable
@@ -24,6 +25,7 @@ from pipeline.settings.intake import IntakeSettings
 
 LOG_NAME = "force.csv"
 LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
+Kind = Literal["specimen", "none", "deep"]
 
 
 def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
@@ -41,7 +43,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     found: dict[Path, None] = {}
     for path in paths:
         _check_folder(path)
-        here = [folder for folder, found in _search(path, set(), settings.search_depth) if found]
+        here = _of_kind("specimen", [path], settings)
         if not here:
             other = misnamed(path)
             if other is not None:
@@ -86,10 +88,18 @@ def misnamed(folder: Path) -> InputError | None:
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Folders that hold photos and a table but no ``specimen.toml``: specimens somebody forgot to describe."""
+    return [folder for folder in _of_kind("none", paths, settings) if _looks_like_one(folder, settings)]
+
+
+def find_too_deep(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
+    """Folders so far below the given ones that they are not searched."""
+    return _of_kind("deep", paths, settings)
+
+
+def _of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
+    """Folders of one kind among and below the given ones, without doubles."""
     searched = (step for path in paths for step in _search(path, set(), settings.search_depth))
-    return [
-        folder for folder in dict.fromkeys(f for f, found in searched if not found) if _looks_like_one(folder, settings)
-    ]
+    return list(dict.fromkeys(folder for folder, found in searched if found == kind))
 
 
 def _looks_like_one(folder: Path, settings: IntakeSettings) -> bool:
@@ -102,8 +112,8 @@ def _looks_like_one(folder: Path, settings: IntakeSettings) -> bool:
         return False
 
 
-def _search(folder: Path, seen: set[tuple[int, int]], depth: int) -> Iterator[tuple[Path, bool]]:
-    """Folders on the way down, and whether each is a specimen, which is not searched further.
+def _search(folder: Path, seen: set[tuple[int, int]], depth: int) -> Iterator[tuple[Path, Kind]]:
+    """Folders on the way down, and what each is; a specimen is not searched further.
 
     A folder that cannot be looked into may be one: reading it says what is in the way. ``seen`` are the identities of
     the folders searched before: many ways lead through links, and all but the first are passed over.
@@ -114,11 +124,13 @@ def _search(folder: Path, seen: set[tuple[int, int]], depth: int) -> Iterator[tu
         described = _is_there(folder / NAME)
         below = [] if described or identity in seen else _folders_in(folder)
     except OSError:
-        yield folder, True
+        yield folder, "specimen"
         return
     if described or identity not in seen:
-        yield folder, described
-    if not described and depth > 0:
+        yield folder, "specimen" if described else "none"
+    if depth == 0:
+        yield from ((folder / name, "deep") for name in below)
+    elif not described:
         seen.add(identity)
         for name in below:
             yield from _search(folder / name, seen, depth - 1)

@@ -7,9 +7,10 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
-import re
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,10 @@ from pipeline.errors import InputError
 from pipeline.intake.cellunits import without_units
 from pipeline.intake.clock import clock_s, through_midnight
 from pipeline.intake.columns import Columns
-from pipeline.intake.dialect import Decimal, Row, decimal_sign, decimals, is_missing, to_number
+from pipeline.intake.dialect import Decimal, Rows, decimal_sign, decimals, is_missing, to_number
 from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.specimenfile import LogSpec
+from pipeline.intake.table import read_table
 from pipeline.records import Array, Branch, Finding
 from pipeline.settings.intake import IntakeSettings
 
@@ -29,12 +31,6 @@ BRANCHES: dict[Branch, str] = {
     "loading": "loading|load|up|forward|push|belastung|belasten|laden|hin|auf|hub",
     "unloading": "unloading|unload|down|backward|back|return|entlastung|entlasten|zurück|rück|ab",
 }
-SUMMARY = re.compile(
-    r"(mean|mittel(wert)?|average|avg|median|min(imum)?|max(imum)?|sum(me)?|total|gesamt|std|st\.?\s?dev|stddev|"
-    r"standardabw(eichung|\.)?|stabw|spannweite|range|count|anzahl)\b.{0,40}",
-    re.IGNORECASE,
-)
-"""First word of a row below the table, in a cell of its own."""
 BRANCH_OF: dict[str, Branch] = {word: branch for branch, words in BRANCHES.items() for word in words.split("|")}
 
 
@@ -58,7 +54,7 @@ class Samples:
         Value of the last digit of the forces.
     """
 
-    lines: tuple[int, ...]
+    lines: Sequence[int]
     forces: Array
     displacements: Array
     times: Array | None
@@ -74,7 +70,7 @@ class Samples:
         images = _kept_images(self.images, [int(row) for row in kept], len(self.lines))
         return replace(
             self,
-            lines=tuple(self.lines[row] for row in kept),
+            lines=array("q", (self.lines[row] for row in kept)),
             forces=self.forces[kept],
             displacements=self.displacements[kept],
             times=None if self.times is None else self.times[kept],
@@ -85,7 +81,7 @@ class Samples:
 
 
 def read_samples(
-    rows: Sequence[Row], columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings
+    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings
 ) -> tuple[Samples, Columns]:
     """Convert the rows below the header.
 
@@ -101,15 +97,12 @@ def read_samples(
         ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``,
         ``log/unit``.
     """
-    again = {tuple(cells) for _, cells in rows[: columns.first_row] if len(cells) >= columns.width}
-    data, summary = _without_summary([row for row in rows[columns.first_row :] if tuple(row[1]) not in again], columns)
-    lines = [line for line, _ in data]
-    _check_widths(data, columns, path)
-    table = {role: [_cell(cells, place) for _, cells in data] for role, place in columns.index.items()}
-    table, columns = without_units(table, columns, path=path, line=lines[0] if lines else None)
+    read = read_table(rows, columns, path)
+    lines = read.lines
+    table, columns = without_units(read.cells, columns, path=path, line=lines[0] if lines else None)
     force = table["force"]
     displacement, carried = _carry_down(table["displacement"])
-    kept = [row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]]
+    kept = array("q", (row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]))
     if not kept:
         raise InputError(
             "holds no row with a force and a displacement",
@@ -118,19 +111,19 @@ def read_samples(
             remedy="export the log again, one row per sample",
         )
     decimal = decimal_sign(
-        [*force, *displacement],
+        chain(force, displacement),
         path=path,
         separator=columns.separator,
         decimal=_decimal(spec),
-        others=lambda: _others(data, columns),
+        others=lambda: read.others(_told(columns)),
     )
     numbers = _Numbers(decimal, columns, path, lines, settings.number_limit)
     steps = _carry_down(table["step"])[0] if "step" in table else []
     branches = _branches(table["branch"], lines, path) if "branch" in table else None
     times, noted = _times(table["time"], kept, numbers, settings) if "time" in table else (None, [])
-    images = _kept_images(table.get("image"), kept, len(data))
+    images = _kept_images(table.get("image"), kept, len(lines))
     samples = Samples(
-        lines=tuple(lines[row] for row in kept),
+        lines=array("q", (lines[row] for row in kept)),
         forces=numbers.column("force", force, kept),
         displacements=numbers.column("displacement", displacement, kept),
         times=times,
@@ -138,40 +131,19 @@ def read_samples(
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
         resolution=columns.factor["force"] * _last_digit(max(decimals(force[row], decimal) for row in kept)),
-        findings=(*_losses(path.name, lines, force, carried, summary), *noted),
+        findings=(*_losses(path.name, lines, force, carried, read.summary), *noted),
     )
     return samples, columns
 
 
-def _without_summary(data: Sequence[Row], columns: Columns) -> tuple[Sequence[Row], Sequence[Row]]:
-    """Rows of samples, and rows at the end that are none: a mean or a remark below a table that is full above it.
-
-    Without a displacement where all rows above have one, or with the name of a mean where they have a number.
-    """
-    end = len(data)
-    while end and _is_summary(data[end - 1][1], columns):
-        end -= 1
-    end = end or len(data)  # where all rows are called so, their cells are refused one by one
-    own = [not is_missing(_cell(cells, columns.index["displacement"])) for _, cells in data[:end]]
-    full = max((row + 1 for row, there in enumerate(own) if there), default=0)
-    # a displacement that stands only in the first row of each hold is missing above, too
-    end = full if all(own[:full]) and 2 * full > end else end
-    return data[:end], data[end:]
-
-
-def _is_summary(cells: list[str], columns: Columns) -> bool:
-    """Whether a row is called a mean, a sum or the like; a photo may have any name."""
-    return any(SUMMARY.fullmatch(cell) for place, cell in enumerate(cells) if place != columns.index.get("image"))
-
-
 def _losses(
-    name: str, lines: Sequence[int], force: Sequence[str], carried: int, summary: Sequence[Row]
+    name: str, lines: Sequence[int], force: Sequence[str], carried: int, summary: Sequence[int]
 ) -> list[Finding]:
     """Rows that are no samples, rows without a force, and displacements carried down."""
     findings = []
     if summary:
         message = f"the last {len(summary)} rows are a summary or a remark, no samples, and were left out"
-        findings.append(doubtful("log/summary", f"{name}, line {summary[0][0]}: {message}"))
+        findings.append(doubtful("log/summary", f"{name}, line {summary[0]}: {message}"))
     empty = [row for row, cell in enumerate(force) if is_missing(cell)]
     if empty:
         message = f"{name}: {len(empty)} of {len(force)} rows have no force and were left out"
@@ -191,29 +163,9 @@ def _decimal(spec: LogSpec) -> Decimal | None:
     return "," if spec.decimal == "," else "." if spec.decimal == "." else None
 
 
-def _others(data: Sequence[Row], columns: Columns) -> Iterator[str]:
-    """Cells of the columns that are neither force nor displacement nor a label: step 1.2 is none of 12 tenths."""
-    known = {place for role, place in columns.index.items() if role in ("force", "displacement", "step", "image")}
-    return (cell for _, cells in data for place, cell in enumerate(cells) if place not in known)
-
-
-def _cell(cells: list[str], place: int) -> str:
-    return cells[place] if place < len(cells) else ""
-
-
-def _check_widths(data: Sequence[Row], columns: Columns, path: Path) -> None:
-    for line, cells in data:
-        if any(cells[columns.width :]):
-            remedy = "remove the surplus cells"
-            if columns.separator == ",":
-                remedy = "if the comma is the decimal sign too, export with semicolons or with decimal points"
-            raise InputError(
-                f"{len(cells)} cells under a header of {columns.width}",
-                path=path,
-                line=line,
-                code="log/row-length",
-                remedy=remedy,
-            )
+def _told(columns: Columns) -> set[int]:
+    """Columns of forces, displacements and labels, which do not decide on the decimal sign: step 1.2 is no number."""
+    return {place for role, place in columns.index.items() if role in ("force", "displacement", "step", "image")}
 
 
 @dataclass(frozen=True)
@@ -223,7 +175,7 @@ class _Numbers:
     decimal: Decimal
     columns: Columns
     path: Path
-    lines: list[int]
+    lines: Sequence[int]
     limit: float
 
     def value(self, role: str, cell: str, row: int) -> float:
@@ -242,7 +194,7 @@ class _Numbers:
 
     def column(self, role: str, cells: Sequence[str], kept: Sequence[int]) -> Array:
         factor = self.columns.factor[role]
-        return np.array([self.value(role, cells[row], row) * factor for row in kept])
+        return np.fromiter((self.value(role, cells[row], row) * factor for row in kept), float, len(kept))
 
 
 def _carry_down(cells: Sequence[str]) -> tuple[list[str], int]:
@@ -260,10 +212,11 @@ def _carry_down(cells: Sequence[str]) -> tuple[list[str], int]:
 def _kept_images(cells: Sequence[str] | None, kept: Sequence[int], count: int) -> list[str]:
     """Photo names by row; a name in a row left out moves to the nearest row above that is kept, or else below."""
     images = ["" if cells is None or is_missing(cells[row]) else cells[row] for row in range(count)]
-    for row in sorted(set(range(count)) - set(kept)):
-        if images[row]:
-            place = max(bisect.bisect_left(kept, row) - 1, 0)
-            images[kept[place]] = images[kept[place]] or images[row]
+    for row in (row for row, name in enumerate(images) if name):
+        place = bisect.bisect_left(kept, row)
+        if place == len(kept) or kept[place] != row:
+            nearest = kept[max(place - 1, 0)]
+            images[nearest] = images[nearest] or images[row]
     return images
 
 

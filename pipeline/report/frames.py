@@ -13,6 +13,16 @@ from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
 from pipeline.visited import METHODS, answer, best, pre_curvature
 
+CHARACTERISTIC = (
+    "kappa_per_m",
+    "moment_Nm",
+    "tangent_Nm2",
+    "tangent_std_Nm2",
+    "secant_Nm2",
+    "supported",
+    "moment_std_Nm",
+    "secant_std_Nm2",
+)
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
 
@@ -26,25 +36,15 @@ def characteristic_frame(result: Result) -> pd.DataFrame:
         "balance": result.balance.curve if result.balance else None,
         "extended": result.diagnosis.extended if result.diagnosis else None,
     }
-    columns = [
-        "kappa_per_m",
-        "moment_Nm",
-        "tangent_Nm2",
-        "tangent_std_Nm2",
-        "secant_Nm2",
-        "supported",
-        "moment_std_Nm",
-        "secant_std_Nm2",
-    ]
     parts, chosen = [], answer(result).method
     for method in METHODS:
         curve = whole[method]
         if curve is not None:
-            part = pd.DataFrame({name: getattr(curve, name) for name in columns})
+            part = pd.DataFrame({name: getattr(curve, name) for name in CHARACTERISTIC})
             part.insert(0, "method", method)
-            part.insert(1 + columns.index("supported") + 1, "answer", int(method == chosen))
+            part.insert(1, "answer", int(method == chosen))
             parts.append(part)
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", *columns, "answer"])
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", "answer", *CHARACTERISTIC])
 
 
 def centerlines_frame(result: Result) -> pd.DataFrame:

@@ -8,12 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 
-from pipeline.batch import Store
+from pipeline.batch import Store, processes
 from pipeline.batch.orders import result_names
 from pipeline.errors import InputError
 from pipeline.settings import Settings
+from pipeline.settings.batch import BatchSettings
 from tests.pipeline.cheap_batch import PATIENCE_S, TOML, run_cheaply, start, stored, wait_for, write_specimens
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -186,3 +188,14 @@ def test_a_worker_that_grows_too_much_costs_its_specimen(tmp_path):
     tally = run_cheaply(tmp_path / "batch", tmp_path / "out", workers=1, memory_per_worker_gb=0.8)
     assert (tally.measured, tally.failed) == (2, 1)
     assert Store(tmp_path / "out").entry("b")["code"] == "specimen/worker-died"
+
+
+def test_the_memory_of_a_container_is_shared_by_its_workers(tmp_path, monkeypatch):
+    limits = {"none": "max\n", "container": "2000000000\n", "missing": None}
+    for name, text in limits.items():
+        if text is not None:
+            (tmp_path / name).write_text(text)
+    monkeypatch.setattr(processes, "CONTAINER", tuple(tmp_path / name for name in limits))
+    assert processes._bytes_per_worker(BatchSettings(), 4) == pytest.approx(0.95 * 2e9 / 4)
+    (tmp_path / "container").unlink()
+    assert processes._bytes_per_worker(BatchSettings(), 1) == pytest.approx(0.95 * psutil.virtual_memory().total)

@@ -4,7 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from pipeline.cli import main
 from pipeline.compare import compare
 from pipeline.predict import predict
 from pipeline.report.answer import answer as first_screen
@@ -113,10 +115,15 @@ def test_no_comparison_holds_it(measured):
         assert "not usable: the forces seem to be 1000 times too large" in comparison.statement
 
 
-def test_a_prediction_with_it_says_so(measured):
-    findings = predict(found(measured, "size/force", "error"), [0.004]).findings
-    assert [f.level for f in findings if f.code == "predict/unusable"] == ["error"]
-    assert not [f for f in predict(measured, [0.004]).findings if f.code == "predict/unusable"]
+def test_nothing_is_predicted_with_it(measured, tmp_path):
+    wrong = found(measured, "size/force", "error")
+    with pytest.raises(ValueError, match="is not usable, nor is what follows from it: the forces seem to be 1000"):
+        predict(wrong, [0.004])
+    (tmp_path / "result.json").write_text(to_json(wrong))
+    done = CliRunner().invoke(main, ["predict", str(tmp_path), "--displacement-mm", "4"])
+    assert (done.exit_code, done.stdout) == (3, "")
+    assert done.stderr == f"cablebend: {wrong.specimen.id} is not usable: the forces seem to be 1000 times too large.\n"
+    assert predict(measured, [0.004]).steps[0].status == "predicted"
 
 
 def test_one_curve_of_the_table_is_the_answer(measured):

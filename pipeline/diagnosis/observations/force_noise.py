@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 
 from rod.measurement import MeasuredStep
 
@@ -85,7 +85,7 @@ def _differ(found: _Scatter, floor: float, level: float) -> bool:
         return False
     statistic = total * np.log(freedom @ own / total) - freedom @ np.log(own)
     correction = 1.0 + (np.sum(1.0 / freedom) - 1.0 / total) / (3.0 * (len(freedom) - 1))
-    return bool(stats.chi2.sf(statistic / correction, len(freedom) - 1) < level)
+    return bool(special.chdtrc(len(freedom) - 1, statistic / correction) < level)
 
 
 SPREADS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -179,7 +179,7 @@ def _decaying(steps: tuple[MeasuredStep, ...], plain: _Scatter, level: float) ->
     if free <= 0 or spent <= 0:
         return None
     ratio = (float(plain.squares.sum()) - rest) / spent / max(rest / free, 1e-300)
-    return best if float(stats.f.sf(ratio, spent, free)) < level else None
+    return best if float(special.fdtrc(spent, free, ratio)) < level else None
 
 
 def _scatter(steps: tuple[MeasuredStep, ...], decay: float | None) -> _Scatter:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 Array = NDArray[np.float64]
 
@@ -167,8 +167,8 @@ def adjusted_p(statistic: Array, maxima: Array) -> Array:
     The number of effectively independent tests of the tail is read from the upper tenth of the simulated maxima.
     """
     at = float(np.quantile(maxima, 0.9))
-    tests = np.log(0.9) / np.log1p(-2.0 * stats.norm.sf(at))
-    single = 2.0 * stats.norm.sf(np.maximum(statistic, 1e-12))
+    tests = np.log(0.9) / np.log1p(-2.0 * special.ndtr(-at))
+    single = 2.0 * special.ndtr(-np.maximum(statistic, 1e-12))
     tail = -np.expm1(tests * np.log1p(-np.minimum(single, 1.0 - 1e-12)))
     rank = np.searchsorted(maxima, statistic, side="left")
     simulated = (maxima.size - rank + 1.0) / (maxima.size + 1.0)
@@ -177,4 +177,4 @@ def adjusted_p(statistic: Array, maxima: Array) -> Array:
 
 def sigma_needed(limit: float, *, power: float) -> float:
     """Size of an effect in sigma that exceeds the family-wise limit with the given power."""
-    return limit + float(stats.norm.ppf(power))
+    return limit + float(special.ndtri(power))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 from pipeline.diagnosis.statistics.score import span
 
@@ -85,14 +85,14 @@ def component(residual: Array, jacobian: Array, columns: Array, *, lines: Array,
     misfit = float(np.sum((residual - fixed @ (fixed.T @ residual)) ** 2)) - (len(residual) - fixed.shape[1])
     return Component(
         std=float(tau[best]),
-        p_value=0.5 * float(stats.chi2.sf(twice[best] - twice[0], 1)),
+        p_value=0.5 * float(special.chdtrc(1, twice[best] - twice[0])),
         share=float(np.sum(squared - squared / wide[best])) / max(misfit, 1e-12),
         price=float(np.sum(np.log(wide[best]))),
         between=(float(tau[likely[0]]), float(tau[likely[-1]])),
     )
 
 
-WITHIN = float(stats.chi2.ppf(0.95, 1))
+WITHIN = float(special.chdtri(1, 0.05))
 """Fall of twice the log-likelihood at the ends of a 95 % interval of one number (Wilks 1938)."""
 
 

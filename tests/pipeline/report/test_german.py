@@ -5,6 +5,7 @@ German twin fails here.
 """
 
 import ast
+import functools
 import re
 import string
 from pathlib import Path
@@ -70,37 +71,35 @@ def no_messages(node):
     return isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Field"
 
 
-def strings(path):
-    """All strings of a module that are no documentation, as templates."""
-    tree, skipped = ast.parse(path.read_text(encoding="utf-8")), set()
-    for node in ast.walk(tree):
-        if no_messages(node):
-            skipped.update(map(id, ast.walk(node)))
-        elif isinstance(node, ast.JoinedStr):  # its parts are no strings of their own, what is put in may hold some
-            skipped.update(id(part) for part in node.values if isinstance(part, ast.Constant))
-            formats = [part.format_spec for part in node.values if isinstance(part, ast.FormattedValue)]
-            skipped.update(id(inner) for spec in formats if spec is not None for inner in ast.walk(spec))
-    for node in ast.walk(tree):
-        text = None if id(node) in skipped else template(node)
-        if text:
-            yield shown(text)
+def strings(node):
+    """All strings below a node that are no documentation, as templates."""
+    if no_messages(node):
+        return
+    if text := template(node):
+        yield shown(text)
+    inside = ast.iter_child_nodes(node)
+    if isinstance(node, ast.JoinedStr):  # its parts are no strings of their own, what is put in may hold some
+        inside = (part.value for part in node.values if isinstance(part, ast.FormattedValue))
+    for child in inside:
+        yield from strings(child)
 
 
-def modules():
-    for path in sorted((*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "rod").rglob("*.py"))):
-        name = path.relative_to(ROOT).as_posix()
-        if not name.startswith(ELSEWHERE):
-            yield name, set(strings(path))
+MODULES = [
+    path.relative_to(ROOT).as_posix() for room in ("pipeline", "rod") for path in sorted((ROOT / room).rglob("*.py"))
+]
+MODULES = [name for name in MODULES if not name.startswith(ELSEWHERE)]
 
 
-CODE = dict(modules())
+@functools.cache
+def strings_of(module):
+    return set(strings(ast.parse((ROOT / module).read_text(encoding="utf-8"))))
 
 
-@pytest.mark.parametrize("module", CODE)
+@pytest.mark.parametrize("module", MODULES)
 def test_every_sentence_has_a_german_twin(module):
     sentences = {
         text
-        for text in CODE[module]
+        for text in strings_of(module)
         if len(re.findall(r"[A-Za-z]{2,}", text)) > 1 and re.search(r"[\w)}] [\w({]", text)
         if not NO_SENTENCES.search(text)
     }
@@ -109,7 +108,7 @@ def test_every_sentence_has_a_german_twin(module):
 
 
 def test_no_twin_is_left_over():
-    assert sorted(GERMAN.keys() - set().union(*CODE.values())) == []
+    assert sorted(GERMAN.keys() - set().union(*map(strings_of, MODULES))) == []
 
 
 def test_both_have_the_same_gaps():

@@ -1,6 +1,7 @@
 """index.html and summary.csv: every specimen is there, with its reason if it failed; also after half a run."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pipeline.report.row import as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
+from pipeline.visited import decided
 
 
 def named(result, name, kind="HV 35"):
@@ -133,6 +135,47 @@ def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_re
         row = index_row(result, ReportSettings())
         again = from_entry(json.loads(json.dumps(as_entry(row))))
         assert as_entry(again) == as_entry(row)
+
+
+def test_a_row_holds_causes_and_no_pre_curvature_without_its_std(full_result, diagnosed):
+    result = diagnosed("two_causes")
+    row = index_row(result, ReportSettings())
+    assert row.causes == tuple(cause.name for cause in result.diagnosis.causes) and len(row.causes) == 2
+    assert row.pre_curvature is not None
+    levels = [finding.level for finding in result.findings]
+    assert (row.warnings, row.errors) == (levels.count("warning"), levels.count("error"))
+    told = decided(full_result).model_copy(update={"pre_curvature_std_per_m": None})
+    assert index_row(full_result.model_copy(update={"answer": told}), ReportSettings()).pre_curvature is None
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("low",), [2.0, 0.02]),
+        (("low",), [2.0, 0.02, math.inf]),
+        (("pre_curvature",), [2.0, math.nan]),
+        (("curve", "range"), [8.7, 2.0]),
+        (("curve", "tangent"), [0.02]),
+        (("curve", "tangent_std"), [1e-4]),
+        (("photos_used",), True),
+        (("status",), "done"),
+        (("version",), 0),
+    ],
+    ids=str,
+)
+def test_an_entry_of_wrong_values_is_no_row(place, value, full_result):
+    whole = json.dumps(as_entry(index_row(full_result, ReportSettings())))
+    from_entry(json.loads(whole))
+    data = inside = json.loads(whole)
+    for name in place[:-1]:
+        inside = inside[name]
+    inside[place[-1]] = value
+    with pytest.raises(ValueError, match=r"row|numbers|curve"):
+        from_entry(data)
+    short = json.loads(whole)
+    short["curve"] |= {"tangent": [0.02], "tangent_std": [1e-4], "factor": [[1e-5]]}
+    with pytest.raises(ValueError, match="a curve of nothing"):
+        from_entry(short)
 
 
 def test_a_row_is_small(full_result):

@@ -15,7 +15,8 @@ from pipeline.result import from_json
 from pipeline.settings import ReportSettings
 from pipeline.visited import visited
 
-CHARACTERISTIC = ["method", "kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2", "supported"]
+CHARACTERISTIC = ["method", "answer", "kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2"]
+CHARACTERISTIC += ["supported"]
 CENTERLINES = ["image", "s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m"]
 
 
