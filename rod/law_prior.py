@@ -64,10 +64,11 @@ class Family:
 
 def family(form: Array, fixed: Array) -> Family:
     """Family with its norms."""
-    size = len(form)
-    level = np.full((size, size), 1.0 / size)  # B-splines of equal coefficients are the level, which has no prior
-    precisions = form / TAUS[:, None, None] ** 2 + fixed + level
-    return Family(form, fixed, 0.5 * np.linalg.slogdet(precisions)[1])
+    precisions = form / TAUS[:, None, None] ** 2 + fixed
+    # B-splines of equal coefficients are the level, which has no prior: one as large as the others, taken out again
+    size, scale = len(form), np.trace(precisions, axis1=1, axis2=2)
+    held = precisions + scale[:, None, None] * np.full((size, size), 1.0 / size)
+    return Family(form, fixed, 0.5 * (np.linalg.slogdet(held)[1] - np.log(scale)))
 
 
 def forms(squares: list[Array], *, smooth: bool) -> list[Array]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from rod.compliance_law import ComplianceLaw
 from rod.inverse.evaluation import Evaluation, evaluate
@@ -120,7 +119,7 @@ def read_off(
         by_moment=np.column_stack([by_moment, scale * moment]),
         by_log=np.column_stack([by_log, np.full(kappa.size, scale)]),
         by_pre_curvature=np.eye(u.size + 1)[p] / model.length,
-        covariance=block_diag(covariance, 1.0),
+        covariance=np.pad(covariance, (0, 1)) + np.diag(np.eye(u.size + 1)[-1]),
     )
     splines = model.basis.at(moment)
     values, vectors = np.linalg.eigh(posterior.law_covariance)

@@ -3,7 +3,7 @@
 Every iteration simulates the test, linearises, and moves to the mean over the priors (`rod.law_prior`), so no prior is
 chosen on the way. Where the law falls steeply, a method that lets the cost never rise creeps along a curved valley;
 whole steps, held back only in the law and K0, leave it. To keep them on the way the noise is taken larger at first
-(`ANNEALED`), and the abscissa of the law is laid along the law found so far (`rod.compliance_law.refreshed`) whenever
+(`LOUD`), and the abscissa of the law is laid along the law found so far (`rod.compliance_law.refreshed`) whenever
 the noise is lowered.
 """
 
@@ -21,9 +21,10 @@ from rod.law_prior import Posterior, averaged, priors
 
 Array = NDArray[np.float64]
 
-ANNEALED = (30.0, 5.0, 1.0)
-"""Factors on the noise, one after the other: a start that is off by a factor of two is ten standard deviations of good
-photos away, where their linearisation says nothing."""
+LOUD, LOWERED = 30.0, 6.0
+"""Factor on the noise that a fit begins with, or what its start asks for, and by how much it is lowered from stage to
+stage: a start that is off by a factor of two is ten standard deviations of good photos away, where their linearisation
+says nothing."""
 
 FOLLOWS = 2.0
 """Root mean square of whitened residuals above which the simulation does not follow the data; no luck makes as much."""
@@ -54,7 +55,7 @@ class Fit:
     @property
     def misfit(self) -> tuple[float, float]:
         """Root mean square of the residuals of shapes and forces in units of the noise of `model`; 1 where unknown."""
-        shapes, forces = (self._rms(kind) if self.posterior is not None else 1.0 for kind in ("shape", "force"))
+        shapes, forces = (self._rms(kind) for kind in ("shape", "force"))
         return shapes, forces
 
     def _rms(self, kind: str) -> float:
@@ -84,18 +85,19 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
     The noise is lowered to what is stated, or as far as the simulation follows the data. Where it does not, its misfit
     counts as noise from there on: a law that is let follow closer bends to hide what the simulation lacks.
     """
-    used, found = 1, Fit(model, evaluate(model, start), None, 1, False)
-    for factor in ANNEALED:
-        before, within = found, FINELY if factor == ANNEALED[-1] else ROUGHLY
-        found = _quieter(before, (factor, factor), within, evaluations - used)
-        used += found.evaluations
-        if max(found.misfit) > FOLLOWS:
-            loud = found if before.posterior is None else before
-            found = _quieter(loud, _needed(loud, found), FINELY, evaluations)
+    found, loud = Fit(model, evaluate(model, start), None, 1, False), None
+    used, noise = 1, max(LOUD, max(found.misfit) / FOLLOWS)
+    while found.evaluation.failure is None:
+        quiet = _quieter(found, (noise, noise), FINELY if noise == 1.0 else ROUGHLY, evaluations - used)
+        used += quiet.evaluations
+        if loud is not None and max(quiet.misfit) > FOLLOWS:
+            found = _quieter(loud, _needed(loud, quiet), FINELY, evaluations)
             used += found.evaluations
             break
-        if not found.settled:
+        found = loud = quiet
+        if noise == 1.0 or not found.settled:
             break
+        noise = max(1.0, noise / LOWERED)
     if found.settled:
         found = _settle(found.model, found.evaluation.unknowns, found.evaluation, FINELY, evaluations, smooth=True)
         used += found.evaluations
