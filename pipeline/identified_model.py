@@ -27,8 +27,7 @@ from scipy.integrate import cumulative_trapezoid
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.observations.prediction import Facts, Model
-from pipeline.result import CauseForm, Result
-from pipeline.visited import Visited, best, pre_curvature
+from pipeline.result import CauseForm, Result, Visited
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
 
@@ -137,21 +136,22 @@ class IdentifiedModel:
 
 def identified_model(result: Result) -> IdentifiedModel | None:
     """The cable of a result; None without a characteristic."""
-    curve = best(result)
+    curve = result.answer.curve
     if curve is None:
         return None
-    K0, std = pre_curvature(result, curve)
     law = Characteristic.from_ordinates(curve.kappa, curve.tangent)
-    factor = _joint_factor(curve, K0, std)
+    factor = _joint_factor(curve)
     forms = _forms(result, columns=factor.shape[1]) if curve.method == "extended" else ()
-    return IdentifiedModel(curve.method, law, K0, factor, (float(curve.kappa[0]), float(curve.kappa[-1])), forms)
+    visited = float(curve.kappa[0]), float(curve.kappa[-1])
+    return IdentifiedModel(curve.method, law, curve.pre_curvature, factor, visited, forms)
 
 
-def _joint_factor(curve: Visited, K0: float, std: float) -> Array:
+def _joint_factor(curve: Visited) -> Array:
     """Factor of the joint covariance of f along the curve and K0, (n + 1, r); see the module.
 
     Without a factor of f its errors are taken as one common factor on the whole curve: the widest band of a force.
     """
+    K0, std = curve.pre_curvature, curve.pre_curvature_std
     F = curve.factor if curve.factor.shape[1] else curve.tangent_std[:, None]
     rise = cumulative_trapezoid(F, curve.kappa, axis=0, initial=0)
     rise -= np.array([np.interp(K0, curve.kappa, column) for column in rise.T])  # int_{K0}^{K} of each column

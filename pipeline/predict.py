@@ -33,7 +33,6 @@ from pipeline.records import Finding
 from pipeline.result import CausePart, Result
 from pipeline.rounding import plain
 from pipeline.settings.predict import PredictSettings
-from pipeline.visited import answer
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
@@ -343,9 +342,8 @@ def _difference(here: Equilibrium, there: Equilibrium, by: float) -> dict[str, A
 def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
     """What a reader of the prediction must know about the model it was made with."""
     found = []
-    told = answer(result)
-    if not told.usable:
-        message = f"The result is not usable, and so is what follows from it: {told.reason.rstrip('.')}."
+    if not result.answer.usable:
+        message = f"The result is not usable, and so is what follows from it: {result.answer.reason.rstrip('.')}."
         found.append(Finding("predict/unusable", "error", message))
     if model.method == "balance":
         message = "The fit did not converge; the prediction rests on the balance equations, whose bands are wider."

@@ -132,7 +132,6 @@ PIPELINE = [
     ("records",),
     ("settings",),
     ("result",),
-    ("visited",),
     ("intake",),
     ("vision",),
     ("simulate",),

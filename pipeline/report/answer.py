@@ -9,10 +9,8 @@ import numpy as np
 
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import Result, leading, trusted
 from pipeline.settings import ReportSettings
-from pipeline.visited import answer as decision
-from pipeline.visited import best, leading, pre_curvature, trusted
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
@@ -20,7 +18,7 @@ TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "wa
 
 
 @dataclass(frozen=True)
-class Answer:
+class FirstScreen:
     """The answer in a few sentences.
 
     Attributes
@@ -47,19 +45,19 @@ class Answer:
     pre_curvatures: tuple[tuple[str, str], ...]
 
 
-def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
+def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
     """The answer of a result in the language of the words."""
     model, adequate = _model(result, words, settings)
     diagnosis = result.diagnosis
     if result.status == "failed":
         verdict, tone = words("status_failed"), "bad"
-    elif leading(result.findings) is not None or not decision(result).usable:
+    elif leading(result.findings) is not None or not result.answer.usable:
         verdict, tone = words("verdict_fault"), "bad"
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
     else:
         verdict, tone = "", "good" if adequate else "warn"
-    return Answer(
+    return FirstScreen(
         sentence=_sentence(result, words),
         agreement=_agreement(result, words),
         model=model,
@@ -86,17 +84,17 @@ def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
 
 def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
     """K0 by sources that are independent of each other, then by the curve of the answer if it saw more than they."""
-    sources, curve = pre_curvatures(result), best(result)
-    if curve is not None and curve.method == "extended":
-        return {**sources, "extended": pre_curvature(result, curve)}
-    if curve is not None and curve.method == "inverse" and "photo" in sources:
-        return {**sources, "all": pre_curvature(result, curve)}
+    sources, curve = pre_curvatures(result), result.answer.curve
+    if curve is not None and (curve.method == "extended" or (curve.method == "inverse" and "photo" in sources)):
+        name = "extended" if curve.method == "extended" else "all"
+        return {**sources, name: (curve.pre_curvature, curve.pre_curvature_std)}
     return sources
 
 
 def _sentence(result: Result, words: Words) -> str:
     """f_EI at both ends of the visited range and K0."""
-    name, curve = result.specimen.id, best(result)
+    name, told = result.specimen.id, result.answer
+    curve = told.curve
     if curve is None:
         refused = _refused(result)
         if refused:
@@ -105,20 +103,19 @@ def _sentence(result: Result, words: Words) -> str:
         if result.status == "failed" and reason:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
-    told = decision(result)
     lead = "" if told.usable else f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
     unit = stiffness_unit(result, words)
-    change = curve.tangent[-1] - curve.tangent[0]
-    beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
+    (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
+    beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
     text = words(
-        "answer_constant" if not beyond else "answer_falls" if change < 0.0 else "answer_rises",
+        "answer_constant" if not beyond else "answer_falls" if f_high < f_low else "answer_rises",
         id=name,
-        first=_together(unit.text(curve.tangent[0], curve.tangent_std[0])),
-        last=_together(unit.text(curve.tangent[-1], curve.tangent_std[-1])),
-        low=words.curvature(curve.kappa[0]),
-        high=words.curvature(curve.kappa[-1]),
+        first=_together(unit.text(f_low, std_low)),
+        last=_together(unit.text(f_high, std_high)),
+        low=words.curvature(low),
+        high=words.curvature(high),
     )
-    rest = _together(words.measured(*pre_curvature(result, curve)))
+    rest = _together(words.measured(curve.pre_curvature, curve.pre_curvature_std))
     return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
 
 
@@ -171,8 +168,8 @@ def _advice(result: Result, words: Words) -> str:
     fault = leading(result.findings)
     if fault is not None:
         return words.said(fault.message).sentence
-    if not decision(result).usable:
-        return words.said(decision(result).reason).sentence
+    if not result.answer.usable:
+        return words.said(result.answer.reason).sentence
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

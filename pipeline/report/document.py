@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pipeline.report.answer import answer
+from pipeline.report.answer import first_screen
 from pipeline.report.canvas import page_colours
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.diagnosed import diagnosis_view
@@ -32,7 +32,6 @@ from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows,
 from pipeline.report.words import Words
 from pipeline.result import Result
 from pipeline.settings import ReportSettings
-from pipeline.visited import best
 
 __all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
 
@@ -61,7 +60,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             result=result,
             words=words,
             settings=settings,
-            answer=answer(result, words, settings),
+            answer=first_screen(result, words, settings),
             main=main,
             shown={
                 "photos": bool(result.photos) or result.status != "failed",
@@ -96,7 +95,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
 def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> dict[str, Any]:
     """Equivalent constant stiffness and smallest radius in words; empty where there is none."""
     texts: dict[str, Any] = {}
-    curve = best(result)
+    curve = result.answer.curve
     constant = equivalent(curve, settings.equivalent_range_per_m) if curve else None
     if curve is not None and constant is not None:
         unit = stiffness_unit(result, words)

@@ -14,10 +14,9 @@ from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
 from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
-from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
+from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves, trusted
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit
-from pipeline.visited import best, curves, trusted
 
 TALL = (400.0, 350.0)
 POINTS = 5
@@ -255,7 +254,7 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
     The control points where the fitted simulation is the answer; any other way has none, or a law that is no longer
     theirs, and is read at `POINTS` places over the visited range.
     """
-    unit, curve, exact = figures.stiffness_unit(result, words), best(result), words("exact")
+    unit, curve, exact = figures.stiffness_unit(result, words), result.answer.curve, words("exact")
     if curve is None:
         return []
     if curve.method == "inverse" and result.inverse is not None:
@@ -267,7 +266,7 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
 
 def knot_title(result: Result, words: Words) -> str:
     """What `knot_rows` shows: the control points, or points of a way without any."""
-    curve = best(result)
+    curve = result.answer.curve
     if curve is None or curve.method == "inverse":
         return words("table_knots")
     return words("table_points", way=words(f"way_{curve.method}"))

@@ -16,10 +16,9 @@ from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_ar
 from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
-from pipeline.result import Result, StepPart
+from pipeline.result import Result, StepPart, Visited, curves, trusted, visited
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit, suited
-from pipeline.visited import Visited, curves, trusted, visited
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.

@@ -11,7 +11,6 @@ from pipeline.compare import Comparison
 from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.result import Curve, Result
-from pipeline.visited import METHODS, answer, best, pre_curvature
 
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
@@ -36,9 +35,8 @@ def characteristic_frame(result: Result) -> pd.DataFrame:
         "moment_std_Nm",
         "secant_std_Nm2",
     ]
-    parts, chosen = [], answer(result).method
-    for method in METHODS:
-        curve = whole[method]
+    parts, chosen = [], result.answer.method
+    for method, curve in whole.items():
         if curve is not None:
             part = pd.DataFrame({name: getattr(curve, name) for name in columns})
             part.insert(0, "method", method)
@@ -91,13 +89,13 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
         Columns quantity, value, std, unit, note. The first row of a quantity is the answer of the report.
     """
     rows: list[tuple[str, float, float | None, str, str]] = []
-    curve = best(result)
+    curve = result.answer.curve
     constant = equivalent(curve, bounds) if curve else None
     if curve is not None and constant is not None:
         note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
         note += ", std is an upper bound" if constant.bound else ""
         rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
-    answer = {curve.method: pre_curvature(result, curve)} if curve is not None else {}
+    answer = {} if curve is None else {curve.method: (curve.pre_curvature, curve.pre_curvature_std)}
     parts = {"inverse": result.inverse, "balance": result.balance}
     others = {
         way: (part.pre_curvature_per_m, part.pre_curvature_std_per_m)
@@ -113,7 +111,7 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
 
 def moment_frame(result: Result) -> pd.DataFrame:
     """Moment over curvature of the best way on the visited range: the table a nonlinear beam element asks for."""
-    curve = best(result)
+    curve = result.answer.curve
     if curve is None:
         return pd.DataFrame(columns=["kappa_per_m", "moment_Nm", "moment_std_Nm"])
     return pd.DataFrame(

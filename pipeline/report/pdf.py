@@ -20,7 +20,7 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.image import imread
 
 from pipeline.report import figures, maps, ranking
-from pipeline.report.answer import answer
+from pipeline.report.answer import first_screen
 from pipeline.report.canvas import LIGHT, Area, style
 from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
 from pipeline.report.document import simulation_texts
@@ -30,9 +30,8 @@ from pipeline.report.page import unbroken
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
 from pipeline.report.ruling import FONT
 from pipeline.report.words import Words
-from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result
+from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result, curves
 from pipeline.settings import ReportSettings
-from pipeline.visited import curves
 
 PAGE = (595.0, 842.0)  # A4 in points
 MARGIN = 44.0
@@ -149,7 +148,7 @@ def _head(result: Result) -> str:
 
 def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
     """Answer, main figure, adequacy, agreement, K0 three ways, what to do next, warnings."""
-    sheet, said = Sheet(_head(result)), answer(result, words, settings)
+    sheet, said = Sheet(_head(result)), first_screen(result, words, settings)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
         figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words, settings)

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pipeline.result import FindingPart, Result
+    from pipeline.result import FindingPart, Result, Visited
     from pipeline.settings.report import ReportSettings
-    from pipeline.visited import Visited
 
 Array = NDArray[np.float64]
 End = tuple[float, float, float]
@@ -118,11 +117,9 @@ VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "
 
 def index_row(result: Result, settings: ReportSettings) -> IndexRow:
     """Row of one result, without its report."""
-    from pipeline.visited import answer, best
-
-    curve, told = best(result), answer(result)
-    worst = _worst(result.findings)
-    rest = (told.pre_curvature_per_m, told.pre_curvature_std_per_m)
+    told = result.answer
+    curve, worst = told.curve, _worst(result.findings)
+    low, high = curve.ends() if curve else (None, None)
     return IndexRow(
         id=result.specimen.id,
         type=result.specimen.description.get("type", ""),
@@ -132,9 +129,9 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         usable=told.usable,
         fault="" if told.usable else told.reason,
         method=told.method or "",
-        low=None if curve is None else _end(curve, 0),
-        high=None if curve is None else _end(curve, -1),
-        pre_curvature=None if rest[0] is None or rest[1] is None else (rest[0], rest[1]),
+        low=low,
+        high=high,
+        pre_curvature=None if curve is None else (curve.pre_curvature, curve.pre_curvature_std),
         rms_relative=result.agreement.rms_relative if result.agreement else None,
         compatible=result.agreement.compatible if result.agreement else None,
         photos_used=sum(photo.status == "traced" for photo in result.photos),
@@ -152,10 +149,6 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
     """The first error, else the first warning."""
     levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
     return levels["error"] or levels["warning"]
-
-
-def _end(curve: Visited, at: int) -> End:
-    return float(curve.kappa[at]), float(curve.tangent[at]), float(curve.tangent_std[at])
 
 
 def _thinned(curve: Visited, points: int) -> RowCurve:

@@ -8,6 +8,7 @@ over.
 
 from __future__ import annotations
 
+from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, trusted
 from pipeline.result.files import from_json, read_result, schema, to_json
 from pipeline.result.parts import (
     AgreementPart,
@@ -30,14 +31,16 @@ from pipeline.result.parts import (
     PointwisePart,
     PreviewPart,
     ResidualMap,
-    Result,
     ScalePart,
     SpecimenPart,
     StepPart,
 )
+from pipeline.result.visited import Visited, visited
+from pipeline.result.whole import Result
 
 __all__ = [
     "AgreementPart",
+    "Answer",
     "AnswerPart",
     "BalancePart",
     "BlindSpot",
@@ -61,8 +64,15 @@ __all__ = [
     "ScalePart",
     "SpecimenPart",
     "StepPart",
+    "Visited",
+    "curves",
     "from_json",
+    "leading",
+    "none_of_its_type",
     "read_result",
+    "refuted",
     "schema",
     "to_json",
+    "trusted",
+    "visited",
 ]

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
-from pipeline.result.parts import Result
+from pipeline.result.whole import Result
 
 LARGEST_BYTES = 256_000_000
 """Of a ``result.json``: a photo takes 150 kB, and a test has tens of steps."""

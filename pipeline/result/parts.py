@@ -1,4 +1,4 @@
-"""The parts of a result and the whole: what ``result.json`` holds, by name and unit.
+"""The parts of a result: what ``result.json`` holds, by name and unit.
 
 The parts fixed by the contract (schema, specimen, answer, photos, inverse, balance, agreement, diagnosis, findings,
 provenance) keep their names; more stands beside them.
@@ -6,14 +6,12 @@ provenance) keep their names; more stands beside them.
 
 from __future__ import annotations
 
-from html import escape
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.result.lists import Floats, Number, check_one_length
-from pipeline.rounding import rounded
 
 
 class Part(BaseModel):
@@ -326,10 +324,13 @@ class DiagnosisPart(Part):
     corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")
 
 
+Method = Literal["extended", "inverse", "balance"]
+
+
 class AnswerPart(Part):
     """Which of the curves is the result, why, and whether a fault of the data makes it none of the cable's."""
 
-    method: Literal["extended", "inverse", "balance"] | None = None
+    method: Method | None = None
     usable: bool
     reason: str
     pre_curvature_per_m: Number | None = None
@@ -342,46 +343,3 @@ class FindingPart(Part):
     code: str
     level: Literal["info", "warning", "error"]
     message: str
-
-
-class Result(Part):
-    """Everything measured on one specimen."""
-
-    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = "cablebend/result/1"
-    status: Literal["measured", "partial", "failed"]
-    headline: str = ""
-    specimen: SpecimenPart
-    answer: AnswerPart | None = Field(None, description="see `pipeline.visited.answer`; none in earlier results")
-    scale: ScalePart | None = None
-    photos: list[PhotoPart] = []
-    steps: list[StepPart] = []
-    inverse: InversePart | None = None
-    balance: BalancePart | None = None
-    agreement: AgreementPart | None = None
-    diagnosis: DiagnosisPart | None = None
-    findings: list[FindingPart] = []
-    provenance: dict[str, Any] = {}
-
-    def _repr_html_(self) -> str:
-        """Show the result in a notebook: what was found, each number with its standard deviation."""
-        agreement = self.agreement.pre_curvature if self.agreement else {}
-        rows = [(f"pre-curvature K0, {way}", rounded(value, std) + " 1/m") for way, (value, std) in agreement.items()]
-        for way, part in (("inverse", self.inverse), ("balance", self.balance)):
-            if part is not None and part.curve is not None and part.curve.kappa_per_m:
-                rows += [(f"f_EI, {way}, at {kappa:.3g} 1/m", text) for kappa, text in _ends(part.curve)]
-        if self.diagnosis is not None:
-            rows.append((f"diagnosis: {self.diagnosis.verdict}", self.diagnosis.headline))
-        rows += [(finding.level, finding.message) for finding in self.findings if finding.level != "info"]
-        body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-        title = f"{self.specimen.id}: {self.status}" + (f". {self.headline}" if self.headline else "")
-        return f"<table><caption>{escape(title)}</caption><tbody>{body}</tbody></table>"
-
-
-def _ends(curve: Curve) -> list[tuple[float, str]]:
-    """First and last supported point of a characteristic: curvature and tangent with its standard deviation."""
-    points = [i for i, supported in enumerate(curve.supported) if supported]
-    ends = (points[0], points[-1]) if points else ()
-    return [
-        (curve.kappa_per_m[i], rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i]) + " mN m²")
-        for i in ends
-    ]

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.pooling import pool, random_effects
-from pipeline.visited import Visited, best, curves, visited
+from pipeline.result import Visited, curves, visited
 from tests.pipeline.report.virtual_result import K0, curve_of, moment_of
 
 
@@ -15,12 +15,12 @@ def straight(low, slope, std, factor=None):
     tangent = low + slope * kappa
     zeros = np.zeros(11)
     factor = np.zeros((11, 0)) if factor is None else factor
-    return Visited("inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor)
+    return Visited("inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor, 0.0, 0.0)
 
 
 def test_equivalent_stiffness_is_the_rise_of_the_moment(full_result):
     # curve sampled at 61 points; the trapezoidal rule is off by h^2 / 12 f' / f, below 1e-4 here
-    got = equivalent(best(full_result), (3.0, 7.0))
+    got = equivalent(full_result.answer.curve, (3.0, 7.0))
     expected = (moment_of(np.array([7.0])) - moment_of(np.array([3.0])))[0] / 4.0
     assert got.stiffness == pytest.approx(expected, rel=1e-4)
     assert (got.low, got.high) == (3.0, 7.0)
@@ -39,7 +39,11 @@ def test_error_of_equivalent_stiffness_by_repetition():
     rng, factor = np.random.default_rng(3), np.column_stack([np.full(11, 0.3), np.linspace(0.0, 0.5, 11)])
     curve = straight(5.0, -0.2, 0.0, factor)
     draws = [
-        equivalent(Visited(*([curve.method, curve.kappa] + [curve.tangent + factor @ rng.normal(size=2)] * 6), factor))
+        equivalent(
+            Visited(
+                *([curve.method, curve.kappa] + [curve.tangent + factor @ rng.normal(size=2)] * 6), factor, 0.0, 0.0
+            )
+        )
         for _ in range(2000)
     ]
     # standard error of a standard deviation from 2000 draws is 1.6 %; four of them
@@ -62,12 +66,12 @@ def test_unsupported_points_do_not_count():
 
 
 def test_extended_model_answers_first(diagnosed, full_result):
-    assert best(diagnosed("named")).method == "extended"
-    assert best(full_result).method == "inverse"
-    assert best(full_result.model_copy(update={"inverse": None})).method == "balance"
+    assert diagnosed("named").answer.curve.method == "extended"
+    assert full_result.answer.curve.method == "inverse"
+    assert full_result.model_copy(update={"inverse": None}).answer.curve.method == "balance"
     stuck = full_result.inverse.model_copy(update={"converged": False})
-    assert best(full_result.model_copy(update={"inverse": stuck})).method == "balance"
-    assert best(full_result.model_copy(update={"inverse": None, "balance": None})) is None
+    assert full_result.model_copy(update={"inverse": stuck}).answer.curve.method == "balance"
+    assert full_result.model_copy(update={"inverse": None, "balance": None}).answer.curve is None
     assert set(curves(diagnosed("named"))) == {"inverse", "balance", "extended"}
 
 
@@ -75,8 +79,8 @@ def test_an_extended_model_that_the_data_refute_answers_last(diagnosed):
     named = diagnosed("named")
     refuted = named.diagnosis.model_copy(update={"verdict": "unexplained", "extended_refuted": True})
     unexplained = named.model_copy(update={"diagnosis": refuted})
-    assert best(unexplained).method == "inverse"
-    assert best(unexplained.model_copy(update={"inverse": None, "balance": None})).method == "extended"
+    assert unexplained.answer.curve.method == "inverse"
+    assert unexplained.model_copy(update={"inverse": None, "balance": None}).answer.curve.method == "extended"
 
 
 def test_smallest_radius_is_that_of_the_visible_cable(full_result):
@@ -126,7 +130,7 @@ def test_pooling_false_alarms_by_repetition():
 
 def test_pooling_needs_two_specimens_and_a_common_range():
     one, other = straight(5.0, 0.0, 0.1), straight(5.0, 0.0, 0.1)
-    shifted = Visited(other.method, other.kappa + 20.0, *[other.tangent] * 6, other.factor)
+    shifted = Visited(other.method, other.kappa + 20.0, *[other.tangent] * 6, other.factor, 0.0, 0.0)
     assert pool([one]) is None
     assert pool([one, shifted]) is None
 
