@@ -143,7 +143,7 @@ PIPELINE = [
     ("assembly",),
     ("run",),
     ("batch",),
-    ("cli",),
+    ("cli", "door"),
 ]
 GUESTS = {
     "cv2": {"vision"},

@@ -167,12 +167,6 @@ def _is_noise(leftover: dict[str, Any], settings: ReportSettings) -> bool:
     return float(leftover.get("p_value", 0.0)) > settings.leftover_p_value
 
 
-def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:
-    """Typed residual map of the diagnosis; None if there is none."""
-    known = {key: value for key, value in (values or {}).items() if key in ResidualMap.model_fields}
-    return ResidualMap.model_validate(known) if known else None
-
-
 def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
     """Ranking, cosines, maps before and after."""
     drawn: dict[str, Drawing] = {}
@@ -192,7 +186,7 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
             title=words("fig_cosines"),
             description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
         )
-    before, after = residual_map(part.residuals_before), residual_map(part.residuals_after)
+    before, after = part.residuals_before, part.residuals_after
     if before is not None and after is not None:
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
@@ -217,7 +211,7 @@ def _before_and_after(
         drawn[key] = drawing(
             f"map-{key}",
             partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
-            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            size=(400.0, maps.map_height(residuals)),
             title=words(f"fig_map_{key}"),
             description=words("fig_map_alt", rms=map_rms(residuals, words)),
         )

@@ -137,12 +137,12 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
             title=words("fig_pointwise"),
             description=words("fig_pointwise_alt"),
         )
-    residuals = maps.measured_map(result)
+    residuals = maps.answer_map(result)
     if residuals is not None:
         drawn["map"] = drawing(
             "residual-map",
             lambda f: maps.draw_map(f, residuals, words, settings),
-            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            size=(400.0, maps.map_height(residuals)),
             title=words("fig_map"),
             description=words("fig_map_alt", rms=map_rms(residuals, words)),
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from pipeline.result.lists import Floats, Number, check_one_length
 
@@ -290,6 +290,10 @@ class ResidualMap(Part):
     data: dict[str, int] = Field({}, description="number of data by kind")
 
 
+# a simulation that found no equilibrium leaves an empty one
+MapOrNone = Annotated[ResidualMap | None, BeforeValidator(lambda given: given or None)]
+
+
 class ForceCorrectionPart(Part):
     """Forces of some steps that were wrong together: shown = factor * force + offset; a finding says why."""
 
@@ -316,8 +320,8 @@ class DiagnosisPart(Part):
         False, description="whether the data refute the extended model, so that its curve is no answer"
     )
     leftover: dict[str, Any] | None = None
-    residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
-    residuals_after: dict[str, Any] | None = None
+    residuals_before: MapOrNone = Field(None, description="of the fitted simulation")
+    residuals_after: MapOrNone = Field(None, description="of the model extended by the causes")
     twins: dict[str, dict[str, Number]] = Field({}, description="cosines of confusable causes")
     left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
     left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
