@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pipeline.diagnosis.plans.design import Plan, design
     from pipeline.errors import InputError
     from pipeline.predict import predict
+    from pipeline.report.exports import export
     from pipeline.report.frames import (
         causes_frame,
         centerlines_frame,
@@ -51,6 +52,7 @@ __all__ = [
     "compare",
     "design",
     "estimate",
+    "export",
     "forces_frame",
     "measure",
     "photos_frame",
@@ -71,6 +73,7 @@ ROOMS = {
     "pipeline.diagnosis.plans.design": ("Plan", "design"),
     "pipeline.errors": ("InputError",),
     "pipeline.predict": ("predict",),
+    "pipeline.report.exports": ("export",),
     "pipeline.report.frames": (
         *("causes_frame", "centerlines_frame", "characteristic_frame"),
         *("forces_frame", "photos_frame", "simulation_frame"),
