@@ -9,28 +9,30 @@ over.
 from __future__ import annotations
 
 from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, trusted
+from pipeline.result.diagnosed import (
+    BlindSpot,
+    CauseForm,
+    CausePart,
+    CauseRow,
+    DiagnosisPart,
+    ForceCorrectionPart,
+    GainPart,
+    NextExperiment,
+    ResidualMap,
+)
 from pipeline.result.files import from_json, read_result, schema, to_json
 from pipeline.result.parts import (
     AgreementPart,
     AnswerPart,
     BalancePart,
-    BlindSpot,
-    CauseForm,
-    CausePart,
-    CauseRow,
     Curve,
-    DiagnosisPart,
     FindingPart,
-    ForceCorrectionPart,
-    GainPart,
     InversePart,
     KnotPart,
     MisfitPart,
-    NextExperiment,
     PhotoPart,
     PointwisePart,
     PreviewPart,
-    ResidualMap,
     ScalePart,
     SpecimenPart,
     StepPart,

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.result.parts import AnswerPart, BalancePart, DiagnosisPart, FindingPart, InversePart, Method
+from pipeline.result.diagnosed import DiagnosisPart
+from pipeline.result.parts import AnswerPart, BalancePart, FindingPart, InversePart, Method
 from pipeline.result.visited import Visited, html_table, visited
 from pipeline.rounding import plain
 

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from pipeline.result.answer import Answer, answer_of
+from pipeline.result.diagnosed import DiagnosisPart
 from pipeline.result.parts import (
     AgreementPart,
     AnswerPart,
     BalancePart,
-    DiagnosisPart,
     FindingPart,
     InversePart,
     Part,
@@ -22,13 +22,17 @@ from pipeline.result.parts import (
 )
 from pipeline.result.visited import html_table
 
+SCHEMA: Literal["cablebend/result/1"] = "cablebend/result/1"
+
 
 class Result(Part):
     """Everything measured on one specimen."""
 
-    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = "cablebend/result/1"
-    status: Literal["measured", "partial", "failed"]
-    headline: str = ""
+    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema", description="what this file is")] = SCHEMA
+    status: Literal["measured", "partial", "failed"] = Field(
+        description="measured: the simulation was fitted; partial: only the balance equations answer; failed: none does"
+    )
+    headline: str = Field("", description="the answer in a sentence")
     specimen: SpecimenPart
     answer_: Annotated[AnswerPart | None, Field(alias="answer", description="none in the earliest results")] = None
     scale: ScalePart | None = None
