@@ -308,19 +308,6 @@ def test_settings_that_are_refused(text, code, line, hint, tmp_path):
     assert hint in refused.value.sentence
 
 
-def test_explain_knows_every_cause_of_the_contract():
-    known = call("explain").stdout
-    assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 20
-    parts = ("Amount:", "Sits in:", "Shows with:", "Told apart by:", "At the rig:", "Settled by:")
-    assert all(part in call("explain", "pre_curvature").stdout for part in parts)
-    assert "An der Anlage:" in call("explain", "pre_curvature", "--language", "de").stdout
-    page = call("explain", "rig_compliance").stdout
-    assert page.startswith("rig_compliance (m/N")
-    german = call("explain", "rig_compliance", "--language", "de").stdout
-    assert german.startswith("rig_compliance: Nachgiebigkeit der Anlage (m/N, nicht negativ)")
-    assert "An der Anlage:    Die fotografierte Sehne statt des Protokolls verwenden" in german
-
-
 def test_language_is_no_part_of_a_result():
     specimen = read_specimen(ROOT / "fixtures" / "specimens" / "three", Settings().intake)
     parts = [
