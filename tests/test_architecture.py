@@ -98,6 +98,7 @@ INSIDE = {
         ("shots",),
         ("picture_size", "stated_width"),
         ("series",),
+        ("look",),
     ],
     "pipeline.vision.scale": [("plane",), ("calibration", "chord", "corners", "plane_fit"), ("board", "doubt")],
     "pipeline.vision.search": [
