@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.report.figures import stiffness_unit
+from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import Result, leading, trusted
 from pipeline.settings import ReportSettings
@@ -34,6 +35,8 @@ class FirstScreen:
     verdict, tone : str
         Label of the verdict and how to colour it: ``good``, ``warn`` or ``bad``.
     pre_curvatures : tuple of (way, value ± std)
+    hidden : tuple of str
+        What could hide in the data and would change f_EI by more than its band.
     """
 
     sentence: str
@@ -43,6 +46,7 @@ class FirstScreen:
     verdict: str
     tone: str
     pre_curvatures: tuple[tuple[str, str], ...]
+    hidden: tuple[str, ...] = ()
 
 
 def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
@@ -68,6 +72,30 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
             (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
             for way, (value, std) in _all_pre_curvatures(result).items()
         ),
+        hidden=_hidden(result, words, settings),
+    )
+
+
+MOST_HIDDEN = 3
+"""Lines on the first screen; all blind spots stand with the diagnosis."""
+
+
+def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str, ...]:
+    """Blind spots that would move f_EI, at a plausible size, farther than its band reaches; the worst first."""
+    curve, diagnosis = result.answer.curve, result.diagnosis
+    if curve is None or diagnosis is None:
+        return ()
+    band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
+    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.blind_spots]
+    worst = sorted((one for one in spots if one[0] > band), key=lambda one: -one[0])[:MOST_HIDDEN]
+    return tuple(
+        words(
+            "hidden_row",
+            name=words.cause(spot.name),
+            bias=words.number(100.0 * bias, 2),
+            settled=words.said(spot.settled_by),
+        )
+        for bias, spot in worst
     )
 
 
@@ -103,7 +131,10 @@ def _sentence(result: Result, words: Words) -> str:
         if result.status == "failed" and reason:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
-    lead = "" if told.usable else f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
+    fault = leading(result.findings)
+    lead = f"{words.said(fault.message.rstrip('.')).sentence}. " if fault is not None else ""
+    if not told.usable:
+        lead = f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
     unit = stiffness_unit(result, words)
     (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
     beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
@@ -166,10 +197,11 @@ def _advice(result: Result, words: Words) -> str:
     if result.status == "failed":
         return words("next_refused" if _refused(result) else "next_failed")
     fault = leading(result.findings)
+    remedy = words.code(fault.code) if fault is not None else None
     if fault is not None:
-        return words.said(fault.message).sentence
+        return remedy[1] if remedy else words.said(fault.message).sentence
     if not result.answer.usable:
-        return words.said(result.answer.reason).sentence
+        return words("next_unusable")
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

@@ -19,6 +19,7 @@ from pipeline.report.evidence import (
     knot_rows,
     knot_title,
     main_figure,
+    map_note,
     mechanics_figures,
     photo_rows,
     photo_views,
@@ -30,7 +31,7 @@ from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, environment, palette_css, unbroken
 from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import Result, curves, set_aside
 from pipeline.settings import ReportSettings
 
 __all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
@@ -62,6 +63,8 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             settings=settings,
             answer=first_screen(result, words, settings),
             main=main,
+            aside=_aside(result, words),
+            map_note=map_note(result, words),
             shown={
                 "photos": bool(result.photos) or result.status != "failed",
                 "diagnosis": diagnosis is not None and diagnosis.examined,
@@ -90,6 +93,12 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             js=asset("page.js") + asset("report.js"),
         )
     )
+
+
+def _aside(result: Result, words: Words) -> str:
+    """Label of the switch for curves that are set aside; empty where there are none."""
+    aside = set_aside(result) & curves(result).keys()
+    return words("aside_refuted" if "extended" in aside else "aside_without") if aside else ""
 
 
 def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> dict[str, Any]:

@@ -8,7 +8,7 @@ over.
 
 from __future__ import annotations
 
-from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, trusted
+from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, set_aside, trusted
 from pipeline.result.diagnosed import (
     BlindSpot,
     CauseForm,
@@ -74,6 +74,7 @@ __all__ = [
     "read_result",
     "refuted",
     "schema",
+    "set_aside",
     "to_json",
     "trusted",
     "visited",

@@ -89,6 +89,14 @@ def refuted(diagnosis: DiagnosisPart | None) -> bool:
     return diagnosis is not None and diagnosis.extended_refuted
 
 
+def set_aside(result: Result) -> frozenset[str]:
+    """Methods whose curve is not f_EI: those without the cause that was found, or an extended one that is refuted."""
+    answering = result.answer.method
+    if answering == "extended":
+        return frozenset({"inverse", "balance"})
+    return frozenset({"extended"}) if refuted(result.diagnosis) and answering is not None else frozenset()
+
+
 def trusted(result: Result) -> dict[str, Visited]:
     """`curves` without an extended model that the data refute, unless nothing else was found."""
     parts = curves(result)

@@ -43,8 +43,12 @@ UNIT = FindingPart(code="size/force", level="error", message=f"the {TOO_LARGE}")
 def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads):
     fault = FindingPart(code=code, level=level, message="the log is wrong")
     assert (leading([fault]) is not None) == leads
-    told = first_screen(measured.model_copy(update={"findings": [fault]}), Words("en"), ReportSettings())
-    assert (told.advice == "The log is wrong") == leads and (told.tone == "bad") == leads
+    words = Words("en")
+    told = first_screen(measured.model_copy(update={"findings": [fault]}), words, ReportSettings())
+    before_numbers = told.sentence.casefold().partition("the bending")[0]
+    assert ("the log is wrong. " in before_numbers) == leads and (told.tone == "bad") == leads
+    remedy = words.code(code)
+    assert (told.advice == (remedy[1] if remedy else "The log is wrong")) == leads
 
 
 def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
