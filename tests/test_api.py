@@ -30,6 +30,7 @@ from tests.test_cli import HEAVY
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+HOUSE = (ROOT / "fixtures/readme/house.md").read_text(encoding="utf-8")
 
 
 def example() -> str:
@@ -41,7 +42,7 @@ def example() -> str:
 
 def stages() -> list[str]:
     """Functions that the table of stages names, with the arguments it shows."""
-    table = README.partition("<!-- python stages -->")[2].partition("\n\n")[0]
+    table = HOUSE.partition("<!-- python stages -->")[2].partition("\n\n")[0]
     return re.findall(r"\| `((?:pipeline|rod)\.[^`]+)` \|", table)
 
 
@@ -67,7 +68,7 @@ def test_the_example_of_the_readme_runs_as_it_stands(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("call", stages())
-def test_stages_of_the_readme_exist_with_the_arguments_shown(call):
+def test_stages_exist_with_the_arguments_shown(call):
     name, _, arguments = call.partition("(")
     module, _, function = name.rpartition(".")
     signature = inspect.signature(getattr(importlib.import_module(module), function))
@@ -76,7 +77,7 @@ def test_stages_of_the_readme_exist_with_the_arguments_shown(call):
     signature.bind(*(argument for argument in given if "=" not in argument), **named)
 
 
-def test_the_readme_names_the_stages():
+def test_the_house_names_the_stages():
     assert len(stages()) > 5
 
 
