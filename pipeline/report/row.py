@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 End = tuple[float, float, float]
 
-ROW = 1
+ROW = 2
 """Version of what stands in an entry; another one is made anew from the result."""
 
 SHAPES, SHAPE_POINTS = 5, 11
@@ -54,8 +54,8 @@ class IndexRow:
     Attributes
     ----------
     id, type, status, verdict : str
-    causes : tuple of str
-        Named ones.
+    causes, twins : tuple of str
+        Named ones, and other names that the data cannot tell from them.
     usable : bool
     fault : str
         Why it is not usable; empty if it is.
@@ -84,6 +84,7 @@ class IndexRow:
     status: str
     verdict: str
     causes: tuple[str, ...]
+    twins: tuple[str, ...]
     usable: bool
     fault: str
     method: str
@@ -117,7 +118,7 @@ VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "
 
 def index_row(result: Result, settings: ReportSettings) -> IndexRow:
     """Row of one result, without its report."""
-    told = result.answer
+    told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
     curve, worst = told.curve, _worst(result.findings)
     low, high = curve.ends() if curve else (None, None)
     return IndexRow(
@@ -125,7 +126,8 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         type=result.specimen.description.get("type", ""),
         status=result.status,
         verdict=result.diagnosis.verdict if result.diagnosis else "none",
-        causes=tuple(cause.name for cause in result.diagnosis.causes) if result.diagnosis else (),
+        causes=tuple(cause.name for cause in found),
+        twins=tuple(dict.fromkeys(name for cause in found for name in cause.class_ if name != cause.name)),
         usable=told.usable,
         fault="" if told.usable else told.reason,
         method=told.method or "",
@@ -213,6 +215,7 @@ def from_entry(data: object) -> IndexRow:
             **{name: _typed(data[name], str) for name in TEXTS},
             **{name: _typed(data[name], int) for name in COUNTS},
             causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
+            twins=tuple(_typed(name, str) for name in _typed(data["twins"], list)),
             usable=_typed(data["usable"], bool),
             low=_end_of(data["low"]),
             high=_end_of(data["high"]),

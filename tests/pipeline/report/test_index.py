@@ -57,6 +57,21 @@ def test_page_links_every_report_and_escapes_names(batch, tmp_path):
     assert "the log is empty" in page
 
 
+@pytest.mark.parametrize(
+    ("verdict", "language", "told"),
+    [
+        ("class", "en", "hysteresis or bearing friction"),
+        ("class", "de", "Hysterese oder Lagerreibung"),
+        ("adequate", "en", ""),
+        ("unexplained", "en", ""),  # a cause that does not suffice is none
+    ],
+)
+def test_the_page_names_the_cause_and_its_class(diagnosed, tmp_path, verdict, language, told):
+    pages = write_index([diagnosed(verdict)], tmp_path, ReportSettings(language=language))
+    cell = re.search(r"<br><b>([^<]*)</b></td>", pages[0].read_text(encoding="utf-8"))
+    assert (cell[1] if cell else "") == told
+
+
 def test_folder_of_half_a_run_is_enough(batch, tmp_path):
     for result in batch[:2]:
         write_result(result, tmp_path / "deep" / result.specimen.id)
