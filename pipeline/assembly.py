@@ -30,10 +30,10 @@ from pipeline.result import (
     Result,
     ScalePart,
     SpecimenPart,
+    leading,
 )
 from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
-from pipeline.visited import decided, leading, refuted, visited
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
@@ -85,9 +85,7 @@ def assemble(
         The command that reproduces the result.
     """
     parts = identification_parts(identification)
-    photos = photo_parts(specimen, traces, parts)
     measured = parts.inverse.converged or parts.balance.curve is not None
-    told = _gathered(specimen, traces, parts, list(findings))
     result = Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
         specimen=_specimen_part(specimen),
@@ -97,21 +95,16 @@ def assemble(
             source=traces.scale.source,
             axis_parallax_std=traces.axis_parallax_std,
         ),
-        photos=photos,
+        photos=photo_parts(specimen, traces, parts),
         steps=parts.steps,
         inverse=parts.inverse,
         balance=parts.balance,
         agreement=parts.agreement,
         diagnosis=diagnosis,
-        findings=told,
+        findings=_gathered(specimen, traces, parts, list(findings)),
         provenance=provenance(specimen, settings, command),
     )
-    answer = decided(result)
-    fault = leading(told)
-    if fault is None and answer.method is not None and not answer.usable:
-        fault = FindingPart(code="answer/unusable", level="error", message=answer.reason)
-    said = headline(parts, diagnosis, photos, fault)
-    return result.model_copy(update={"answer": answer, "headline": said})
+    return result.model_copy(update={"answer_": result.answer.stored(), "headline": headline(result)})
 
 
 def _gathered(
@@ -139,39 +132,35 @@ def _specimen_part(specimen: Specimen) -> SpecimenPart:
     )
 
 
-def headline(
-    parts: IdentificationParts,
-    diagnosis: DiagnosisPart | None,
-    photos: Sequence[PhotoPart],
-    fault: FindingPart | None = None,
-) -> str:
+WAYS = {"inverse": "inverse problem", "balance": "balance equations", "extended": "extended model"}
+
+
+def headline(result: Result) -> str:
     """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
 
-    Where the diagnosis extended the model, what the extended model gives is the answer, unless the data refute it;
-    where no photo could be used, why the first was not. A fault of the data comes before all that.
+    Where no photo could be used, why the first was not. A fault of the data comes before all that.
     """
-    way, name = (parts.inverse, "inverse problem") if parts.inverse.curve else (parts.balance, "balance equations")
-    extended = None if diagnosis is None or refuted(diagnosis) else visited("extended", diagnosis.extended)
-    curve = extended or visited(name, way.curve)
-    if curve is None and photos and all(photo.reason for photo in photos):
-        return f"None of the {len(photos)} photos could be used. The first: {photos[0].reason}"
+    answer, agreement, diagnosis = result.answer, result.agreement, result.diagnosis
+    curve = answer.curve
+    if curve is None and result.photos and all(photo.reason for photo in result.photos):
+        return f"None of the {len(result.photos)} photos could be used. The first: {result.photos[0].reason}"
     if curve is None:
-        return f"No characteristic was measured: {parts.inverse.advice}."
+        advice = result.inverse.advice if result.inverse else answer.reason
+        return f"No characteristic was measured: {advice}."
     low, high = (
-        f"{rounded(1e3 * f, 1e3 * std)} mN m² at {plain(kappa, zeros=True)} 1/m"
-        for kappa, f, std in ((curve.kappa[i], curve.tangent[i], curve.tangent_std[i]) for i in (0, -1))
+        f"{rounded(1e3 * f, 1e3 * std)} mN m² at {plain(kappa, zeros=True)} 1/m" for kappa, f, std in curve.ends()
     )
-    name = name if extended is None else "extended model"
-    lead = "" if fault is None else f"{fault.message[:1].upper()}{fault.message[1:].rstrip('.')}. "
-    start = rounded(*((way.pre_curvature_per_m, way.pre_curvature_std_per_m) if extended is None else extended.rest()))
-    answer = f"By the {name}, f_EI (tangent) goes from {low} to {high}; pre-curvature {start} 1/m"
-    agrees = parts.agreement.compatible
-    if agrees is not None and parts.agreement.rms_relative is not None:
-        share = f"{plain(100 * parts.agreement.rms_relative, 2)} % rms"
-        answer += f"; both ways {'agree' if agrees else 'disagree beyond their bands'} ({share})"
+    fault = leading(result.findings)
+    said = fault.message if fault else "" if answer.usable else answer.reason
+    lead = f"{said[:1].upper()}{said[1:].rstrip('.')}. " if said else ""
+    rest = rounded(curve.pre_curvature, curve.pre_curvature_std)
+    told = f"By the {WAYS[curve.method]}, f_EI (tangent) goes from {low} to {high}; pre-curvature {rest} 1/m"
+    if agreement is not None and agreement.compatible is not None and agreement.rms_relative is not None:
+        share = f"{plain(100 * agreement.rms_relative, 2)} % rms"
+        told += f"; both ways {'agree' if agreement.compatible else 'disagree beyond their bands'} ({share})"
     if diagnosis is not None:
-        answer += f". {diagnosis.headline}"
-    return lead + (answer if answer.endswith(".") else f"{answer}.")
+        told += f". {diagnosis.headline}"
+    return lead + (told if told.endswith(".") else f"{told}.")
 
 
 def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:

@@ -3,8 +3,7 @@
 Two results -> f_EI (tangent reading) on the curvatures that both visited, with both covariances, and K0. The two share
 no photo and no force, so the covariance of the difference is the sum of both; `pipeline.identify.contrast` tests the
 mean log ratio over each third of the common range. K0 is tested on its own. Both p-values are doubled (Bonferroni), so
-that the verdict as a whole has the level that is told. Each result answers with its best curve (extended, else
-inverse, else balance). Nothing is compared outside the common range.
+that the verdict as a whole has the level that is told. Nothing is compared outside the common range.
 
 What no test on two results can see is said as a finding: an error of the scale that both have in common, and what
 else makes a difference, or its absence, doubtful. Lengths too large by e make f_EI too large by up to 2 e: f is a
@@ -24,11 +23,10 @@ from scipy.special import ndtr
 
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.records import Finding
-from pipeline.result import Result
+from pipeline.result import Result, Visited, leading
 from pipeline.rounding import p_value as p_text
 from pipeline.rounding import plain, rounded
 from pipeline.settings.compare import CompareSettings
-from pipeline.visited import Visited, answer, best, leading, pre_curvature
 
 Array = NDArray[np.float64]
 
@@ -113,14 +111,12 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
         ``not comparable`` where a characteristic is missing or not usable, or no curvature was visited by both.
     """
     settings = settings or CompareSettings()
-    one, two = best(a), best(b)
+    one, two = a.answer.curve, b.answer.curve
     if one is None or two is None:
         lacking = " and ".join(r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None)
         return _not_comparable(a, b, ("", ""), f"No characteristic was measured on {lacking}.", settings)
     methods = (one.method, two.method)
-    faults = [
-        f"{r.specimen.id} is not usable: {said.reason.rstrip('.')}." for r in (a, b) if not (said := answer(r)).usable
-    ]
+    faults = [f"{r.specimen.id} is not usable: {r.answer.reason.rstrip('.')}." for r in (a, b) if not r.answer.usable]
     faults += [f"f_EI of {r.specimen.id} is not positive." for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
     if faults:
         return _not_comparable(a, b, methods, " ".join(faults), settings)
@@ -135,8 +131,8 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     known = one.factor.shape[1] > 0 and two.factor.shape[1] > 0
     covariance = first.parts_covariance(grid) + second.parts_covariance(grid)
     p = p_value(parts_difference(first, second, grid), covariance) if known else None
-    (K0_a, std_a), (K0_b, std_b) = pre_curvature(a, one), pre_curvature(b, two)
-    rest = _difference(K0_a, K0_b, float(np.hypot(std_a, std_b)))
+    apart = float(np.hypot(one.pre_curvature_std, two.pre_curvature_std))
+    rest = _difference(one.pre_curvature, two.pre_curvature, apart)
     mean = _mean(first, second, grid, bands)
     verdict = _verdict(a, b, Tested(p, rest, mean), ratio, settings)
     return Comparison(

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.observations.prediction import Facts, Model
-from pipeline.result import CauseForm, Result
-from pipeline.visited import Visited, best, pre_curvature
+from pipeline.result import CauseForm, Result, Visited
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
 
@@ -126,24 +125,26 @@ class IdentifiedModel:
 
 def identified_model(result: Result) -> IdentifiedModel | None:
     """The cable of a result; None without a characteristic."""
-    curve = best(result)
+    curve = result.answer.curve
     if curve is None:
         return None
-    K0, std = pre_curvature(result, curve)
     law = Characteristic.from_ordinates(curve.kappa, curve.tangent)
-    factor = _joint_factor(curve, std)
+    factor = _joint_factor(curve)
     forms = _forms(result, columns=factor.shape[1]) if curve.method == "extended" else ()
-    return IdentifiedModel(curve.method, law, K0, factor, (float(curve.kappa[0]), float(curve.kappa[-1])), forms)
+    visited = float(curve.kappa[0]), float(curve.kappa[-1])
+    return IdentifiedModel(curve.method, law, curve.pre_curvature, factor, visited, forms)
 
 
-def _joint_factor(curve: Visited, std: float) -> Array:
+def _joint_factor(curve: Visited) -> Array:
     """Factor of the joint covariance of f along the curve and K0, (n + 1, r); see the module.
 
     Without a factor of f its errors are taken as one common factor on the whole curve: the widest band of a force.
     """
-    F, link = curve.factor, curve.rest_factor
+    F, link, std = curve.factor, curve.rest_factor, curve.pre_curvature_std
     if not F.shape[1]:
-        F, link = curve.tangent_std[:, None], np.zeros(1)
+        F = curve.tangent_std[:, None]
+    if link.size != F.shape[1]:
+        link = np.zeros(F.shape[1])
     length = float(np.linalg.norm(link))
     link = link * (min(1.0, std / length) if length > 0.0 else 0.0)  # a correlation of one at most, rounded
     own = np.sqrt(max(std**2 - float(link @ link), 0.0))

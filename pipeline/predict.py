@@ -33,7 +33,6 @@ from pipeline.records import Finding
 from pipeline.result import CausePart, Result
 from pipeline.rounding import plain
 from pipeline.settings.predict import PredictSettings
-from pipeline.visited import answer
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
@@ -165,7 +164,7 @@ def predict(
     model = identified_model(result)
     if model is None:
         return None
-    if not (told := answer(result)).usable:
+    if not (told := result.answer).usable:
         raise ValueError(f"{result.specimen.id} is not usable, nor is what follows from it: {told.reason.rstrip('.')}")
     if length is None or not (np.isfinite(length) and length > 0.0):
         raise ValueError(f"a cable cannot be {length} m long")

@@ -176,18 +176,18 @@ def test_pointing_at_the_characteristic_tells_value_band_and_photos(show, site):
     ActionChains(driver).move_to_element(one(driver, "#characteristic")).perform()
     text = one(driver, "#readout").text
     assert "κ = " in text
-    assert "simulation fitted: " in text
+    assert "extended model: " in text
     assert " ± " in text
     assert "(band " in text
     assert "photos: " in text
-    assert len(shown(driver, "#point circle")) == 3
+    assert len(shown(driver, "#point circle")) == 1
 
 
 def test_characteristic_is_read_by_keyboard_alone(show, site):
     driver = show(f"{site}/cable-0/report.html")
     stage = one(driver, "#characteristic-stage")
     stage.send_keys(Keys.HOME)
-    assert "κ = 2 1/m. simulation fitted: 20.00 ± 0.13 mN m² (band 19.74 … 20.26)" in one(driver, "#readout").text
+    assert "κ = 2 1/m. extended model: 20.00 ± 0.11 mN m² (band 19.78 … 20.22)" in one(driver, "#readout").text
     stage.send_keys(Keys.ARROW_RIGHT)
     assert "κ = 2.13 1/m" in one(driver, "#readout").text
     stage.send_keys(Keys.ESCAPE)
@@ -204,6 +204,17 @@ def test_equivalent_stiffness_of_a_chosen_range(show, site):
     after = one(driver, "#range-result").text
     assert after != before
     assert "κ 5 … 8,7 1/m" in after
+
+
+def test_curves_without_the_cause_are_switched_on(show, site):
+    driver = show(f"{site}/cable-0/report.html")
+    assert not shown(driver, "#characteristic .set-aside")
+    one(driver, "#characteristic-stage").send_keys(Keys.END)
+    assert "simulation fitted" not in one(driver, "#readout").text
+    one(driver, "#aside-toggle").click()
+    assert shown(driver, "#characteristic .set-aside")
+    one(driver, "#characteristic-stage").send_keys(Keys.HOME)
+    assert "simulation fitted" in one(driver, "#readout").text
 
 
 def test_terms_explain_themselves_to_pointer_and_keyboard(show, site):

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -231,11 +232,14 @@ def test_reports_can_wait_until_they_are_asked_for(cheap, monkeypatch):
 
 
 def test_check_measures_nothing_and_says_what_is_wrong(cheap):
+    for name in "abc":  # with photos that show a cable
+        shutil.rmtree(cheap / "batch" / name)
+        shutil.copytree(ROOT / "fixtures/specimens/three", cheap / "batch" / name)
     done = call("check", "batch")
     assert done.exit_code == 0
     assert "3 of 3 specimens would run" in done.stdout
     (cheap / "batch/b/force.csv").write_text("step,displacement_mm,force_N\n1,2,abc\n")
-    (cheap / "batch/c/images/step_1.png").unlink()
+    (cheap / "batch/c/images/step_01.jpg").unlink()
     done = call("check", "batch", "--json")
     assert done.exit_code == 1
     rows = json.loads(done.stdout)["specimens"]
@@ -263,7 +267,7 @@ def test_init_then_check_then_run(cheap):
     path.write_text(
         path.read_text().replace("length_mm = 0.0", "length_mm = 181").replace("diameter_mm = 0.0", "diameter_mm = 5")
     )
-    assert call("check", folder).exit_code == 0
+    assert "1 of 1 specimens would run" in call("check", folder).stdout
     assert call("run", folder, "-o", "out").exit_code == 0
 
 
@@ -311,19 +315,6 @@ def test_settings_that_are_refused(text, code, line, hint, tmp_path):
         read_settings(path, ())
     assert (refused.value.code, refused.value.line) == (code, line)
     assert hint in refused.value.sentence
-
-
-def test_explain_knows_every_cause_of_the_contract():
-    known = call("explain").stdout
-    assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 20
-    parts = ("Amount:", "Sits in:", "Shows with:", "Told apart by:", "At the rig:", "Settled by:")
-    assert all(part in call("explain", "pre_curvature").stdout for part in parts)
-    assert "An der Anlage:" in call("explain", "pre_curvature", "--language", "de").stdout
-    page = call("explain", "rig_compliance").stdout
-    assert page.startswith("rig_compliance (m/N")
-    german = call("explain", "rig_compliance", "--language", "de").stdout
-    assert german.startswith("rig_compliance: Nachgiebigkeit der Anlage (m/N, nicht negativ)")
-    assert "An der Anlage:    Die fotografierte Sehne statt des Protokolls verwenden" in german
 
 
 def test_language_is_no_part_of_a_result():

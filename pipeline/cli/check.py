@@ -15,7 +15,7 @@ from pipeline.cli.run import found, nothing_found
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart
-    from pipeline.settings import IntakeSettings, Settings
+    from pipeline.settings import Settings
 
 
 @click.command(short_help="What would run and what is wrong.")
@@ -32,7 +32,7 @@ def check(
     settings_file: Path | None,
     assignments: tuple[str, ...],
 ) -> None:
-    """Read specimens without measuring them; print what would run and what is wrong, with file and line."""
+    """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
     from pipeline.cli.configuration import read_settings
 
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
@@ -41,13 +41,14 @@ def check(
     if not specimens:
         ctx.exit(nothing_found(refused))
     rows = list(checked_all(specimens, settings))
-    failed = sum(row["status"] == "error" for row in rows)
+    failed = sum(not row["runs"] for row in rows)
+    wrong = sum(row["status"] == "error" for row in rows)
     if as_json:
-        click.echo(json.dumps({"specimens": rows, "runs": len(rows) - failed, "errors": failed}, indent=1))
+        click.echo(json.dumps({"specimens": rows, "runs": len(rows) - failed, "errors": wrong}, indent=1))
     else:
         echo_rows(rows)
         click.echo(f"{len(rows) - failed} of {len(rows)} specimens would run")
-    ctx.exit(3 if failed == len(rows) else 1 if failed or refused else 0)
+    ctx.exit(3 if failed == len(rows) else 1 if wrong or refused else 0)
 
 
 def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, Any]]:
@@ -58,28 +59,31 @@ def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, A
     from pipeline.batch.apart import apart
 
     limit = settings.batch
-    work = partial(checked, settings=settings.intake)
+    work = partial(checked, settings=settings)
     if limit.in_process or (len(folders) == 1 and "timeout_s" not in limit.model_fields_set):
         return map(work, folders)
     lost = partial(without_answer, seconds=limit.timeout_s)
-    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.intake.folder")
+    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.vision.look")
 
 
-def checked(folder: Path, settings: IntakeSettings) -> dict[str, Any]:
-    """What a run would find in one folder; whatever breaks in it is told as the run would tell it."""
+def checked(folder: Path, settings: Settings) -> dict[str, Any]:
+    """What a run would find in one folder and on its photos; whatever breaks in it is told as the run would tell it."""
     from pipeline.batch.specimen import refusal
     from pipeline.intake.folder import read_specimen
+    from pipeline.vision.look import look_at_photos
 
     try:
-        specimen = read_specimen(folder, settings)
+        specimen = read_specimen(folder, settings.intake)
+        told = (*specimen.findings, *look_at_photos(specimen, settings.vision))
     except Exception as error:  # one folder never costs the others
         return _failed(folder, refusal(error))
-    findings = [{"code": f.code, "level": f.level, "message": f.message} for f in specimen.findings]
-    status = "warning" if any(finding["level"] != "info" for finding in findings) else "ok"
+    findings = [{"code": f.code, "level": f.level, "message": f.message} for f in dict.fromkeys(told)]
+    levels = {finding["level"] for finding in findings}
     return {
         "folder": str(folder),
         "id": specimen.id,
-        "status": status,
+        "status": "error" if "error" in levels else "warning" if "warning" in levels else "ok",
+        "runs": True,
         "steps": len(specimen.steps),
         "photos": len(specimen.images),
         "findings": findings,
@@ -98,7 +102,15 @@ def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any
 
 def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
     trouble = {"code": told.code, "level": "error", "message": told.message}
-    return {"folder": str(folder), "id": None, "status": "error", "steps": 0, "photos": 0, "findings": [trouble]}
+    return {
+        "folder": str(folder),
+        "id": None,
+        "status": "error",
+        "runs": False,
+        "steps": 0,
+        "photos": 0,
+        "findings": [trouble],
+    }
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:
@@ -106,7 +118,7 @@ def echo_rows(rows: list[dict[str, Any]]) -> None:
     colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}
     for row in rows:
         state = click.style(f"{row['status']:<8}", colours[row["status"]])
-        counts = "" if row["status"] == "error" else f": {_count(row, 'step')}, {_count(row, 'photo')}"
+        counts = f": {_count(row, 'step')}, {_count(row, 'photo')}" if row["runs"] else ""
         click.echo(f"{state} {_name(row)}{counts}")
         for finding in row["findings"]:
             level = click.style(finding["level"], colours[finding["level"]])

@@ -1,33 +1,53 @@
-"""``cablebend explain``: what a cause is, what shows it, what it is confused with, what to do at the rig."""
+"""``cablebend explain``: what a cause or a message is, and what to do about it."""
 
 from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
 
 import click
 
 from pipeline.cli.options import language_option
 
+if TYPE_CHECKING:
+    from pipeline.report.words import Words
 
-@click.command(short_help="What a cause is and what to do.")
+
+@click.command(short_help="What a cause or a message is and what to do.")
 @click.argument("name", required=False)
 @language_option
 def explain(name: str | None, language: str | None) -> None:
-    """Explain a cause of deviations between simulation and experiment; without NAME list all causes."""
-    from pipeline.diagnosis import explain as page
+    """Explain a cause of deviations, or the code of a message.
+
+    NAME is a cause such as bearing_friction, or the code that stands beside a message, such as photo/blur. Without NAME
+    all causes are listed, with `codes` all codes.
+    """
     from pipeline.diagnosis.causes import CATALOGUE
-    from pipeline.intake.tomltable import nearest
-    from pipeline.report.words import Words
+    from pipeline.report.words import Words, documented_codes
 
-    def told(cause: str) -> str:
-        said = Words(language or "en").said(page(cause)).text
-        # the name that commands and result.json know stays beside its translation
-        return said if said.startswith(cause) else f"{cause}: {said}"
-
-    names = ("pre_curvature", *(cause.name for cause in CATALOGUE))
+    words = Words(language or "en")
+    causes, codes = ("pre_curvature", *(cause.name for cause in CATALOGUE)), tuple(documented_codes())
     if name is None:
-        for known in names:
-            title, _, text = told(known).strip().partition("\n\n")
+        for cause in causes:
+            title, _, text = _cause(cause, words).strip().partition("\n\n")
             click.echo(f"{title}\n  {' '.join(text.partition(chr(10) * 2)[0].split())}")
-        return
-    if name not in names:
-        raise click.BadParameter(f"no cause is called {name!r}; the nearest is {nearest(name, names)}.")
-    click.echo(told(name))
+    elif name == "codes":
+        for code in codes:
+            click.echo(f"{code}\n  {(words.code(code) or ('',))[0]}")
+    elif name in causes:
+        click.echo(_cause(name, words))
+    else:
+        meant = words.code(name)
+        if meant is None:
+            near = get_close_matches(name, (*causes, *codes), n=1)
+            hint = f"; did you mean {near[0]}?" if near else ": `explain` lists all causes, `explain codes` all codes."
+            raise click.BadParameter(f"no cause and no code is called {name!r}{hint}")
+        click.echo("\n".join((name, *meant)))
+
+
+def _cause(cause: str, words: Words) -> str:
+    """The page of a cause; the name that commands and result.json know stays beside its translation."""
+    from pipeline.diagnosis import explain as page
+
+    said = words.said(page(cause)).text
+    return said if said.startswith(cause) else f"{cause}: {said}"

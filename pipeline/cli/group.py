@@ -15,7 +15,20 @@ from pipeline.errors import InputError
 from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
-COMMANDS = ("run", "check", "init", "report", "predict", "compare", "demo", "simulate", "design", "explain", "paper")
+COMMANDS = (
+    "run",
+    "check",
+    "init",
+    "report",
+    "predict",
+    "compare",
+    "export",
+    "demo",
+    "simulate",
+    "design",
+    "explain",
+    "paper",
+)
 INTERRUPTED = 130
 
 

@@ -65,11 +65,10 @@ def predict(
     from pipeline.cli.configuration import read_settings
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
-    from pipeline.visited import answer
 
     settings = read_settings(settings_file, assignments)
     measured = read_result(result)
-    told = answer(measured)
+    told = measured.answer
     if told.method is not None and not told.usable:
         click.echo(f"cablebend: {measured.specimen.id} is not usable: {told.reason.rstrip('.')}.", err=True)
         ctx.exit(MISSING)

@@ -24,6 +24,7 @@ from pipeline.records import Finding, Specimen
 from pipeline.settings.intake import IntakeSettings
 
 LOG_NAME = "force.csv"
+SPREADSHEETS = (".xlsx", ".xls", ".xlsm", ".ods")
 LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
 Kind = Literal["specimen", "none", "deep"]
 
@@ -226,6 +227,14 @@ def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tup
         return path, []
     names = candidate_logs(folder)
     if not names:
+        sheets = sorted(entry.name for entry in folder.iterdir() if entry.suffix.casefold() in SPREADSHEETS)
+        if sheets:
+            raise InputError(
+                f"has no force log but the spreadsheet {sheets[0]}",
+                path=folder,
+                code="folder/no-force-log",
+                remedy=f"open it and save the table of forces as {LOG_NAME} (CSV text)",
+            )
         raise InputError(
             "has no force log",
             path=folder,

@@ -82,8 +82,8 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
     check_names(source, source.tables, tuple(tables))
     values = {table: checked_table(source, table, checks) for table, checks in tables.items()}
     cable = values["specimen"]
-    _require(source, cable, "length_mm", "the cable length between the bearing axes")
-    _require(source, cable, "diameter_mm", "the diameter of the cable")
+    lengths = {"length_mm": "the cable length between the bearing axes", "diameter_mm": "the diameter of the cable"}
+    _require(source, cable, lengths)
     return SpecimenFile(
         id=cable.get("id", folder_name(folder)),
         length_m=cable["length_mm"] * 1e-3,
@@ -131,13 +131,16 @@ def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
     }
 
 
-def _require(source: TomlFile, cable: dict[str, Any], key: str, what: str) -> None:
-    if key not in cable:
+def _require(source: TomlFile, cable: dict[str, Any], needed: dict[str, str]) -> None:
+    """Refuse a table that lacks keys; all of them are named at once."""
+    missing = [key for key in needed if key not in cable]
+    if missing:
+        names = " and ".join(missing)
         raise source.error(
-            f"{key} is missing in [specimen]",
+            f"{names} is missing in [specimen]" if len(missing) == 1 else f"{names} are missing in [specimen]",
             table="specimen",
             code="toml/missing-key",
-            remedy=f"add {key} = ..., {what}",
+            remedy=f"add {' and '.join(f'{key} = ..., {needed[key]}' for key in missing)}",
         )
 
 

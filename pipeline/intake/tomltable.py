@@ -136,18 +136,21 @@ def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> di
             remedy=f"write [{table}] on a line of its own and its keys below",
         )
     check_names(file, values, tuple(checks), table=table)
-    result = {}
+    result, refused = {}, {}
     for key, value in values.items():
         try:
             result[key] = checks[key](value)
-        except ValueError as refused:
-            raise file.error(
-                f"{key} = {shown(value)} cannot be used",
-                table=table,
-                key=key,
-                code="toml/wrong-value",
-                remedy=f"give {refused}",
-            ) from refused
+        except ValueError as error:
+            refused[key] = str(error)
+    if refused:  # all of them at once: a template that was filled in halfway has several
+        given = " and ".join(f"{key} = {shown(values[key])}" for key in refused)
+        raise file.error(
+            f"{given} cannot be used",
+            table=table,
+            key=next(iter(refused)),
+            code="toml/wrong-value",
+            remedy=f"give {' and '.join(dict.fromkeys(refused.values()))}",
+        )
     return result
 
 

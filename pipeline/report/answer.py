@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.report.figures import stiffness_unit
+from pipeline.report.page import band_width
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import Result, leading, trusted
 from pipeline.settings import ReportSettings
-from pipeline.visited import answer as decision
-from pipeline.visited import best, leading, pre_curvature, trusted
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
@@ -20,7 +19,7 @@ TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "wa
 
 
 @dataclass(frozen=True)
-class Answer:
+class FirstScreen:
     """The answer in a few sentences.
 
     Attributes
@@ -36,6 +35,8 @@ class Answer:
     verdict, tone : str
         Label of the verdict and how to colour it: ``good``, ``warn`` or ``bad``.
     pre_curvatures : tuple of (way, value ± std)
+    hidden : tuple of str
+        What could hide in the data and would change f_EI by more than its band.
     """
 
     sentence: str
@@ -45,21 +46,22 @@ class Answer:
     verdict: str
     tone: str
     pre_curvatures: tuple[tuple[str, str], ...]
+    hidden: tuple[str, ...] = ()
 
 
-def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
+def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
     """The answer of a result in the language of the words."""
     model, adequate = _model(result, words, settings)
     diagnosis = result.diagnosis
     if result.status == "failed":
         verdict, tone = words("status_failed"), "bad"
-    elif leading(result.findings) is not None or not decision(result).usable:
+    elif leading(result.findings) is not None or not result.answer.usable:
         verdict, tone = words("verdict_fault"), "bad"
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
     else:
         verdict, tone = "", "good" if adequate else "warn"
-    return Answer(
+    return FirstScreen(
         sentence=_sentence(result, words),
         agreement=_agreement(result, words),
         model=model,
@@ -70,6 +72,30 @@ def answer(result: Result, words: Words, settings: ReportSettings) -> Answer:
             (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
             for way, (value, std) in _all_pre_curvatures(result).items()
         ),
+        hidden=_hidden(result, words, settings),
+    )
+
+
+MOST_HIDDEN = 3
+"""Lines on the first screen; all blind spots stand with the diagnosis."""
+
+
+def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str, ...]:
+    """Blind spots that would move f_EI, at a plausible size, farther than its band reaches; the worst first."""
+    curve, diagnosis = result.answer.curve, result.diagnosis
+    if curve is None or diagnosis is None:
+        return ()
+    band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
+    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.blind_spots]
+    worst = sorted((one for one in spots if one[0] > band), key=lambda one: -one[0])[:MOST_HIDDEN]
+    return tuple(
+        words(
+            "hidden_row",
+            name=words.cause(spot.name),
+            bias=words.number(100.0 * bias, 2),
+            settled=words.said(spot.settled_by),
+        )
+        for bias, spot in worst
     )
 
 
@@ -86,17 +112,17 @@ def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
 
 def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
     """K0 by sources that are independent of each other, then by the curve of the answer if it saw more than they."""
-    sources, curve = pre_curvatures(result), best(result)
-    if curve is not None and curve.method == "extended":
-        return {**sources, "extended": pre_curvature(result, curve)}
-    if curve is not None and curve.method == "inverse" and "photo" in sources:
-        return {**sources, "all": pre_curvature(result, curve)}
+    sources, curve = pre_curvatures(result), result.answer.curve
+    if curve is not None and (curve.method == "extended" or (curve.method == "inverse" and "photo" in sources)):
+        name = "extended" if curve.method == "extended" else "all"
+        return {**sources, name: (curve.pre_curvature, curve.pre_curvature_std)}
     return sources
 
 
 def _sentence(result: Result, words: Words) -> str:
     """f_EI at both ends of the visited range and K0."""
-    name, curve = result.specimen.id, best(result)
+    name, told = result.specimen.id, result.answer
+    curve = told.curve
     if curve is None:
         refused = _refused(result)
         if refused:
@@ -105,20 +131,22 @@ def _sentence(result: Result, words: Words) -> str:
         if result.status == "failed" and reason:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
-    told = decision(result)
-    lead = "" if told.usable else f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
+    fault = leading(result.findings)
+    lead = f"{words.said(fault.message.rstrip('.')).sentence}. " if fault is not None else ""
+    if not told.usable:
+        lead = f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
     unit = stiffness_unit(result, words)
-    change = curve.tangent[-1] - curve.tangent[0]
-    beyond = abs(change) > 2.0 * math.hypot(curve.tangent_std[0], curve.tangent_std[-1])
+    (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
+    beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
     text = words(
-        "answer_constant" if not beyond else "answer_falls" if change < 0.0 else "answer_rises",
+        "answer_constant" if not beyond else "answer_falls" if f_high < f_low else "answer_rises",
         id=name,
-        first=_together(unit.text(curve.tangent[0], curve.tangent_std[0])),
-        last=_together(unit.text(curve.tangent[-1], curve.tangent_std[-1])),
-        low=words.curvature(curve.kappa[0]),
-        high=words.curvature(curve.kappa[-1]),
+        first=_together(unit.text(f_low, std_low)),
+        last=_together(unit.text(f_high, std_high)),
+        low=words.curvature(low),
+        high=words.curvature(high),
     )
-    rest = _together(words.measured(*pre_curvature(result, curve)))
+    rest = _together(words.measured(curve.pre_curvature, curve.pre_curvature_std))
     return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
 
 
@@ -169,10 +197,11 @@ def _advice(result: Result, words: Words) -> str:
     if result.status == "failed":
         return words("next_refused" if _refused(result) else "next_failed")
     fault = leading(result.findings)
+    remedy = words.code(fault.code) if fault is not None else None
     if fault is not None:
-        return words.said(fault.message).sentence
-    if not decision(result).usable:
-        return words.said(decision(result).reason).sentence
+        return remedy[1] if remedy else words.said(fault.message).sentence
+    if not result.answer.usable:
+        return words("next_unusable")
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)

@@ -199,6 +199,7 @@ def _compact(svg: str, name: str, size: tuple[float, float], title: str, descrip
         body = body.replace(light, f"var(--{role})")
     used = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', body))
     kept = {a or b for a, b in used}
+    body = body.replace(' id="set-aside"', ' class="set-aside"')
     body = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in kept else "", body)
     body = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', body)
     body = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", body)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class TangentCurve(Protocol):
-    """A visited characteristic, as `pipeline.visited.Visited` and rows of the index have it."""
+    """A visited characteristic, as `pipeline.result.Visited` and rows of the index have it."""
 
     @property
     def kappa(self) -> Array:

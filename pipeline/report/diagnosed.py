@@ -78,7 +78,7 @@ def diagnosis_view(
         next_what=words.said(following.what).sentence if following else "",
         next_separates=_separates(following.separates, words) if following else "",
         leftover=_leftover(part, words, settings),
-        figures=_figures(part, words, settings) if figures else {},
+        figures=_figures(result, part, words, settings) if figures else {},
     )
 
 
@@ -167,13 +167,7 @@ def _is_noise(leftover: dict[str, Any], settings: ReportSettings) -> bool:
     return float(leftover.get("p_value", 0.0)) > settings.leftover_p_value
 
 
-def residual_map(values: dict[str, Any] | None) -> ResidualMap | None:
-    """Typed residual map of the diagnosis; None if there is none."""
-    known = {key: value for key, value in (values or {}).items() if key in ResidualMap.model_fields}
-    return ResidualMap.model_validate(known) if known else None
-
-
-def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
+def _figures(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
     """Ranking, cosines, maps before and after."""
     drawn: dict[str, Drawing] = {}
     if part.table:
@@ -192,8 +186,9 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
             title=words("fig_cosines"),
             description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
         )
-    before, after = residual_map(part.residuals_before), residual_map(part.residuals_after)
-    if before is not None and after is not None:
+    before, after = part.residuals_before, part.residuals_after
+    # where the extended model does not answer, the map among the mechanics is the one before
+    if before is not None and after is not None and result.answer.method == "extended":
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
     told = part.verdict != "adequate" and not _is_noise(pattern, settings)
@@ -211,16 +206,15 @@ def _figures(part: DiagnosisPart, words: Words, settings: ReportSettings) -> dic
 def _before_and_after(
     before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
 ) -> dict[str, Drawing]:
-    """What the extension did to shapes and forces; without an extension the map of the fit says it all."""
+    """What was left of shapes before the extension, and of forces before and after."""
     drawn: dict[str, Drawing] = {}
-    for key, residuals in (("before", before), ("after", after)):
-        drawn[key] = drawing(
-            f"map-{key}",
-            partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
-            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
-            title=words(f"fig_map_{key}"),
-            description=words("fig_map_alt", rms=map_rms(residuals, words)),
-        )
+    drawn["before"] = drawing(
+        "map-before",
+        partial(maps.draw_map, residuals=before, words=words, settings=settings),
+        size=(400.0, maps.map_height(before)),
+        title=words("fig_map_before"),
+        description=words("fig_map_alt", rms=map_rms(before, words)),
+    )
     if any(value is not None for value in before.force_sigma):
         drawn["force_rest"] = drawing(
             "force-rest",

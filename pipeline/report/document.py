@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pipeline.report.answer import answer
+from pipeline.report.answer import first_screen
 from pipeline.report.canvas import page_colours
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.diagnosed import diagnosis_view
@@ -19,6 +19,7 @@ from pipeline.report.evidence import (
     knot_rows,
     knot_title,
     main_figure,
+    map_note,
     mechanics_figures,
     photo_rows,
     photo_views,
@@ -30,9 +31,8 @@ from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, environment, palette_css, unbroken
 from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
-from pipeline.result import Result
+from pipeline.result import Result, curves, set_aside
 from pipeline.settings import ReportSettings
-from pipeline.visited import best
 
 __all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
 
@@ -61,8 +61,10 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
             result=result,
             words=words,
             settings=settings,
-            answer=answer(result, words, settings),
+            answer=first_screen(result, words, settings),
             main=main,
+            aside=_aside(result, words),
+            map_note=map_note(result, words),
             shown={
                 "photos": bool(result.photos) or result.status != "failed",
                 "diagnosis": diagnosis is not None and diagnosis.examined,
@@ -93,10 +95,16 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     )
 
 
+def _aside(result: Result, words: Words) -> str:
+    """Label of the switch for curves that are set aside; empty where there are none."""
+    aside = set_aside(result) & curves(result).keys()
+    return words("aside_refuted" if "extended" in aside else "aside_without") if aside else ""
+
+
 def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> dict[str, Any]:
     """Equivalent constant stiffness and smallest radius in words; empty where there is none."""
     texts: dict[str, Any] = {}
-    curve = best(result)
+    curve = result.answer.curve
     constant = equivalent(curve, settings.equivalent_range_per_m) if curve else None
     if curve is not None and constant is not None:
         unit = stiffness_unit(result, words)

@@ -14,10 +14,9 @@ from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
 from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
-from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result
+from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves, set_aside, trusted
 from pipeline.settings import ReportSettings
-from pipeline.units import Unit
-from pipeline.visited import best, curves, trusted
+from pipeline.units import Unit, suited
 
 TALL = (400.0, 350.0)
 POINTS = 5
@@ -69,7 +68,7 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
     """What the page needs to answer a pointer over the main figure: frame, values, bands, supporting photos."""
     if main is None:
         return {}
-    unit, half = figures.stiffness_unit(result, words), band_width(settings)
+    unit, half, aside = figures.stiffness_unit(result, words), band_width(settings), set_aside(result)
     ways = [
         {
             "method": method,
@@ -78,8 +77,9 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
             "value": _short(unit.factor * curve.tangent),
             "std": _short(unit.factor * curve.tangent_std),
             "factor": [_short(unit.factor * column) for column in curve.factor.T],
+            "aside": method in aside,
         }
-        for method, curve in trusted(result).items()
+        for method, curve in curves(result).items()
     ]
     ranges = {photo.step: seen_range(photo) for photo in result.photos}
     return {
@@ -138,16 +138,26 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
             title=words("fig_pointwise"),
             description=words("fig_pointwise_alt"),
         )
-    residuals = maps.measured_map(result)
+    residuals = maps.answer_map(result)
     if residuals is not None:
         drawn["map"] = drawing(
             "residual-map",
             lambda f: maps.draw_map(f, residuals, words, settings),
-            size=(400.0, 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))),
+            size=(400.0, maps.map_height(residuals)),
             title=words("fig_map"),
             description=words("fig_map_alt", rms=map_rms(residuals, words)),
         )
     return drawn
+
+
+def map_note(result: Result, words: Words) -> str:
+    """How the residual map is read, and what its unit, one standard deviation, is in length."""
+    pairs = [zip(photo.shape_residual_std_m, photo.seen, strict=False) for photo in result.photos]
+    stds = [std for photo in pairs for std, seen in photo if seen]
+    if not stds:
+        return words("fig_map_note")
+    size = suited(stds, "m", decimal=words.decimal).plain(float(np.median(stds)), 2)
+    return f"{words('fig_map_note')} {words('fig_map_scale', size=size)}"
 
 
 def map_rms(residuals: ResidualMap, words: Words) -> str:
@@ -199,7 +209,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
 def force_rows(result: Result, words: Words) -> list[list[str]]:
     """Rows of the table of forces: step, branch, displacement, measured, simulated, left over, in sigma."""
     unit, rows = figures.force_unit(result, words), []
-    for step in result.steps:
+    for step in figures.steps_of_answer(result):
         sigma = figures.force_residual(step)
         rest = None if step.force_fit_N is None else step.force_N - step.force_fit_N
         rows.append(
@@ -254,7 +264,7 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
 
     The fitted law where that is the answer; any other way is read at `POINTS` places over the visited range.
     """
-    unit, curve, exact = figures.stiffness_unit(result, words), best(result), words("exact")
+    unit, curve, exact = figures.stiffness_unit(result, words), result.answer.curve, words("exact")
     if curve is None:
         return []
     if curve.method == "inverse" and result.inverse is not None:
@@ -266,5 +276,5 @@ def knot_rows(result: Result, words: Words) -> list[list[str]]:
 
 def knot_title(result: Result, words: Words) -> str:
     """What `knot_rows` shows."""
-    curve = best(result)
+    curve = result.answer.curve
     return "" if curve is None else words("table_points", way=words(f"way_{curve.method}"))

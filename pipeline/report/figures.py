@@ -7,6 +7,7 @@ positive), displacement in mm. Bands hold the share of normal errors named in th
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,15 @@ from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_ar
 from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
-from pipeline.result import Result, StepPart
+from pipeline.result import Result, StepPart, Visited, curves, set_aside, trusted, visited
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit, suited
-from pipeline.visited import Visited, curves, trusted, visited
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.
 POINTWISE_HEADROOM = 2.0
-# A base model that lacks its cause wiggles; the answer must stay readable beside it.
-WANTING_HEADROOM = 1.8
+SET_ASIDE = "set-aside"
+"""Mark of what a reader switches on; `canvas` makes it a class of the page."""
 
 
 def stiffness_unit(result: Result, words: Words) -> Unit:
@@ -44,9 +44,15 @@ def force_unit(result: Result, words: Words) -> Unit:
 
 
 def draw_characteristic(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
-    """Draw f_EI by every way with its band; what was never visited is shaded."""
-    axes, parts, unit = plot_area(figure), trusted(result), stiffness_unit(result, words)
-    low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
+    """Draw f_EI: the answer with its band in front, others behind, those that are set aside faint and without a band.
+
+    What was never visited is shaded.
+    """
+    axes, unit, aside = plot_area(figure), stiffness_unit(result, words), set_aside(result)
+    answering = result.answer.method
+    parts = dict(sorted(curves(result).items(), key=lambda item: item[0] != answering))  # the answer leads the legend
+    counted = [curve for method, curve in parts.items() if method not in aside]
+    low, high = min(c.kappa[0] for c in counted), max(c.kappa[-1] for c in counted)
     margin = 0.14 * (high - low)
     left = min(0.0, low) if abs(low) < 0.5 * (high - low) else low - margin
     left = min(left, low - 0.04 * (high - low))
@@ -54,8 +60,13 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
     axes.axvspan(left, low, label=words("unvisited"), **shade)
     axes.axvspan(high, high + margin, **shade)
     for method, curve in parts.items():
-        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings)
-    if result.inverse and "inverse" in parts and "extended" not in parts:
+        if method in aside:
+            name, look = words(f"way_{method}"), {"color": LIGHT[method], "ls": DASHES[method], "gid": SET_ASIDE}
+            axes.plot(curve.kappa, unit.factor * curve.tangent, lw=1.2, alpha=0.45, label=name, **look)
+        else:
+            front = 1.0 if method == answering else 0.0
+            _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings, front=front)
+    if result.inverse and "inverse" in parts and "inverse" not in aside:
         knots = [k for k in result.inverse.knots if low <= k.kappa_per_m <= high]
         axes.plot(
             [k.kappa_per_m for k in knots],
@@ -67,20 +78,28 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
             mec=LIGHT["inverse"],
         )
     axes.set_xlim(left, high + margin)
-    bottom, top = _limits(parts, band_width(settings))
+    bottom, top = _limits(counted, band_width(settings))
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
-    return finish(
-        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
-    )
+    finish(axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2)
+    _mark_legend(axes)
+    return axes
 
 
-def _limits(parts: dict[str, Visited], half: float) -> tuple[float, float]:
-    """Limits of f_EI: all curves fit; once the model was extended, curves found wanting may leave the picture."""
-    tops = {m: float(np.max(c.tangent + np.minimum(half * c.tangent_std, np.abs(c.tangent)))) for m, c in parts.items()}
-    top = max(tops.values())
-    if "extended" in tops:
-        top = min(top, WANTING_HEADROOM * tops["extended"])
-    lowest = min(0.0, *(float(np.min(curve.tangent)) for curve in parts.values()))
+def _mark_legend(axes: Axes) -> None:
+    """Entries of the legend that go with curves set aside get their mark."""
+    legend = axes.get_legend()
+    aside = {line.get_label() for line in axes.get_lines() if line.get_gid() == SET_ASIDE}
+    for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True) if legend else ():
+        if text.get_text() in aside and handle is not None:
+            handle.set_gid(SET_ASIDE)
+            text.set_gid(SET_ASIDE)
+
+
+def _limits(parts: Iterable[Visited], half: float) -> tuple[float, float]:
+    """Limits of f_EI: all curves that count fit; one that is set aside may leave the picture."""
+    parts = tuple(parts)
+    top = max(float(np.max(c.tangent + np.minimum(half * c.tangent_std, np.abs(c.tangent)))) for c in parts)
+    lowest = min(0.0, *(float(np.min(curve.tangent)) for curve in parts))
     return max(1.1 * lowest, -0.25 * top), 1.08 * top
 
 
@@ -93,13 +112,15 @@ def _banded(
     unit: Unit,
     words: Words,
     settings: ReportSettings,
+    front: float = 0.0,
 ) -> None:
-    """A curve of one way with its band, in its colour and dash."""
+    """A curve of one way with its band, in its colour and dash; one with a larger ``front`` covers others."""
     half = band_width(settings) * std
     low, high = unit.factor * (value - half), unit.factor * (value + half)
-    axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0)
-    width: dict[str, Any] = {"lw": 3.0} if method == "extended" else {}
-    axes.plot(kappa, unit.factor * value, color=LIGHT[method], ls=DASHES[method], label=words(f"way_{method}"), **width)
+    axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0, zorder=1.0 + front)
+    look: dict[str, Any] = {"color": LIGHT[method], "ls": DASHES[method], "zorder": 2.0 + front}
+    look |= {"lw": 3.0} if method == "extended" else {}
+    axes.plot(kappa, unit.factor * value, label=words(f"way_{method}"), **look)
 
 
 def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
@@ -159,40 +180,53 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
         axes.fill_between(curve.kappa, low, high, color=LIGHT[colour], alpha=0.2, lw=0.0)
         label = words.branch(name)
         axes.plot(curve.kappa, unit.factor * curve.tangent, color=LIGHT[colour], ls=DASHES[colour], label=label)
-    bottom, top = _limits(parts, half)
+    bottom, top = _limits(parts.values(), half)
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
     return finish(
         axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
     )
 
 
+def steps_of_answer(result: Result) -> list[StepPart]:
+    """The steps with the force of the model that answers: the extended one, else the fitted simulation."""
+    extended = None if result.diagnosis is None else result.diagnosis.residuals_after
+    if extended is None or result.answer.method != "extended":
+        return result.steps
+    left = dict(zip(extended.steps, extended.force_N, strict=False))
+    return [
+        step if (rest := left.get(step.step)) is None else step.model_copy(update={"force_fit_N": step.force_N - rest})
+        for step in result.steps
+    ]
+
+
 def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
-    height, unit = figure.bbox.height, force_unit(result, words)
-    fitted = [step for step in result.steps if step.force_fit_N is not None]
+    height, unit, given = figure.bbox.height, force_unit(result, words), steps_of_answer(result)
+    fitted = [step for step in given if step.force_fit_N is not None]
     axes = plot_area(figure, bottom=0.38 * height) if fitted else plot_area(figure)
     for branch in MARKERS:
-        steps = [step for step in result.steps if step.branch == branch]
+        steps = [step for step in given if step.branch == branch]
         if steps:
             _branch(axes, branch, steps, unit, band_width(settings), words)
     under = Ruling(labelled=False) if fitted else Ruling(words("axis_displacement"))
     if fitted:
-        _simulated(axes, fitted, unit, words)
+        role = "extended" if result.answer.method == "extended" else "inverse"
+        _simulated(axes, fitted, unit, LIGHT[role], words)
         rest = plot_area(figure, top=0.68 * height)
         rest.sharex(axes)
-        _force_rest(rest, result, words, settings)
+        _force_rest(rest, given, words, settings)
     finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
     return axes
 
 
-def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, words: Words) -> None:
+def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, words: Words) -> None:
     """Simulated forces, loading and unloading."""
     for branch in ("loading", "unloading"):
         line = _line_of_branch(fitted, branch)
         axes.plot(
             [1e3 * step.displacement_m for step in line],
             [unit.factor * (step.force_fit_N or 0.0) for step in line],
-            color=LIGHT["inverse"],
+            color=colour,
             marker="_",
             ms=14.0,
             mew=2.0,
@@ -202,16 +236,16 @@ def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, words: Words) -> 
         )
 
 
-def _force_rest(rest: Axes, result: Result, words: Words, settings: ReportSettings) -> None:
+def _force_rest(rest: Axes, given: list[StepPart], words: Words, settings: ReportSettings) -> None:
     """Measured minus simulated force in standard deviations."""
     noise = settings.residual_noise_sigma
     for branch in MARKERS:
-        steps = [step for step in result.steps if step.branch == branch]
+        steps = [step for step in given if step.branch == branch]
         left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
         rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **_marks(branch))
     rest.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in result.steps)])
+    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in given)])
     rest.set_ylim(-limit, limit)
     sigma = Ruling(words("axis_sigma"), most=4, whole=True)
     finish(rest, x=words("axis_displacement"), y=sigma, decimal=words.decimal)

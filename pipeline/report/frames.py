@@ -10,8 +10,8 @@ import pandas as pd
 from pipeline.compare import Comparison
 from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
+from pipeline.report.exports import beam_table
 from pipeline.result import Curve, Result
-from pipeline.visited import METHODS, answer, best, pre_curvature
 
 CHARACTERISTIC = (
     "kappa_per_m",
@@ -36,9 +36,8 @@ def characteristic_frame(result: Result) -> pd.DataFrame:
         "balance": result.balance.curve if result.balance else None,
         "extended": result.diagnosis.extended if result.diagnosis else None,
     }
-    parts, chosen = [], answer(result).method
-    for method in METHODS:
-        curve = whole[method]
+    parts, chosen = [], result.answer.method
+    for method, curve in whole.items():
         if curve is not None:
             part = pd.DataFrame({name: getattr(curve, name) for name in CHARACTERISTIC})
             part.insert(0, "method", method)
@@ -77,7 +76,7 @@ def causes_frame(result: Result) -> pd.DataFrame:
 
 
 def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) -> pd.DataFrame:
-    """Constants a simulation program asks for: equivalent EI over a range of curvature, K0, smallest radius seen.
+    """Constants a simulation program asks for: equivalent EI over a range of curvature, K0, smallest radius, causes.
 
     Parameters
     ----------
@@ -88,37 +87,39 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     Returns
     -------
     pandas.DataFrame
-        Columns quantity, value, std, unit, note. The first row of a quantity is the answer of the report.
+        Columns quantity, value, std, unit, note; each quantity once. A cause that was named stands under its name.
     """
     rows: list[tuple[str, float, float | None, str, str]] = []
-    curve = best(result)
+    curve = result.answer.curve
     constant = equivalent(curve, bounds) if curve else None
     if curve is not None and constant is not None:
         note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
         note += ", std is an upper bound" if constant.bound else ""
         rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
-    answer = {curve.method: pre_curvature(result, curve)} if curve is not None else {}
-    parts = {"inverse": result.inverse, "balance": result.balance}
-    others = {
-        way: (part.pre_curvature_per_m, part.pre_curvature_std_per_m)
-        for way, part in parts.items()
-        if part is not None and part.pre_curvature_per_m is not None
-    }
-    rows += [("pre_curvature", *k0, "1/m", way) for way, k0 in (answer | others).items()]
+    if curve is not None:
+        rows.append(("pre_curvature", curve.pre_curvature, curve.pre_curvature_std, "1/m", curve.method))
     radius = smallest_radius(result)
     if radius is not None:
         rows.append(("smallest_bend_radius_seen", radius[0], radius[1], "m", f"photo of step {radius[2]}"))
+    for cause in result.diagnosis.causes if result.diagnosis else []:
+        apart = "are without it" if result.answer.method == "extended" else "contain what it does"
+        note = f"probability {cause.probability:.2g}; the numbers above {apart}"
+        rows.append((cause.name, cause.estimate, cause.std, cause.unit.replace("^", ""), note))
     return pd.DataFrame(rows, columns=["quantity", "value", "std", "unit", "note"])
 
 
-def moment_frame(result: Result) -> pd.DataFrame:
-    """Moment over curvature of the best way on the visited range: the table a nonlinear beam element asks for."""
-    curve = best(result)
+def beam_frame(result: Result) -> pd.DataFrame:
+    """Moment over the bend away from rest, from nothing on: the table a nonlinear beam element asks for.
+
+    ``measured`` is 0 for the side to which a straight cable was not bent, and which is taken to be alike.
+    """
+    curve = result.answer.curve
+    names = ("bend_per_m", "moment_Nm", "moment_std_Nm", "measured")
     if curve is None:
-        return pd.DataFrame(columns=["kappa_per_m", "moment_Nm", "moment_std_Nm"])
-    return pd.DataFrame(
-        {"kappa_per_m": curve.kappa, "moment_Nm": curve.moment, "moment_std_Nm": curve.moment_std},
-    )
+        return pd.DataFrame(columns=list(names))
+    table = beam_table(curve)
+    columns = (table.bend, table.moment, table.moment_std, table.measured.astype(int))
+    return pd.DataFrame(dict(zip(names, columns, strict=True)))
 
 
 def prediction_frame(prediction: Prediction) -> pd.DataFrame:

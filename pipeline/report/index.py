@@ -192,7 +192,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
     """Texts of a row and the numbers it is sorted by, as the script of the page has them.
 
     Name, report, type, state, verdict, four pairs of number and text, photos used and their text, troubles, the worst
-    of them and its language if it is another one, shapes.
+    of them and its language if it is another one, shapes, causes.
     """
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
     rms = None if row.rms_relative is None else 100.0 * row.rms_relative
@@ -206,7 +206,16 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
         *(part for number in numbers for part in number),
         *(row.photos_used, f"{row.photos_used} / {row.photos_given}", row.warnings + row.errors),
         *(said.sentence if said.text else "", "" if said.language == words.language else said.language, row.shapes),
+        _causes(row, words),
     ]
+
+
+def _causes(row: IndexRow, words: Words) -> str:
+    """The causes that were named, and the names that cannot be told from them; where none suffices, nothing."""
+    if row.verdict not in ("named", "class", "two_causes"):
+        return ""
+    named = f" {words('and')} ".join(words.cause(name) for name in row.causes)
+    return f" {words('or')} ".join((named, *(words.cause(name) for name in row.twins)))
 
 
 def _data(

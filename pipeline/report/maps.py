@@ -50,6 +50,17 @@ def measured_map(result: Result) -> ResidualMap | None:
     )
 
 
+def answer_map(result: Result) -> ResidualMap | None:
+    """Residual map of the model that answers: the extended one, else the fitted simulation as the photos hold it."""
+    extended = None if result.diagnosis is None else result.diagnosis.residuals_after
+    return extended if extended is not None and result.answer.method == "extended" else measured_map(result)
+
+
+def map_height(residuals: ResidualMap) -> float:
+    """Height of the figure of a map in px: rows that can be told apart."""
+    return 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))
+
+
 def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
     branches = residuals.branches or [""] * len(residuals.steps)

@@ -7,32 +7,26 @@ report.html.
 
 from __future__ import annotations
 
-import base64
 import io
 import textwrap
-from functools import cache
 from pathlib import Path
 
-import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.image import imread
 
-from pipeline.report import figures, maps, ranking
-from pipeline.report.answer import answer
+from pipeline.report import figures, maps, photos, ranking
+from pipeline.report.answer import first_screen
 from pipeline.report.canvas import LIGHT, Area, style
-from pipeline.report.diagnosed import DiagnosisView, diagnosis_view, residual_map
+from pipeline.report.diagnosed import DiagnosisView, diagnosis_view
 from pipeline.report.document import simulation_texts
 from pipeline.report.evidence import force_rows
 from pipeline.report.files import write_atomic
 from pipeline.report.page import unbroken
 from pipeline.report.provenance import fit_rows, provenance_rows, specimen_rows
-from pipeline.report.ruling import FONT
+from pipeline.report.ruling import printable
 from pipeline.report.words import Words
-from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result
+from pipeline.result import DiagnosisPart, FindingPart, PhotoPart, Result, curves
 from pipeline.settings import ReportSettings
-from pipeline.visited import curves
 
 PAGE = (595.0, 842.0)  # A4 in points
 MARGIN = 44.0
@@ -105,17 +99,6 @@ def _lines(text: str, size: float, bold: bool = False) -> list[str]:
     return textwrap.wrap(printable(unbroken(text)), int(width / (LETTER * (1.12 if bold else 1.0) * size))) or [""]
 
 
-@cache
-def _letters() -> frozenset[int]:
-    return frozenset(get_font(findfont(FontProperties(family=[FONT]))).get_charmap())
-
-
-def printable(text: str) -> str:
-    """Text with every letter the font of the figures has not replaced by a box."""
-    letters = _letters()
-    return "".join(letter if ord(letter) in letters or letter.isspace() else "□" for letter in text)
-
-
 def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
     """Content of ``report.pdf``."""
     settings = settings or ReportSettings()
@@ -149,7 +132,7 @@ def _head(result: Result) -> str:
 
 def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
     """Answer, main figure, adequacy, agreement, K0 three ways, what to do next, warnings."""
-    sheet, said = Sheet(_head(result)), answer(result, words, settings)
+    sheet, said = Sheet(_head(result)), first_screen(result, words, settings)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
         figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words, settings)
@@ -200,7 +183,7 @@ def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> 
     sheet.y += 278.0
     if any(photo.kappa_per_m for photo in result.photos):
         figures.draw_curvatures(sheet.part(230.0, right=0.5, advance=False), result, words)
-    residuals = maps.measured_map(result)
+    residuals = maps.answer_map(result)
     if residuals is not None:
         maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, settings, title=words("fig_map"))
     sheet.y += 236.0
@@ -234,9 +217,10 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
     shown = pictures[: settings.photos_in_pdf]
     for index in range(0, len(shown), 2):
         row = shown[index : index + 2]
-        height = 18.0 + max(_height(photo) for photo in row)
+        height = photos.PICTURE_HEAD + max(_height(photo) for photo in row)
         for column, photo in enumerate(row):
-            _picture(sheet.part(height, left=0.5 * column, right=0.5 * column + 0.48, advance=False), photo, words)
+            part = sheet.part(height, left=0.5 * column, right=0.5 * column + 0.48, advance=False)
+            photos.draw_photo(part, photo, words)
         sheet.y += height + 4.0
     if not pictures:
         sheet.text(words("photo_none"))
@@ -264,27 +248,6 @@ def _height(photo: PhotoPart) -> float:
     return 0.0 if preview is None else min(width * preview.height / preview.width, 0.2 * PAGE[1])
 
 
-def _picture(part: Area, photo: PhotoPart, words: Words) -> None:
-    """One photo with its centerline; hidden parts dashed."""
-    if photo.preview is None:
-        return
-    head = 14.0 / part.bbox.height
-    axes = part.add_axes((0.0, 0.0, 1.0, 1.0 - head))
-    axes.set_axis_off()
-    axes.imshow(
-        imread(io.BytesIO(base64.b64decode(photo.preview.jpeg_base64)), format="jpeg"), cmap="gray", vmin=0, vmax=255
-    )
-    axes.set_autoscale_on(False)
-    if photo.u_px:
-        u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction - 0.5
-        v = (np.asarray(photo.v_px) + 0.5) / photo.preview.reduction - 0.5
-        axes.plot(u, v, color="#2aa8dd", lw=0.8, ls=(0, (3, 2)))
-        axes.plot(np.where(photo.seen, u, np.nan), v, color="#ffb000", lw=1.0)
-    status = "" if photo.status == "traced" else f", {words(f'status_{photo.status}')}"
-    label = printable(f"{words('fig_photo', step=photo.step)}{status}")
-    part.text(0.0, 1.0 - 10.0 / part.bbox.height, label, size=8.5, color=LIGHT["ink"])
-
-
 def _diagnosis_sheet(
     result: Result, part: DiagnosisPart, view: DiagnosisView, words: Words, settings: ReportSettings
 ) -> Sheet:
@@ -297,7 +260,7 @@ def _diagnosis_sheet(
     if part.table:
         height = min(ranking.ranking_height(part), 280.0)
         ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
-    before, after = (residual_map(values) for values in (part.residuals_before, part.residuals_after))
+    before, after = part.residuals_before, part.residuals_after
     if before is not None and after is not None:
         for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
             area = sheet.part(165.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)

@@ -7,18 +7,24 @@ cable that no photo shows (under a bearing cover) are drawn dashed and shaded.
 
 from __future__ import annotations
 
+import base64
+import io
 from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.image import imread
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
 from pipeline.report.page import band_width
-from pipeline.report.ruling import Ruling
+from pipeline.report.ruling import Ruling, printable
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart
 from pipeline.settings import ReportSettings
 from pipeline.units import suited
+
+PICTURE_HEAD = 18.0
+"""Room above a photo for its name, px."""
 
 # A centerline of 200 points over a preview of 1000 px: more points than this cannot be told apart.
 LARGEST_PATH = 400
@@ -59,6 +65,25 @@ def bearing_marks(photo: PhotoPart) -> list[tuple[float, float]]:
         return []
     axes = (photo.left_px, photo.right_px)
     return [((p[0] + 0.5) / photo.preview.reduction, (p[1] + 0.5) / photo.preview.reduction) for p in axes if p]
+
+
+def draw_photo(area: Area, photo: PhotoPart, words: Words) -> Axes:
+    """Draw one photo with its centerline; hidden parts dashed. The photo has a preview."""
+    head = 14.0 / area.bbox.height
+    axes, preview = area.add_axes((0.0, 0.0, 1.0, 1.0 - head)), photo.preview
+    axes.set_axis_off()
+    if preview is not None:
+        file = io.BytesIO(base64.b64decode(preview.jpeg_base64))
+        axes.imshow(imread(file, format="jpeg"), cmap="gray", vmin=0, vmax=255)
+        axes.set_autoscale_on(False)
+        u, v = ((np.asarray(px) + 0.5) / preview.reduction - 0.5 for px in (photo.u_px, photo.v_px))
+        if u.size:
+            axes.plot(u, v, color="#2aa8dd", lw=0.8, ls=(0, (3, 2)))
+            axes.plot(np.where(photo.seen, u, np.nan), v, color="#ffb000", lw=1.0)
+    status = "" if photo.status == "traced" else f", {words(f'status_{photo.status}')}"
+    label = printable(f"{words('fig_photo', step=photo.step)}{status}")
+    area.text(0.0, 1.0 - 10.0 / area.bbox.height, label, size=8.5, color=LIGHT["ink"])
+    return axes
 
 
 def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words, settings: ReportSettings) -> Axes:

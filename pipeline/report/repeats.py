@@ -59,7 +59,7 @@ def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
         for (number, _), mean, wrong in zip(group, means, outlying(means), strict=True):
             if not wrong:
                 continue
-            from pipeline.visited import none_of_its_type  # loads what results are made of: for the few that need it
+            from pipeline.result import none_of_its_type  # loads what results are made of: for the few that need it
 
             times = mean / float(np.median(means[means != mean]))
             fault = none_of_its_type(times, others=len(group) - 1, kind=name)

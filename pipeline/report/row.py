@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pipeline.result import FindingPart, Result
+    from pipeline.result import FindingPart, Result, Visited
     from pipeline.settings.report import ReportSettings
-    from pipeline.visited import Visited
 
 Array = NDArray[np.float64]
 End = tuple[float, float, float]
 
-ROW = 1
+ROW = 2
 """Version of what stands in an entry; another one is made anew from the result."""
 
 SHAPES, SHAPE_POINTS = 5, 11
@@ -55,8 +54,8 @@ class IndexRow:
     Attributes
     ----------
     id, type, status, verdict : str
-    causes : tuple of str
-        Named ones.
+    causes, twins : tuple of str
+        Named ones, and other names that the data cannot tell from them.
     usable : bool
     fault : str
         Why it is not usable; empty if it is.
@@ -85,6 +84,7 @@ class IndexRow:
     status: str
     verdict: str
     causes: tuple[str, ...]
+    twins: tuple[str, ...]
     usable: bool
     fault: str
     method: str
@@ -118,23 +118,22 @@ VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "
 
 def index_row(result: Result, settings: ReportSettings) -> IndexRow:
     """Row of one result, without its report."""
-    from pipeline.visited import answer, best
-
-    curve, told = best(result), answer(result)
-    worst = _worst(result.findings)
-    rest = (told.pre_curvature_per_m, told.pre_curvature_std_per_m)
+    told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
+    curve, worst = told.curve, _worst(result.findings)
+    low, high = curve.ends() if curve else (None, None)
     return IndexRow(
         id=result.specimen.id,
         type=result.specimen.description.get("type", ""),
         status=result.status,
         verdict=result.diagnosis.verdict if result.diagnosis else "none",
-        causes=tuple(cause.name for cause in result.diagnosis.causes) if result.diagnosis else (),
+        causes=tuple(cause.name for cause in found),
+        twins=tuple(dict.fromkeys(name for cause in found for name in cause.class_ if name != cause.name)),
         usable=told.usable,
         fault="" if told.usable else told.reason,
         method=told.method or "",
-        low=None if curve is None else _end(curve, 0),
-        high=None if curve is None else _end(curve, -1),
-        pre_curvature=None if rest[0] is None or rest[1] is None else (rest[0], rest[1]),
+        low=low,
+        high=high,
+        pre_curvature=None if curve is None else (curve.pre_curvature, curve.pre_curvature_std),
         rms_relative=result.agreement.rms_relative if result.agreement else None,
         compatible=result.agreement.compatible if result.agreement else None,
         photos_used=sum(photo.status == "traced" for photo in result.photos),
@@ -152,10 +151,6 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
     """The first error, else the first warning."""
     levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
     return levels["error"] or levels["warning"]
-
-
-def _end(curve: Visited, at: int) -> End:
-    return float(curve.kappa[at]), float(curve.tangent[at]), float(curve.tangent_std[at])
 
 
 def _thinned(curve: Visited, points: int) -> RowCurve:
@@ -220,6 +215,7 @@ def from_entry(data: object) -> IndexRow:
             **{name: _typed(data[name], str) for name in TEXTS},
             **{name: _typed(data[name], int) for name in COUNTS},
             causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
+            twins=tuple(_typed(name, str) for name in _typed(data["twins"], list)),
             usable=_typed(data["usable"], bool),
             low=_end_of(data["low"]),
             high=_end_of(data["high"]),

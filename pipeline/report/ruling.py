@@ -175,3 +175,14 @@ def _advance(letter: str) -> float:
     font = get_font(findfont(FontProperties(family=[FONT])))
     font.set_size(size, 72.0)
     return float(font.load_char(ord(letter), flags=LoadFlags.NO_HINTING).linearHoriAdvance / 65536.0 / size)
+
+
+@cache
+def _letters() -> frozenset[int]:
+    return frozenset(get_font(findfont(FontProperties(family=[FONT]))).get_charmap())
+
+
+def printable(text: str) -> str:
+    """Text with every letter the font of the figures has not replaced by a box."""
+    letters = _letters()
+    return "".join(letter if ord(letter) in letters or letter.isspace() else "□" for letter in text)

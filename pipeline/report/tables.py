@@ -1,7 +1,7 @@
 """The tables beside the report, as any spreadsheet or program reads them: comma, decimal point, UTF-8, SI units.
 
-``characteristic.csv`` and ``centerlines.csv`` are fixed by the contract; ``moment_curve.csv`` (kappa, m) and
-``simulation.csv`` (constants with errors) are what simulation programs ask for. Text that a spreadsheet would run as
+``characteristic.csv``, ``beam_table.csv`` and ``centerlines.csv`` are fixed by the contract; ``simulation.csv`` has
+constants with errors. Text that a spreadsheet would run as
 a formula is disarmed, see `cells`.
 """
 
@@ -13,7 +13,7 @@ import pandas as pd
 
 from pipeline.report.cells import FLOATS, neutral
 from pipeline.report.files import write_atomic
-from pipeline.report.frames import centerlines_frame, characteristic_frame, moment_frame, simulation_frame
+from pipeline.report.frames import beam_frame, centerlines_frame, characteristic_frame, simulation_frame
 from pipeline.result import Result, to_json
 from pipeline.settings import ReportSettings
 
@@ -29,13 +29,13 @@ def write_tables(result: Result, folder: Path, settings: ReportSettings | None =
     Returns
     -------
     tuple of Path
-        characteristic.csv, centerlines.csv, moment_curve.csv, simulation.csv.
+        characteristic.csv, centerlines.csv, beam_table.csv, simulation.csv.
     """
     bounds = (settings or ReportSettings()).equivalent_range_per_m
     frames = {
         "characteristic.csv": characteristic_frame(result),
         "centerlines.csv": centerlines_frame(result),
-        "moment_curve.csv": moment_frame(result),
+        "beam_table.csv": beam_frame(result),
         "simulation.csv": simulation_frame(result, bounds),
     }
     return tuple(write_csv(frame, Path(folder) / name) for name, frame in frames.items())

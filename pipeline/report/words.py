@@ -19,6 +19,7 @@ from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
+CODES = TABLE.with_name("codes.toml")
 LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 
 
@@ -35,6 +36,12 @@ def _german_causes() -> dict[str, str]:
     rows = _table()["causes"].items()
     forms = {name: (name, name.replace("_", " "), spoken(name)) for name, _ in rows}  # the second: earlier results
     return {english: german for name, german in rows for english in forms[name]}
+
+
+@cache
+def documented_codes() -> dict[str, tuple[str, str, str, str]]:
+    """Meaning and remedy of every code of a message, in English and then in German; a name may end in ``*``."""
+    return {code: tuple(texts) for code, texts in tomllib.loads(CODES.read_text(encoding="utf-8")).items()}
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,14 @@ class Words:
             text, known = in_german(sentence, _german_causes())
             return Said(text.replace("+-", "±"), "de" if known else "en")
         return Said(sentence.replace("+-", "±"), "en")
+
+    def code(self, code: str) -> tuple[str, str] | None:
+        """What a message's code means and what to do about it; None for one that is not known."""
+        known = documented_codes()
+        family = next((name for name in known if name.endswith("*") and code.startswith(name[:-1])), "")
+        texts = known.get(code) or known.get(family)
+        first = 2 * LANGUAGES[self.language][0]
+        return (texts[first], texts[first + 1]) if texts else None
 
     def branch(self, name: str) -> str:
         """Branch of the test; a name the table does not have stays as it is."""

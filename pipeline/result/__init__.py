@@ -8,36 +8,41 @@ over.
 
 from __future__ import annotations
 
+from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, set_aside, trusted
+from pipeline.result.diagnosed import (
+    BlindSpot,
+    CauseForm,
+    CausePart,
+    CauseRow,
+    DiagnosisPart,
+    ForceCorrectionPart,
+    GainPart,
+    NextExperiment,
+    ResidualMap,
+)
 from pipeline.result.files import from_json, read_result, schema, to_json
 from pipeline.result.parts import (
     AgreementPart,
     AnswerPart,
     BalancePart,
-    BlindSpot,
-    CauseForm,
-    CausePart,
-    CauseRow,
     Curve,
-    DiagnosisPart,
     FindingPart,
-    ForceCorrectionPart,
-    GainPart,
     InversePart,
     KnotPart,
     MisfitPart,
-    NextExperiment,
     PhotoPart,
     PointwisePart,
     PreviewPart,
-    ResidualMap,
-    Result,
     ScalePart,
     SpecimenPart,
     StepPart,
 )
+from pipeline.result.visited import Visited, visited
+from pipeline.result.whole import Result
 
 __all__ = [
     "AgreementPart",
+    "Answer",
     "AnswerPart",
     "BalancePart",
     "BlindSpot",
@@ -61,8 +66,16 @@ __all__ = [
     "ScalePart",
     "SpecimenPart",
     "StepPart",
+    "Visited",
+    "curves",
     "from_json",
+    "leading",
+    "none_of_its_type",
     "read_result",
+    "refuted",
     "schema",
+    "set_aside",
     "to_json",
+    "trusted",
+    "visited",
 ]

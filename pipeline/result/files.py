@@ -8,10 +8,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
-from pipeline.result.parts import Result
+from pipeline.result.whole import SCHEMA, Result
 
 LARGEST_BYTES = 256_000_000
 """Of a ``result.json``: a photo takes 150 kB, and a test has tens of steps."""
+
+
+FAMILY = "cablebend/result/"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def to_json(result: Result) -> str:
@@ -20,8 +24,11 @@ def to_json(result: Result) -> str:
 
 
 def from_json(text: str) -> Result:
-    """Read ``result.json`` back; raises ``pydantic.ValidationError`` for anything that is not one."""
-    return Result.model_validate_json(text)
+    """Read ``result.json`` back; raises ``ValueError`` for anything that is none, or that names no schema."""
+    result = Result.model_validate_json(text)
+    if "schema_" not in result.model_fields_set:
+        raise ValueError("it names no schema")
+    return result
 
 
 def read_result(path: Path | str) -> Result:
@@ -30,7 +37,7 @@ def read_result(path: Path | str) -> Result:
     Raises
     ------
     InputError
-        ``result/unreadable`` if it cannot be read or is none.
+        ``result/unreadable`` if it cannot be read or is none, ``result/version`` if another version wrote it.
     """
     file = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
     try:
@@ -38,12 +45,27 @@ def read_result(path: Path | str) -> Result:
             raise ValueError(f"larger than {LARGEST_BYTES / 1e6:.0f} MB")
         return from_json(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, MemoryError) as error:
+        other = _other_version(error)
+        if other:
+            raise InputError(
+                f"is of version {other}, and this program reads {SCHEMA}",
+                path=file,
+                code="result/version",
+                remedy="read it with the version of cablebend that wrote it, or measure the specimen again",
+            ) from error
         raise InputError(
             f"is no readable result ({_told(error)})",
             path=file,
             code="result/unreadable",
             remedy="give a result.json that `cablebend run` wrote, or its folder",
         ) from error
+
+
+def _other_version(error: Exception) -> str:
+    """The schema that a result of another version names; empty if that is not what is wrong."""
+    wrong = error.errors() if isinstance(error, ValidationError) else []
+    named = next((one["input"] for one in wrong if one["loc"] == ("schema",)), None)
+    return named if isinstance(named, str) and named.startswith(FAMILY) else ""
 
 
 def _told(error: Exception) -> str:
@@ -57,5 +79,7 @@ def _told(error: Exception) -> str:
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema of ``result.json``, published as ``result.schema.json``."""
-    return Result.model_json_schema(by_alias=True)
+    """JSON schema of ``result.json``, published as ``result.schema.json``; further fields may stand beside those."""
+    document = Result.model_json_schema(by_alias=True)
+    required = ["schema", *document["required"]]  # has a default for whoever makes a result, none for who reads one
+    return {"$schema": DIALECT, "$id": f"urn:{SCHEMA.replace('/', ':')}", **document, "required": required}

@@ -1,4 +1,4 @@
-"""The parts of a result and the whole: what ``result.json`` holds, by name and unit.
+"""The parts of a result: what ``result.json`` holds, by name and unit.
 
 The parts fixed by the contract (schema, specimen, answer, photos, inverse, balance, agreement, diagnosis, findings,
 provenance) keep their names; more stands beside them.
@@ -6,73 +6,85 @@ provenance) keep their names; more stands beside them.
 
 from __future__ import annotations
 
-from html import escape
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.result.lists import Floats, Number, check_one_length
-from pipeline.rounding import rounded
 
 
 class Part(BaseModel):
     """Base of all parts: frozen; keys it does not know are passed over; NaN is null, written by whoever fills it."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="ignore",
+        allow_inf_nan=False,
+        populate_by_name=True,
+        json_schema_extra={"additionalProperties": True},
+    )
 
 
 class SpecimenPart(Part):
     """The cable and the rig, as given."""
 
-    id: str
-    length_m: Number | None = Field(None, description="None if specimen.toml could not be read")
-    diameter_m: Number | None = None
-    folder: str
-    moving_bearing: str = ""
-    description: dict[str, str] = {}
+    id: str = Field(description="name of the specimen, that of its folder unless specimen.toml says otherwise")
+    length_m: Number | None = Field(
+        None, description="of the cable between the bearing axes, m; null if specimen.toml could not be read"
+    )
+    diameter_m: Number | None = Field(None, description="outer diameter of the cable, m")
+    folder: str = Field(description="where it was measured")
+    moving_bearing: str = Field("", description="the one that is pushed: left or right")
+    description: dict[str, str] = Field({}, description="free texts of specimen.toml, such as its type")
 
 
 class PreviewPart(Part):
     """Reduced photo for the report: base64 JPEG; displayed px = preview px * reduction."""
 
-    jpeg_base64: str
-    width: int
-    height: int
-    reduction: Number
-    strip_base64: str | None = None
+    jpeg_base64: str = Field(description="the reduced photo, JPEG in base64")
+    width: int = Field(description="of the preview, px")
+    height: int = Field(description="of the preview, px")
+    reduction: Number = Field(description="displayed px of the photo in one px of the preview")
+    strip_base64: str | None = Field(None, description="the cable straightened along its centerline, JPEG in base64")
 
 
 class PhotoPart(Part):
     """One photo: traced (with its centerline) or rejected (with the reason)."""
 
-    image: str
-    step: int
-    status: Literal["traced", "rejected", "missing"]
-    reason: str | None = None
-    code: str | None = None
-    chord_m: Number | None = None
-    chord_std_m: Number | None = None
-    traced_length_m: Number | None = None
-    traced_length_std_m: Number | None = None
-    width_m: Number | None = None
-    width_std_m: Number | None = None
-    left_px: tuple[Number, Number] | None = None
-    right_px: tuple[Number, Number] | None = None
-    mirrored: bool | None = None
-    s_m: Floats = []
-    x_m: Floats = []
-    y_m: Floats = []
-    u_px: Floats = []
-    v_px: Floats = []
-    theta_rad: Floats = []
-    kappa_per_m: Floats = []
-    kappa_std_per_m: Floats = []
-    seen: list[bool] = []
-    kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m")
-    shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal, at s_m")
-    shape_residual_std_m: Floats = Field([], description="its standard deviation: photo noise, correlated")
-    quality: dict[str, Number] = {}
+    image: str = Field(description="file name within the specimen's folder")
+    step: int = Field(description="number of its step in the log")
+    status: Literal["traced", "rejected", "missing"] = Field(
+        description="traced, rejected (the reason says why) or missing (named in the log, not in the folder)"
+    )
+    reason: str | None = Field(None, description="why it was not traced")
+    code: str | None = Field(None, description="of the reason, for `cablebend explain`")
+    chord_m: Number | None = Field(None, description="distance of the bearing axes on the photo, m")
+    chord_std_m: Number | None = Field(None, description="its standard deviation, m")
+    traced_length_m: Number | None = Field(None, description="length of the centerline between the bearing axes, m")
+    traced_length_std_m: Number | None = Field(None, description="its standard deviation, m")
+    width_m: Number | None = Field(None, description="width of the cable on the photo, m")
+    width_std_m: Number | None = Field(None, description="its standard deviation, m")
+    left_px: tuple[Number, Number] | None = Field(
+        None, description="left bearing axis, px of the photo as displayed; (0, 0) is the centre of its top-left pixel"
+    )
+    right_px: tuple[Number, Number] | None = Field(None, description="right bearing axis, px as left_px")
+    mirrored: bool | None = Field(None, description="true if y points up on the photo, against its rows")
+    s_m: Floats = Field([], description="arc length from the left bearing axis, m")
+    x_m: Floats = Field([], description="along the chord from the left bearing axis, m")
+    y_m: Floats = Field([], description="across the chord toward the bow, m")
+    u_px: Floats = Field([], description="column in the photo as displayed, px")
+    v_px: Floats = Field([], description="row in the photo as displayed, px")
+    theta_rad: Floats = Field([], description="angle of the tangent from the chord toward the bow, rad")
+    kappa_per_m: Floats = Field([], description="curvature, 1/m, positive in the direction of the bow")
+    kappa_std_per_m: Floats = Field([], description="its standard deviation, 1/m")
+    seen: list[bool] = Field([], description="false where the cable was hidden and its centerline was continued")
+    kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m, 1/m")
+    shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal at s_m, m")
+    shape_residual_std_m: Floats = Field([], description="its standard deviation, m: photo noise, correlated")
+    quality: dict[str, Number] = Field(
+        {}, description="how well the photo could be used: contrast_to_noise and the like, plain numbers"
+    )
     preview: PreviewPart | None = None
 
     @model_validator(mode="after")
@@ -85,37 +97,43 @@ class PhotoPart(Part):
 class ScalePart(Part):
     """Scale of the photos and where it came from; `axis_parallax_std` as in `pipeline.records.Traces`."""
 
-    px_per_mm: Number
-    std_relative: Number
-    source: str
-    axis_parallax_std: Number = 0.0
+    px_per_mm: Number = Field(description="pixels of a photo in one millimetre, at the height of the cable's axis")
+    std_relative: Number = Field(description="its standard deviation over itself, common to all photos")
+    source: str = Field(description="where it came from, in words")
+    axis_parallax_std: Number = Field(
+        0.0, description="standard deviation of the relative distance by which bearing covers are seen too far apart"
+    )
 
 
 class StepPart(Part):
     """One displacement step: measured and simulated force."""
 
-    step: int
-    branch: str
-    displacement_m: Number
-    force_N: Number
-    force_std_N: Number
-    force_fit_N: Number | None = None
-    image: str | None = None
+    step: int = Field(description="number in the log")
+    branch: str = Field(description="mounted, loading or unloading")
+    displacement_m: Number = Field(description="of the pushed bearing toward the other, m")
+    force_N: Number = Field(description="mean of the hold, N, positive in compression")
+    force_std_N: Number = Field(description="its standard deviation, N")
+    force_fit_N: Number | None = Field(
+        None, description="of the fitted simulation, N; see residuals_after for the extended model"
+    )
+    image: str | None = Field(None, description="its photo; null without one")
 
 
 class Curve(Part):
     """A characteristic on a grid: moment and both readings with pointwise 1-sigma bands, on the visited range."""
 
-    kappa_per_m: Floats
-    moment_Nm: Floats
-    moment_std_Nm: Floats
-    tangent_Nm2: Floats
-    tangent_std_Nm2: Floats
-    secant_Nm2: Floats
-    secant_std_Nm2: Floats
-    supported: list[bool]
+    kappa_per_m: Floats = Field(description="curvature, increasing, 1/m")
+    moment_Nm: Floats = Field(description="bending moment, N m")
+    moment_std_Nm: Floats = Field(description="its standard deviation, N m")
+    tangent_Nm2: Floats = Field(description="bending stiffness f_EI = dm/dkappa, N m^2")
+    tangent_std_Nm2: Floats = Field(description="its standard deviation, N m^2")
+    secant_Nm2: Floats = Field(description="moment over the bend from rest, m / (kappa - K0), N m^2")
+    secant_std_Nm2: Floats = Field(description="its standard deviation, N m^2")
+    supported: list[bool] = Field(
+        description="whether the cable was bent to this curvature on any photo; nothing is known elsewhere"
+    )
     tangent_factor_Nm2: list[Floats] = Field(
-        [], description="F (n, r) with F F^T the covariance of tangent_Nm2 along the grid; empty if not known"
+        [], description="F (n, r) in N m^2, F F^T is the covariance of tangent_Nm2 along the grid; empty if not known"
     )
     pre_curvature_factor_per_m: Floats = Field(
         [], description="g (r,) with F g the covariance of tangent_Nm2 with the pre-curvature; empty if not known"
@@ -138,36 +156,38 @@ class Curve(Part):
 class KnotPart(Part):
     """A control point of the natural cubic spline, tangent reading."""
 
-    kappa_per_m: Number
-    tangent_Nm2: Number
-    std_Nm2: Number
+    kappa_per_m: Number = Field(description="place of the control point, 1/m")
+    tangent_Nm2: Number = Field(description="f_EI there, N m^2")
+    std_Nm2: Number = Field(description="its standard deviation, N m^2")
 
 
 class MisfitPart(Part):
     """How well the fitted simulation explains the data, in units and in sigma."""
 
-    force_rmse_N: Number
-    shape_rmse_m: Number
-    curvature_rmse_per_m: Number | None = None
-    chi2: Number
-    degrees_of_freedom: Number
+    force_rmse_N: Number = Field(description="measured minus simulated force, root mean square, N")
+    shape_rmse_m: Number = Field(description="measured minus simulated position, root mean square, m")
+    curvature_rmse_per_m: Number | None = Field(
+        None, description="measured minus simulated curvature, root mean square, 1/m"
+    )
+    chi2: Number = Field(description="sum of squares of all residuals in standard deviations")
+    degrees_of_freedom: Number = Field(description="what chi2 is expected to be")
     chi2_by_block: dict[str, tuple[Number, Number]] = Field({}, description="chi2 and number of data by block")
 
 
 class InversePart(Part):
     """Way one: simulate the experiment and fit."""
 
-    reading: Literal["tangent"] = "tangent"
-    outcome: str
-    advice: str = ""
-    converged: bool
-    iterations: int = 0
-    pre_curvature_per_m: Number | None = None
-    pre_curvature_std_per_m: Number | None = None
-    supported_per_m: tuple[Number, Number] | None = None
-    knots: list[KnotPart] = []
-    curve: Curve | None = None
-    misfit: MisfitPart | None = None
+    reading: Literal["tangent"] = Field("tangent", description="f_EI is dm/dkappa")
+    outcome: str = Field(description="how the fit ended")
+    advice: str = Field("", description="what that means and what to do")
+    converged: bool = Field(description="whether the fit is to be trusted")
+    iterations: int = Field(0, description="of the fit")
+    pre_curvature_per_m: Number | None = Field(None, description="K0, curvature at rest, 1/m")
+    pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
+    supported_per_m: tuple[Number, Number] | None = Field(None, description="curvatures visited, from and to, 1/m")
+    knots: list[KnotPart] = Field([], description="points of f_EI along the fitted law")
+    curve: Curve | None = Field(None, description="f_EI and moment on a grid")
+    misfit: MisfitPart | None = Field(None, description="how well the simulation explains the data")
     nuisance: dict[str, tuple[Number, Number]] = Field({}, description="fitted value and std, e.g. scale, length")
     branches: dict[str, Curve] = Field({}, description="loading and unloading fitted apart")
 
@@ -175,218 +195,56 @@ class InversePart(Part):
 class PointwisePart(Part):
     """The paper's (kappa, f_EI)-graph of one photo, Eq. (14) point by point."""
 
-    step: int
-    kappa_per_m: Floats
-    tangent_Nm2: Floats
+    step: int = Field(description="number in the log")
+    kappa_per_m: Floats = Field(description="curvature, 1/m")
+    tangent_Nm2: Floats = Field(description="dm/dkappa at each point, N m^2")
 
 
 class BalancePart(Part):
     """Way two: balance equations, no simulation."""
 
-    outcome: str
-    advice: str = ""
-    pre_curvature_per_m: Number | None = None
-    pre_curvature_std_per_m: Number | None = None
-    supported_per_m: tuple[Number, Number] | None = None
-    curve: Curve | None = None
-    points_kappa_per_m: Floats = []
-    points_moment_Nm: Floats = []
-    pointwise: list[PointwisePart] = []
+    outcome: str = Field(description="how it ended")
+    advice: str = Field("", description="what that means and what to do")
+    pre_curvature_per_m: Number | None = Field(None, description="K0, curvature at rest, 1/m")
+    pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
+    supported_per_m: tuple[Number, Number] | None = Field(None, description="curvatures visited, from and to, 1/m")
+    curve: Curve | None = Field(None, description="f_EI and moment on a grid")
+    points_kappa_per_m: Floats = Field([], description="curvature of points along the photos, 1/m")
+    points_moment_Nm: Floats = Field([], description="their moment by statics, force times y, N m")
+    pointwise: list[PointwisePart] = Field([], description="the paper's graph, photo by photo")
     checks: dict[str, Number] = Field({}, description="left against right half, photo against photo: z or p")
 
 
 class AgreementPart(Part):
     """Both ways compared as the same quantity on the range both visited."""
 
-    quantity: Literal["tangent"] = "tangent"
-    rms_relative: Number | None = None
-    max_relative: Number | None = None
-    compatible: bool | None = None
-    p_value: Number | None = None
-    level: Number = 0.05
-    range_per_m: tuple[Number, Number] | None = None
+    quantity: Literal["tangent"] = Field("tangent", description="what both ways are compared as")
+    rms_relative: Number | None = Field(None, description="root mean square difference of f_EI over f_EI")
+    max_relative: Number | None = Field(None, description="largest difference of f_EI over f_EI")
+    compatible: bool | None = Field(None, description="whether their bands allow the difference; null if not tested")
+    p_value: Number | None = Field(None, description="probability of a difference as large as this by chance")
+    level: Number = Field(0.05, description="p value below which they are said to disagree")
+    range_per_m: tuple[Number, Number] | None = Field(None, description="curvatures compared, from and to, 1/m")
     pre_curvature: dict[str, tuple[Number, Number]] = Field({}, description="K0 and std: photo, balance, inverse")
-    hints: list[str] = []
+    hints: list[str] = Field([], description="what the way they differ points to")
 
 
-class CauseForm(Part):
-    """One form of a cause as it stands in the extended model: what a prediction needs of it."""
-
-    label: str = Field("", description="in words, as it completes the cause's name")
-    amount: Number = Field(description="in the cause's unit")
-    std: Number
-    at: Number = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
-    width: Number = Field(
-        0.0, description="of a spot, in shares of the length; of what a steep camera foreshortens its distance, m"
-    )
-    tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
-    factor: list[Floats] = Field(
-        [],
-        description="G (1 + tuned, r): with F of the extended curve, G F^T is the covariance of amount and form with f",
-    )
-
-
-class CausePart(Part):
-    """A named cause with its class of twins, probability and estimate."""
-
-    name: str
-    class_: Annotated[list[str], Field(alias="class")] = []
-    probability: Number
-    estimate: Number
-    std: Number
-    unit: str
-    forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
-
-
-class CauseRow(Part):
-    """One row of the table of causes; see `pipeline.diagnosis`."""
-
-    name: str
-    z: Number
-    p_adjusted: Number
-    estimate: Number
-    std: Number
-    unit: str
-    minimal_detectable: Number | None = None
-    surviving_fraction: Number
-    nearest_twin: str = ""
-    twin_cosine: Number = 0.0
-    delta_chi2: Number | None = None
-    heldout_excess_removed: Number | None = None
-    stiffness_shift: Number | None = None
-
-
-class GainPart(Part):
-    """What the extension bought, on steps it had not seen."""
-
-    heldout_excess_removed: Number
-    ci95: tuple[Number, Number]
-    force_rmse_N: tuple[Number, Number]
-    shape_rmse_m: tuple[Number, Number]
-
-
-class BlindSpot(Part):
-    """A cause that cannot be seen here but would hurt."""
-
-    name: str
-    stiffness_bias_at_plausible_size: Number
-    settled_by: str
-
-
-class NextExperiment(Part):
-    """The cheapest measurement that separates what is confused."""
-
-    what: str
-    separates: list[str]
-
-
-class ResidualMap(Part):
-    """Residuals over arc length and step, in standard deviations; null where there is no photo or no force."""
-
-    s_m: Floats
-    steps: list[int]
-    branches: list[str] = []
-    shape_sigma: list[list[Number | None]]
-    force_sigma: list[Number | None] = []
-    shape_m: list[list[Number | None]] = []
-    force_N: list[Number | None] = []
-    chord_m: list[Number | None] = []
-    chord_sigma: list[Number | None] = []
-    displacement_m: list[Number | None] = []
-    chi2: dict[str, Number] = Field({}, description="by kind of data: force, chord, shape")
-    data: dict[str, int] = Field({}, description="number of data by kind")
-
-
-class ForceCorrectionPart(Part):
-    """Forces of some steps that were wrong together: shown = factor * force + offset; a finding says why."""
-
-    steps: list[int]
-    factor: Number
-    offset_N: Number
-    errors_N: list[list[Number]] = Field(
-        [], description="what the correction may be off by at each of the steps; a row is one standard deviation"
-    )
-
-
-class DiagnosisPart(Part):
-    """What the simulation gets wrong, and why."""
-
-    verdict: Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"]
-    headline: str
-    causes: list[CausePart] = []
-    table: list[CauseRow] = []
-    gain: GainPart | None = None
-    blind_spots: list[BlindSpot] = []
-    next_experiment: NextExperiment | None = None
-    extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
-    extended_refuted: bool = Field(
-        False, description="whether the data refute the extended model, so that its curve is no answer"
-    )
-    leftover: dict[str, Any] | None = None
-    residuals_before: dict[str, Any] | None = Field(None, description="a `ResidualMap`")
-    residuals_after: dict[str, Any] | None = None
-    twins: dict[str, dict[str, Number]] = Field({}, description="cosines of confusable causes")
-    left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
-    left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
-    corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")
+Method = Literal["extended", "inverse", "balance"]
 
 
 class AnswerPart(Part):
     """Which of the curves is the result, why, and whether a fault of the data makes it none of the cable's."""
 
-    method: Literal["extended", "inverse", "balance"] | None = None
-    usable: bool
-    reason: str
-    pre_curvature_per_m: Number | None = None
-    pre_curvature_std_per_m: Number | None = None
+    method: Method | None = Field(None, description="which curve: extended, inverse or balance; null without any")
+    usable: bool = Field(description="false where a fault of the data makes the numbers none of the cable's")
+    reason: str = Field(description="why it is this curve, or why not usable")
+    pre_curvature_per_m: Number | None = Field(None, description="K0 of that curve, 1/m")
+    pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
 
 
 class FindingPart(Part):
     """Something a reader must know."""
 
-    code: str
-    level: Literal["info", "warning", "error"]
-    message: str
-
-
-class Result(Part):
-    """Everything measured on one specimen."""
-
-    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema")] = "cablebend/result/1"
-    status: Literal["measured", "partial", "failed"]
-    headline: str = ""
-    specimen: SpecimenPart
-    answer: AnswerPart | None = Field(None, description="see `pipeline.visited.answer`; none in earlier results")
-    scale: ScalePart | None = None
-    photos: list[PhotoPart] = []
-    steps: list[StepPart] = []
-    inverse: InversePart | None = None
-    balance: BalancePart | None = None
-    agreement: AgreementPart | None = None
-    diagnosis: DiagnosisPart | None = None
-    findings: list[FindingPart] = []
-    provenance: dict[str, Any] = {}
-
-    def _repr_html_(self) -> str:
-        """Show the result in a notebook: what was found, each number with its standard deviation."""
-        agreement = self.agreement.pre_curvature if self.agreement else {}
-        rows = [(f"pre-curvature K0, {way}", rounded(value, std) + " 1/m") for way, (value, std) in agreement.items()]
-        for way, part in (("inverse", self.inverse), ("balance", self.balance)):
-            if part is not None and part.curve is not None and part.curve.kappa_per_m:
-                rows += [(f"f_EI, {way}, at {kappa:.3g} 1/m", text) for kappa, text in _ends(part.curve)]
-        if self.diagnosis is not None:
-            rows.append((f"diagnosis: {self.diagnosis.verdict}", self.diagnosis.headline))
-        rows += [(finding.level, finding.message) for finding in self.findings if finding.level != "info"]
-        body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-        title = f"{self.specimen.id}: {self.status}" + (f". {self.headline}" if self.headline else "")
-        return f"<table><caption>{escape(title)}</caption><tbody>{body}</tbody></table>"
-
-
-def _ends(curve: Curve) -> list[tuple[float, str]]:
-    """First and last supported point of a characteristic: curvature and tangent with its standard deviation."""
-    points = [i for i, supported in enumerate(curve.supported) if supported]
-    ends = (points[0], points[-1]) if points else ()
-    return [
-        (curve.kappa_per_m[i], rounded(1e3 * curve.tangent_Nm2[i], 1e3 * curve.tangent_std_Nm2[i]) + " mN m²")
-        for i in ends
-    ]
+    code: str = Field(description="what it is, for `cablebend explain CODE`")
+    level: Literal["info", "warning", "error"] = Field(description="error, warning or info")
+    message: str = Field(description="one sentence for people")

@@ -106,7 +106,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
 
 def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     """All photos with the diameter as stated."""
-    calibration = _given_calibration(specimen, settings)
+    calibration = given_calibration(specimen, settings)
     shots, cover_findings = find_cables(specimen, calibration, settings)
     shots, sized = _together(shots, lambda some: of_one_size(some, settings.series))
     shots, size_findings = sized or (shots, (_UNTOLD,))
@@ -190,7 +190,8 @@ def _with_pictures(shots: Sequence[Shot], lines: tuple[Line, ...]) -> tuple[Line
     return tuple(replace(line, preview=shot.preview) if line.preview is None else line for shot, line in pairs)
 
 
-def _given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
+def given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
+    """The scale that specimen.toml gives, as a number or by a board; None if it gives none."""
     camera = specimen.camera
     if camera.scale_px_per_m is not None:
         return from_number(camera.scale_px_per_m, settings.calibration)

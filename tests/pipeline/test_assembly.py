@@ -1,16 +1,13 @@
 """What the stages saw is gathered into a result: nothing that cost a photo is missing among the findings."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from pipeline.assembly import folded, headline, photo_findings, without_those_told_better
 from pipeline.records import Finding, Rejected
-from pipeline.report.answer import answer
+from pipeline.report.answer import first_screen
 from pipeline.report.words import Words
-from pipeline.result import FindingPart
+from pipeline.result import FindingPart, leading
 from pipeline.settings import ReportSettings
-from pipeline.visited import leading
 from tests.pipeline.report.virtual_result import measured_result
 
 ENDS = "the file ends before the picture does; copy it again"
@@ -46,13 +43,16 @@ UNIT = FindingPart(code="size/force", level="error", message=f"the {TOO_LARGE}")
 def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads):
     fault = FindingPart(code=code, level=level, message="the log is wrong")
     assert (leading([fault]) is not None) == leads
-    told = answer(measured.model_copy(update={"findings": [fault]}), Words("en"), ReportSettings())
-    assert (told.advice == "The log is wrong") == leads and (told.tone == "bad") == leads
+    words = Words("en")
+    told = first_screen(measured.model_copy(update={"findings": [fault]}), words, ReportSettings())
+    before_numbers = told.sentence.casefold().partition("the bending")[0]
+    assert ("the log is wrong. " in before_numbers) == leads and (told.tone == "bad") == leads
+    remedy = words.code(code)
+    assert (told.advice == (remedy[1] if remedy else "The log is wrong")) == leads
 
 
 def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
-    parts = SimpleNamespace(inverse=measured.inverse, balance=measured.balance, agreement=measured.agreement)
-    plain, led = headline(parts, None, []), headline(parts, None, [], UNIT)
+    plain, led = headline(measured), headline(measured.model_copy(update={"findings": [UNIT]}))
     assert led == f"The {TOO_LARGE}. {plain}"
     german = Words("de").said(led)
     assert german.language == "de" and german.text.endswith(Words("de").said(plain).text)

@@ -9,12 +9,11 @@ from click.testing import CliRunner
 from pipeline.cli import main
 from pipeline.compare import compare
 from pipeline.predict import predict
-from pipeline.report.answer import answer as first_screen
+from pipeline.report.answer import first_screen
 from pipeline.report.frames import characteristic_frame
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, ForceCorrectionPart, Result, SpecimenPart, from_json, to_json
 from pipeline.settings import ReportSettings
-from pipeline.visited import answer, decided
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
 
@@ -26,16 +25,16 @@ def measured():
 
 def found(result, code, level="warning"):
     finding = FindingPart(code=code, level=level, message="the forces seem to be 1000 times too large")
-    return result.model_copy(update={"findings": [finding], "answer": None})
+    return result.model_copy(update={"findings": [finding], "answer_": None})
 
 
 def test_the_answer_says_which_curve_it_is_and_why(measured):
-    told = decided(measured)
+    told = measured.answer
     assert (told.method, told.usable) == ("inverse", True)
     assert told.pre_curvature_per_m == measured.inverse.pre_curvature_per_m
     extended = measured.model_copy(update={"diagnosis": diagnosis_of("named", measured.photos)})
-    assert decided(extended).method == "extended"
-    assert decided(extended).reason != told.reason
+    assert extended.answer.method == "extended"
+    assert extended.answer.reason != told.reason
 
 
 @pytest.mark.parametrize(
@@ -54,7 +53,7 @@ def test_the_answer_says_which_curve_it_is_and_why(measured):
     ],
 )
 def test_faults_that_make_the_numbers_none_of_the_cable(measured, code, level, usable):
-    told = decided(found(measured, code, level))
+    told = found(measured, code, level).answer
     assert told.usable == usable
     assert ("1000 times" in told.reason) == (not usable)
 
@@ -62,15 +61,15 @@ def test_faults_that_make_the_numbers_none_of_the_cable(measured, code, level, u
 def test_a_sign_turned_midway_is_corrected_and_no_fault(measured):
     correction = ForceCorrectionPart(steps=[5, 6], factor=-1.0, offset_N=0.0)
     diagnosis = diagnosis_of("adequate", measured.photos).model_copy(update={"corrected_forces": [correction]})
-    assert decided(found(measured, "force/sign").model_copy(update={"diagnosis": diagnosis})).usable
+    assert found(measured, "force/sign").model_copy(update={"diagnosis": diagnosis}).answer.usable
 
 
 def test_photos_of_something_else(measured):
     longer = [p.model_copy(update={"traced_length_m": 1.2 * p.traced_length_m}) for p in measured.photos]
-    told = decided(measured.model_copy(update={"photos": longer}))
+    told = measured.model_copy(update={"photos": longer}).answer
     assert not told.usable and "another cable" in told.reason
     reversed_ = [p.model_copy(update={"chord_m": 0.18 + s.displacement_m}) for p, s in _with_steps(measured)]
-    told = decided(measured.model_copy(update={"photos": reversed_}))
+    told = measured.model_copy(update={"photos": reversed_}).answer
     assert not told.usable and "another test" in told.reason
 
 
@@ -82,21 +81,21 @@ def _with_steps(result):
 def test_a_stiffness_that_is_negative(measured):
     curve = measured.inverse.curve
     curve = curve.model_copy(update={"tangent_Nm2": [-v for v in curve.tangent_Nm2]})
-    told = decided(measured.model_copy(update={"inverse": measured.inverse.model_copy(update={"curve": curve})}))
+    told = measured.model_copy(update={"inverse": measured.inverse.model_copy(update={"curve": curve})}).answer
     assert not told.usable and "sign of the forces" in told.reason
 
 
 def test_without_a_curve_there_is_no_answer_and_its_reason_is_the_error():
     message = "force.csv: the log is empty."
     finding = FindingPart(code="log/empty", level="error", message=message)
-    told = decided(Result(status="failed", specimen=SpecimenPart(id="a", folder="a"), findings=[finding]))
+    told = Result(status="failed", specimen=SpecimenPart(id="a", folder="a"), findings=[finding]).answer
     assert (told.method, told.usable, told.reason) == (None, False, message)
 
 
 def test_what_is_stored_counts(measured):
-    stored = from_json(to_json(measured.model_copy(update={"answer": decided(found(measured, "size/force"))})))
-    assert not answer(stored).usable
-    assert answer(measured).usable
+    stored = from_json(to_json(measured.model_copy(update={"answer_": found(measured, "size/force").answer.stored()})))
+    assert not stored.answer.usable and stored.answer.curve is not None
+    assert measured.answer.usable
 
 
 @pytest.mark.parametrize(("language", "said"), [("en", "not usable"), ("de", "nicht verwendbar")])

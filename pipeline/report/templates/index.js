@@ -2,12 +2,12 @@
   const data = JSON.parse(document.getElementById("data").textContent), decimal = data.decimal, say = data.words;
   const find = (id) => document.getElementById(id), frame = find("specimens"), table = frame.querySelector("table");
   // Cells as `_cells` in pipeline/report/index.py writes them.
-  const [NAME, HREF, TYPE, STATE, VERDICT, LOW, , HIGH, , K0, , RMS, , USED, PHOTOS, TROUBLES, REASON, LANGUAGE, SHAPES] = Array(19).keys();
+  const [NAME, HREF, TYPE, STATE, VERDICT, LOW, , HIGH, , K0, , RMS, , USED, PHOTOS, TROUBLES, REASON, LANGUAGE, SHAPES, CAUSES] = Array(20).keys();
   // Words are searched, numbers are not: who types 42 wants cable-42, not every stiffness with a 42 in it.
   const rows = data.cells.map((cells, index) => ({
     cells, index, checked: false, state: data.states[cells[STATE]], verdict: data.verdicts[cells[VERDICT]], text: "",
   }));
-  for (const row of rows) row.text = [row.cells[NAME], row.cells[TYPE], row.state, row.verdict, row.cells[REASON]].join(" ").toLowerCase();
+  for (const row of rows) row.text = [row.cells[NAME], row.cells[TYPE], row.state, row.verdict, row.cells[REASON], row.cells[CAUSES]].join(" ").toLowerCase();
 
   const svg = "http://www.w3.org/2000/svg";
   const node = (parent, name, values, text) => {
@@ -29,7 +29,8 @@
     if (cells[SHAPES]) node(node(shape, "svg", { viewBox: `0 0 ${data.size[0]} ${data.size[1]}`, role: "img", "aria-label": say.shape_alt }), "path", { d: cells[SHAPES] });
     if (data.typed) node(line, "td", {}, cells[TYPE]);
     node(line, "td", {}, row.state);
-    node(line, "td", {}, row.verdict);
+    const verdict = node(line, "td", {}, row.verdict);
+    if (cells[CAUSES]) { node(verdict, "br"); node(verdict, "b", {}, cells[CAUSES]); }
     for (const column of [LOW, HIGH, K0, RMS]) node(line, "td", { class: "num" }, cells[column + 1]);
     node(line, "td", { class: "num" }, cells[PHOTOS]);
     const why = node(line, "td", { class: "why" });

@@ -55,7 +55,7 @@
     out.replaceChildren();
     const put = (text, bold) => { const node = document.createElement(bold ? "b" : "span"); node.textContent = text; out.append(node); };
     put(`\u03ba = ${shown(kappa, 3, decimal)} 1/m. `, true);
-    const ways = data.ways.filter((way) => inside(way, kappa));
+    const ways = data.ways.filter((way) => inside(way, kappa) && !(way.aside && stage.classList.contains("quiet")));
     for (const way of ways) {
       const value = between(way.kappa, way.value, kappa), std = between(way.kappa, way.std, kappa), half = data.half * std;
       const py = bottom - (value - frame.y[0]) / (frame.y[1] - frame.y[0]) * (bottom - top);
@@ -68,8 +68,12 @@
     const steps = data.photos.filter((p) => p.low <= kappa && kappa <= p.high).map((p) => p.step);
     put(steps.length ? `${data.words.photos}: ${steps.join(", ")}.` : `${data.words.no_photos}.`);
   };
+  const aside = document.getElementById("aside-toggle"), stage = document.getElementById("characteristic-stage");
+  if (aside) {
+    const quiet = () => stage.classList.toggle("quiet", !aside.checked);
+    aside.addEventListener("change", quiet); quiet();
+  }
   const clear = () => { kappa = null; mark.replaceChildren(); out.innerHTML = first; };
-  const stage = document.getElementById("characteristic-stage");
   stage.addEventListener("pointermove", (event) => {
     const box = plot.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * plot.viewBox.baseVal.width;
     if (x < left || x > right) clear(); else show(frame.x[0] + (x - left) / (right - left) * (frame.x[1] - frame.x[0]));

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.report.curves import equivalent, smallest_radius
 from pipeline.report.pooling import pool, random_effects
-from pipeline.visited import Visited, best, curves, visited
+from pipeline.result import Visited, curves, visited
 from tests.pipeline.report.virtual_result import K0, curve_of, moment_of
 
 
@@ -17,14 +17,12 @@ def straight(low, slope, std, factor=None):
     tangent = low + slope * kappa
     zeros = np.zeros(11)
     factor = np.zeros((11, 0)) if factor is None else factor
-    return Visited(
-        "inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor, np.zeros(factor.shape[1])
-    )
+    return Visited("inverse", kappa, zeros, zeros, tangent, np.full(11, std), tangent, zeros, factor, 0.0, 0.0)
 
 
 def test_equivalent_stiffness_is_the_rise_of_the_moment(full_result):
     # curve sampled at 61 points; the trapezoidal rule is off by h^2 / 12 f' / f, below 1e-4 here
-    got = equivalent(best(full_result), (3.0, 7.0))
+    got = equivalent(full_result.answer.curve, (3.0, 7.0))
     expected = (moment_of(np.array([7.0])) - moment_of(np.array([3.0])))[0] / 4.0
     assert got.stiffness == pytest.approx(expected, rel=1e-4)
     assert (got.low, got.high) == (3.0, 7.0)
@@ -63,12 +61,12 @@ def test_unsupported_points_do_not_count():
 
 
 def test_extended_model_answers_first(diagnosed, full_result):
-    assert best(diagnosed("named")).method == "extended"
-    assert best(full_result).method == "inverse"
-    assert best(full_result.model_copy(update={"inverse": None})).method == "balance"
+    assert diagnosed("named").answer.curve.method == "extended"
+    assert full_result.answer.curve.method == "inverse"
+    assert full_result.model_copy(update={"inverse": None}).answer.curve.method == "balance"
     stuck = full_result.inverse.model_copy(update={"converged": False})
-    assert best(full_result.model_copy(update={"inverse": stuck})).method == "balance"
-    assert best(full_result.model_copy(update={"inverse": None, "balance": None})) is None
+    assert full_result.model_copy(update={"inverse": stuck}).answer.curve.method == "balance"
+    assert full_result.model_copy(update={"inverse": None, "balance": None}).answer.curve is None
     assert set(curves(diagnosed("named"))) == {"inverse", "balance", "extended"}
 
 
@@ -76,8 +74,8 @@ def test_an_extended_model_that_the_data_refute_answers_last(diagnosed):
     named = diagnosed("named")
     refuted = named.diagnosis.model_copy(update={"verdict": "unexplained", "extended_refuted": True})
     unexplained = named.model_copy(update={"diagnosis": refuted})
-    assert best(unexplained).method == "inverse"
-    assert best(unexplained.model_copy(update={"inverse": None, "balance": None})).method == "extended"
+    assert unexplained.answer.curve.method == "inverse"
+    assert unexplained.model_copy(update={"inverse": None, "balance": None}).answer.curve.method == "extended"
 
 
 def test_smallest_radius_is_that_of_the_visible_cable(full_result):

@@ -153,7 +153,9 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert 'id="cosines"' in page
     assert "dead weights" in text
     found = verdict in ("named", "class", "two_causes")
-    assert ('id="map-after"' in page) == found
+    assert ('id="map-before"' in page) == found
+    assert page.count('id="residual-map"') == 1  # of the model that answers
+    assert ('id="aside-toggle"' in page) == found and page.count('class="set-aside"') == (6 if found else 0)
     assert ("removes 94 %" in text) == found
     assert ("A hump at mid-span" in text) == (verdict == "unexplained")
     assert ('id="leftover"' in page) == (verdict == "unexplained")

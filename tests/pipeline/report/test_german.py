@@ -34,7 +34,7 @@ ELSEWHERE = (
     "pipeline/intake/template.py",
     "pipeline/predict.py",
     "pipeline/report/",
-    "pipeline/result.py",
+    "pipeline/result/visited.py",
     "pipeline/rounding.py",
     "pipeline/settings/",
     "pipeline/simulate/",

@@ -15,7 +15,6 @@ from pipeline.report.row import as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
-from pipeline.visited import decided
 
 
 def named(result, name, kind="HV 35"):
@@ -57,6 +56,21 @@ def test_page_links_every_report_and_escapes_names(batch, tmp_path):
     assert "<img" not in page
     assert page.count("<script") == 2
     assert "the log is empty" in page
+
+
+@pytest.mark.parametrize(
+    ("verdict", "language", "told"),
+    [
+        ("class", "en", "hysteresis or bearing friction"),
+        ("class", "de", "Hysterese oder Lagerreibung"),
+        ("adequate", "en", ""),
+        ("unexplained", "en", ""),  # a cause that does not suffice is none
+    ],
+)
+def test_the_page_names_the_cause_and_its_class(diagnosed, tmp_path, verdict, language, told):
+    pages = write_index([diagnosed(verdict)], tmp_path, ReportSettings(language=language))
+    cell = re.search(r"<br><b>([^<]*)</b></td>", pages[0].read_text(encoding="utf-8"))
+    assert (cell[1] if cell else "") == told
 
 
 def test_folder_of_half_a_run_is_enough(batch, tmp_path):
@@ -137,15 +151,13 @@ def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_re
         assert as_entry(again) == as_entry(row)
 
 
-def test_a_row_holds_causes_and_no_pre_curvature_without_its_std(full_result, diagnosed):
+def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
     result = diagnosed("two_causes")
     row = index_row(result, ReportSettings())
     assert row.causes == tuple(cause.name for cause in result.diagnosis.causes) and len(row.causes) == 2
     assert row.pre_curvature is not None
     levels = [finding.level for finding in result.findings]
     assert (row.warnings, row.errors) == (levels.count("warning"), levels.count("error"))
-    told = decided(full_result).model_copy(update={"pre_curvature_std_per_m": None})
-    assert index_row(full_result.model_copy(update={"answer": told}), ReportSettings()).pre_curvature is None
 
 
 @pytest.mark.parametrize(

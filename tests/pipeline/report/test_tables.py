@@ -11,9 +11,9 @@ from pipeline.report.files import write_atomic
 from pipeline.report.frames import causes_frame, centerlines_frame, forces_frame, photos_frame, simulation_frame
 from pipeline.report.tables import csv_text, neutral, write_result, write_tables
 from pipeline.report.words import Words
-from pipeline.result import from_json
+from pipeline.result import from_json, visited
+from pipeline.rounding import rounded
 from pipeline.settings import ReportSettings
-from pipeline.visited import visited
 
 CHARACTERISTIC = ["method", "answer", "kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2"]
 CHARACTERISTIC += ["supported"]
@@ -28,7 +28,7 @@ def written(diagnosed, tmp_path):
 def test_columns_are_those_of_the_contract(written):
     assert list(written["characteristic.csv"])[: len(CHARACTERISTIC)] == CHARACTERISTIC
     assert list(written["centerlines.csv"])[: len(CENTERLINES)] == CENTERLINES
-    assert list(written["moment_curve.csv"]) == ["kappa_per_m", "moment_Nm", "moment_std_Nm"]
+    assert list(written["beam_table.csv"]) == ["bend_per_m", "moment_Nm", "moment_std_Nm", "measured"]
     assert list(written["simulation.csv"]) == ["quantity", "value", "std", "unit", "note"]
 
 
@@ -42,9 +42,8 @@ def test_numbers_survive(written, diagnosed):
     lines = written["centerlines.csv"]
     photo = result.photos[1]
     assert lines[lines.image == photo.image].u_px.to_numpy() == pytest.approx(photo.u_px, rel=1e-8)
-    assert written["moment_curve.csv"].moment_Nm.to_numpy() == pytest.approx(
-        result.diagnosis.extended.moment_Nm, rel=1e-8
-    )
+    beam = written["beam_table.csv"]
+    assert beam.moment_Nm.to_numpy()[-5:] == pytest.approx(result.diagnosis.extended.moment_Nm[-5:], rel=1e-8)
 
 
 def test_simulation_table_follows_the_range_asked_for(full_result, tmp_path):
@@ -57,9 +56,9 @@ def test_simulation_table_follows_the_range_asked_for(full_result, tmp_path):
 def test_extended_model_answers_in_every_table(diagnosed, written):
     result = diagnosed("named")
     extended = visited("extended", result.diagnosis.extended)
-    first = written["simulation.csv"].set_index("quantity").loc["pre_curvature"].iloc[0]
+    first = written["simulation.csv"].set_index("quantity").loc["pre_curvature"]
     assert first.note == "extended"
-    assert first.value == pytest.approx(extended.rest()[0], rel=1e-8)
+    assert first.value == pytest.approx(extended.pre_curvature, rel=1e-8)
     words, unit = Words("en"), stiffness_unit(result, Words("en"))
     assert "extended" in knot_title(result, words)
     rows = knot_rows(result, words)
@@ -107,8 +106,10 @@ def test_result_comes_back_as_it_was(full_result, tmp_path):
 
 def test_result_shows_itself_in_a_notebook(diagnosed, partial_result):
     html = diagnosed("named")._repr_html_()
-    assert "pre-curvature K0, inverse</th><td>2.004 ± 0.013 1/m" in html
-    assert "f_EI, inverse, at 2 1/m</th><td>20.00 ± 0.13 mN m²" in html
+    answer = diagnosed("named").answer
+    assert f"K0</th><td>{rounded(answer.pre_curvature_per_m, answer.pre_curvature_std_per_m)} 1/m" in html
+    assert "extended: the model with the causes that were found" in html
+    assert all(f"<th>{name}</th><td>{text}</td>" in html for name, text in answer.curve.told())
     assert "diagnosis: named" in html
     assert "<img" not in partial_result._repr_html_()
 

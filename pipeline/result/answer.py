@@ -1,112 +1,100 @@
-"""The visited part of the characteristics of a result, which of them is the answer, and whether it may be used.
+"""The answer of a result, decided here alone: which curve it is, why, and whether it may be used.
 
 A fault of the data (a unit or sign of the force, photos of something else) makes numbers that fit and are none of the
-cable's. They are told, but in no mean and no comparison: `answer` decides that, here alone.
-
-Only the visited range is ever used: below the pre-curvature and above the largest curvature no cable was looked at.
-All that reads a characteristic out of a result (report, prediction, comparison) reads it here. SI units, as in
-`pipeline.result.Curve`.
+cable's. They are told, but in no mean and no comparison. SI units, as in `pipeline.result.parts.Curve`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.result import AnswerPart, Curve, DiagnosisPart, FindingPart, Result
+from pipeline.result.diagnosed import DiagnosisPart
+from pipeline.result.parts import AnswerPart, BalancePart, FindingPart, InversePart, Method
+from pipeline.result.visited import Visited, html_table, visited
 from pipeline.rounding import plain
 
-Array = NDArray[np.float64]
-METHODS = ("inverse", "balance", "extended")
+if TYPE_CHECKING:
+    from pipeline.result.whole import Result
 
 
-@dataclass(frozen=True)
-class Visited:
-    """The visited part of a characteristic.
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The answer of a result: everything that reads one number or curve out of a result reads it here.
 
     Attributes
     ----------
-    method : str
-        ``inverse``, ``balance`` or ``extended``.
-    kappa : (n,) 1/m
-        Increasing.
-    moment, moment_std : (n,) N m
-    tangent, tangent_std, secant, secant_std : (n,) N m^2
-    factor : (n, r) N m^2
-        Factor F with F F^T the covariance of the tangent; r = 0 where it is not known.
-    rest_factor : (r,) 1/m
-        With F rest_factor the covariance of the tangent with the pre-curvature; zeros where it is not known.
+    usable : bool
+        False where a fault of the data makes the numbers none of the cable's.
+    reason : str
+        Why it is this curve, or why it is not usable.
+    curve : Visited or None
+        f_EI with its band and K0, over the curvatures that were visited; None if no way gave any.
     """
 
-    method: str
-    kappa: Array
-    moment: Array
-    moment_std: Array
-    tangent: Array
-    tangent_std: Array
-    secant: Array
-    secant_std: Array
-    factor: Array
-    rest_factor: Array
+    usable: bool
+    reason: str
+    curve: Visited | None
 
-    def rest(self) -> tuple[float, float]:
-        """Curvature of zero moment and its standard deviation, which is that of the moment there over f; 1/m."""
-        nearest = int(np.argmin(np.abs(self.moment)))
-        f = self.tangent[nearest]
-        return float(self.kappa[nearest] - self.moment[nearest] / f), float(self.moment_std[nearest] / abs(f))
+    @property
+    def method(self) -> Method | None:
+        """Which curve it is: ``extended``, ``inverse`` or ``balance``."""
+        return None if self.curve is None else self.curve.method
 
-    def at(self, kappa: float) -> tuple[float, float]:
-        """Tangent and its standard deviation at a curvature, in N m^2, interpolated linearly."""
-        return (
-            float(np.interp(kappa, self.kappa, self.tangent)),
-            float(np.interp(kappa, self.kappa, self.tangent_std)),
-        )
+    @property
+    def pre_curvature_per_m(self) -> float | None:
+        """K0, 1/m."""
+        return None if self.curve is None else self.curve.pre_curvature
 
+    @property
+    def pre_curvature_std_per_m(self) -> float | None:
+        """Standard deviation of K0, 1/m."""
+        return None if self.curve is None else self.curve.pre_curvature_std
 
-def visited(method: str, curve: Curve | None) -> Visited | None:
-    """The visited part of a curve; None if there is none of at least two points."""
-    if curve is None:
-        return None
-    keep = np.flatnonzero(curve.supported)
-    if keep.size < 2:
-        return None
+    def stored(self) -> AnswerPart:
+        """What ``result.json`` keeps of it; the curve stands there under its method."""
+        names = ("method", "usable", "reason", "pre_curvature_per_m", "pre_curvature_std_per_m")
+        return AnswerPart(**{name: getattr(self, name) for name in names})
 
-    def kept(values: list[float] | list[list[float]]) -> Array:
-        return np.asarray(values, dtype=np.float64)[keep]
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        return html_table("answer", self.told())
 
-    factor = kept(curve.tangent_factor_Nm2) if curve.tangent_factor_Nm2 else np.zeros((keep.size, 0))
-    rest = np.asarray(curve.pre_curvature_factor_per_m, dtype=np.float64)
-    return Visited(
-        method=method,
-        kappa=kept(curve.kappa_per_m),
-        moment=kept(curve.moment_Nm),
-        moment_std=kept(curve.moment_std_Nm),
-        tangent=kept(curve.tangent_Nm2),
-        tangent_std=kept(curve.tangent_std_Nm2),
-        secant=kept(curve.secant_Nm2),
-        secant_std=kept(curve.secant_std_Nm2),
-        factor=factor,
-        rest_factor=rest if rest.size == factor.shape[1] else np.zeros(factor.shape[1]),
-    )
+    def told(self) -> tuple[tuple[str, str], ...]:
+        """The answer in words, by name."""
+        which = "unusable" if not self.usable else self.method or "none"
+        return (("answer", f"{which}: {self.reason}"), *(() if self.curve is None else self.curve.told()))
 
 
 def curves(result: Result) -> dict[str, Visited]:
     """Visited parts of all characteristics of a result, by method."""
-    whole = {
-        "inverse": result.inverse.curve if result.inverse else None,
-        "balance": result.balance.curve if result.balance else None,
-        "extended": result.diagnosis.extended if result.diagnosis else None,
-    }
-    parts = {method: visited(method, whole[method]) for method in METHODS}
-    return {method: part for method, part in parts.items() if part is not None}
+    inverse, balance, diagnosis = result.inverse, result.balance, result.diagnosis
+    parts = (
+        None if inverse is None else visited("inverse", inverse.curve, _rest(inverse)),
+        None if balance is None else visited("balance", balance.curve, _rest(balance)),
+        None if diagnosis is None else visited("extended", diagnosis.extended),
+    )
+    return {part.method: part for part in parts if part is not None}
+
+
+def _rest(part: InversePart | BalancePart) -> tuple[float | None, float | None]:
+    return part.pre_curvature_per_m, part.pre_curvature_std_per_m
 
 
 def refuted(diagnosis: DiagnosisPart | None) -> bool:
     """Whether the data refute the extended model: its curve is no answer."""
     return diagnosis is not None and diagnosis.extended_refuted
+
+
+def set_aside(result: Result) -> frozenset[str]:
+    """Methods whose curve is not f_EI: those without the cause that was found, or an extended one that is refuted."""
+    answering = result.answer.method
+    if answering == "extended":
+        return frozenset({"inverse", "balance"})
+    return frozenset({"extended"}) if refuted(result.diagnosis) and answering is not None else frozenset()
 
 
 def trusted(result: Result) -> dict[str, Visited]:
@@ -116,23 +104,12 @@ def trusted(result: Result) -> dict[str, Visited]:
     return kept if kept and refuted(result.diagnosis) else parts
 
 
-def best(result: Result) -> Visited | None:
-    """The characteristic the report answers with: extended, else inverse if its fit converged, else balance."""
+def _best(result: Result) -> Visited | None:
+    """The characteristic that answers: extended unless refuted, else inverse if its fit converged, else balance."""
     parts = trusted(result)
     fitted = result.inverse is not None and result.inverse.converged
     order = ("extended", "inverse", "balance") if fitted else ("extended", "balance", "inverse")
     return next((parts[method] for method in order if method in parts), None)
-
-
-def pre_curvature(result: Result, curve: Visited) -> tuple[float, float]:
-    """Pre-curvature of the way a curve comes from and its standard deviation, 1/m.
-
-    An extended model tells it with its curve alone.
-    """
-    part = {"inverse": result.inverse, "balance": result.balance}.get(curve.method)
-    if part is None or part.pre_curvature_per_m is None or part.pre_curvature_std_per_m is None:
-        return curve.rest()
-    return part.pre_curvature_per_m, part.pre_curvature_std_per_m
 
 
 def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
@@ -158,25 +135,18 @@ TOGETHER = 0.5
 """Correlation of chords and displacements that noise about no motion at all hardly reaches; it is -1 in a test."""
 
 
-def answer(result: Result) -> AnswerPart:
-    """The answer of a result as stored, or `decided` now: which curve it is, and whether it may be used."""
-    return result.answer or decided(result)
-
-
-def decided(result: Result) -> AnswerPart:
-    """Which curve is the result, why, and whether a fault of the data makes it none of the cable's."""
-    curve, fault = best(result), data_fault(result)
+def answer_of(result: Result) -> Answer:
+    """The answer of a result: as stored; of a result that stores none, or about to be stored, decided now."""
+    stored = result.answer_
+    if stored is not None:
+        curve = None if stored.method is None else curves(result).get(stored.method)
+        return Answer(stored.usable, stored.reason, curve)
+    curve = _best(result)
+    fault = data_fault(result, curve)
     if curve is None:
         first = next((f.message for f in result.findings if f.level == "error"), "no characteristic was measured")
-        return AnswerPart(usable=False, reason=fault or first)
-    rest, std = pre_curvature(result, curve)
-    return AnswerPart(
-        method=curve.method,
-        usable=not fault,
-        reason=fault or _why(result, curve.method),
-        pre_curvature_per_m=rest,
-        pre_curvature_std_per_m=std,
-    )
+        return Answer(False, fault or first, None)
+    return Answer(not fault, fault or _why(result, curve.method), curve)
 
 
 def _why(result: Result, method: str) -> str:
@@ -190,7 +160,7 @@ def _why(result: Result, method: str) -> str:
     return "the simulation could not be fitted" if method == "balance" else "no other way gave a characteristic"
 
 
-def data_fault(result: Result) -> str:
+def data_fault(result: Result, curve: Visited | None) -> str:
     """What makes the numbers of a result none of the cable's, in a sentence; empty if nothing does.
 
     Faults that were left out or corrected (a photo of another step, a dead load cell, a sign turned midway) do not.
@@ -199,7 +169,7 @@ def data_fault(result: Result) -> str:
     turned = diagnosis is not None and any(part.factor < 0.0 for part in diagnosis.corrected_forces)
     wrong = WRONG_SCALE if turned else WRONG_SCALE | {"force/sign"}
     told = next((finding.message for finding in result.findings if finding.code in wrong), "")
-    return told or _other_length(result) or _moving_apart(result) or _negative(best(result))
+    return told or _other_length(result) or _moving_apart(result) or _negative(curve)
 
 
 def _other_length(result: Result) -> str:

@@ -1,0 +1,98 @@
+"""The figures of a report for a notebook: a result goes in, a matplotlib figure comes out.
+
+Axes, units and colours are those of the report. A figure shows itself as the last line of a notebook's cell and is
+saved by its ``savefig``; nothing goes through pyplot.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report import figures, maps, photos
+from pipeline.report.canvas import Area, style
+from pipeline.report.words import Words
+from pipeline.result import Result, curves
+from pipeline.settings import ReportSettings
+
+DOTS_PER_INCH = 144
+"""Twice the 72 at which all figures are laid out: sharp on a screen of today."""
+
+
+def plot_characteristic(result: Result, *, settings: ReportSettings | None = None) -> Figure:
+    """Draw f_EI over the curvature by every way, with bands; raises ``ValueError`` where nothing was measured.
+
+    Parameters
+    ----------
+    result : Result
+    settings : ReportSettings, optional
+        Language and width of the bands.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    settings, words = _how(settings)
+    if not curves(result):
+        raise ValueError(f"{result.specimen.id} has no characteristic to plot")
+    return _figure(lambda area: figures.draw_characteristic(area, result, words, settings), (420.0, 310.0))
+
+
+def plot_forces(result: Result, *, settings: ReportSettings | None = None) -> Figure:
+    """Draw measured and simulated forces over the displacement; parameters as `plot_characteristic`."""
+    settings, words = _how(settings)
+    if not result.steps:
+        raise ValueError(f"{result.specimen.id} has no forces to plot")
+    return _figure(lambda area: figures.draw_forces(area, result, words, settings), (400.0, 350.0))
+
+
+def plot_residuals(result: Result, *, settings: ReportSettings | None = None) -> Figure:
+    """Draw what the model of the answer leaves of the shapes, in standard deviations, over arc length and step."""
+    settings, words = _how(settings)
+    residuals = maps.answer_map(result)
+    if residuals is None:
+        raise ValueError(f"{result.specimen.id} has no residuals to plot")
+    size = (400.0, maps.map_height(residuals))
+    return _figure(lambda area: maps.draw_map(area, residuals, words, settings), size)
+
+
+def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = None) -> Figure:
+    """Draw the photo of a step with the centerline found on it; dashed where no photo shows the cable.
+
+    Raises
+    ------
+    ValueError
+        Where the result holds no picture of that step.
+    """
+    _, words = _how(settings)
+    photo = next((one for one in result.photos if one.step == step and one.preview is not None), None)
+    if photo is None or photo.preview is None:
+        steps = ", ".join(str(one.step) for one in result.photos if one.preview is not None) or "none"
+        raise ValueError(f"no picture of step {step}; steps with one: {steps}")
+    width = 500.0
+    height = photos.PICTURE_HEAD + width * photo.preview.height / photo.preview.width
+    return _figure(lambda area: photos.draw_photo(area, photo, words), (width, height))
+
+
+def _how(settings: ReportSettings | None) -> tuple[ReportSettings, Words]:
+    chosen = settings or ReportSettings()
+    return chosen, Words(chosen.language)
+
+
+def _figure(draw: Callable[[Area], Axes], size: tuple[float, float]) -> Figure:
+    """A figure of so many px at 72 dots per inch that shows itself in a notebook."""
+    with style():
+        figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72, facecolor="white")
+        draw(figure)
+    figure.set_dpi(DOTS_PER_INCH)
+    figure._repr_png_ = lambda: _png(figure)  # type: ignore[attr-defined]  # what notebooks ask an object for
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    file = io.BytesIO()
+    figure.savefig(file, format="png")
+    return file.getvalue()

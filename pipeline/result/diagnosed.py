@@ -1,0 +1,163 @@
+"""The diagnosis as ``result.json`` holds it: causes, what they explain, what is left."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from pipeline.result.lists import Floats, Number
+from pipeline.result.parts import Curve, Part
+
+
+class CauseForm(Part):
+    """One form of a cause as it stands in the extended model: what a prediction needs of it."""
+
+    label: str = Field("", description="in words, as it completes the cause's name")
+    amount: Number = Field(description="in the cause's unit")
+    std: Number = Field(description="of the amount, in the cause's unit")
+    at: Number = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
+    width: Number = Field(
+        0.0, description="of a spot, in shares of the length; of what a steep camera foreshortens its distance, m"
+    )
+    tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
+    factor: list[Floats] = Field(
+        [],
+        description="G (1 + tuned, r): with F of the extended curve, G F^T is the covariance of amount and form with f",
+    )
+
+
+class CausePart(Part):
+    """A named cause with its class of twins, probability and estimate."""
+
+    name: str = Field(description="of the cause, as `cablebend explain` knows it")
+    class_: Annotated[list[str], Field(alias="class")] = Field(
+        [], description="names that these data cannot tell from it, itself included"
+    )
+    probability: Number = Field(description="of the cause, given the data")
+    estimate: Number = Field(description="its amount, in its unit")
+    std: Number = Field(description="of the amount, in its unit")
+    unit: str = Field(description="of the amount; - is a plain number")
+    forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
+
+
+class CauseRow(Part):
+    """One row of the table of causes; see `pipeline.diagnosis`."""
+
+    name: str = Field(description="of the cause")
+    z: Number = Field(description="score: amount over its standard deviation")
+    p_adjusted: Number = Field(description="probability of such a score by chance among all causes tried")
+    estimate: Number = Field(description="amount that fits best, in its unit")
+    std: Number = Field(description="of the amount, in its unit")
+    unit: str = Field(description="of the amount; - is a plain number")
+    minimal_detectable: Number | None = Field(
+        None, description="smallest amount that these data would show, in its unit; null if never"
+    )
+    surviving_fraction: Number = Field(description="share of its trace that f_EI, K0, scale and length cannot take up")
+    nearest_twin: str = Field("", description="cause with the most similar trace")
+    twin_cosine: Number = Field(0.0, description="cosine between both traces; 1: never told apart by such a test")
+    delta_chi2: Number | None = Field(None, description="chi2 less with this cause; null if it was not fitted")
+    heldout_excess_removed: Number | None = Field(
+        None, description="share of the misfit of held-out steps that it removes"
+    )
+    stiffness_shift: Number | None = Field(
+        None, description="relative change of f_EI with this cause, root mean square"
+    )
+
+
+class GainPart(Part):
+    """What the extension bought, on steps it had not seen."""
+
+    heldout_excess_removed: Number = Field(
+        description="share of the misfit beyond noise that the extension removes, on steps it had not seen"
+    )
+    ci95: tuple[Number, Number] = Field(description="95 % interval of that share")
+    force_rmse_N: tuple[Number, Number] = Field(description="before and after, N")
+    shape_rmse_m: tuple[Number, Number] = Field(description="before and after, m")
+
+
+class BlindSpot(Part):
+    """A cause that cannot be seen here but would hurt."""
+
+    name: str = Field(description="of the cause")
+    stiffness_bias_at_plausible_size: Number = Field(
+        description="relative error of f_EI if it acts at a plausible size"
+    )
+    settled_by: str = Field(description="measurement that would show it")
+
+
+class NextExperiment(Part):
+    """The cheapest measurement that separates what is confused."""
+
+    what: str = Field(description="to do, in words")
+    separates: list[str] = Field(description="causes that it tells apart")
+
+
+class ResidualMap(Part):
+    """Residuals over arc length and step, in standard deviations; null where there is no photo or no force."""
+
+    s_m: Floats = Field(description="arc length, m")
+    steps: list[int] = Field(description="numbers in the log")
+    branches: list[str] = Field([], description="of the steps")
+    shape_sigma: list[list[Number | None]] = Field(
+        description="measured minus simulated position along the normal over its standard deviation, by step and place"
+    )
+    force_sigma: list[Number | None] = Field(
+        [], description="measured minus simulated force over its standard deviation, by step"
+    )
+    shape_m: list[list[Number | None]] = Field([], description="measured minus simulated position along the normal, m")
+    force_N: list[Number | None] = Field([], description="measured minus simulated force, N")
+    chord_m: list[Number | None] = Field([], description="measured minus simulated chord, m")
+    chord_sigma: list[Number | None] = Field([], description="the same over its standard deviation")
+    displacement_m: list[Number | None] = Field([], description="of the steps, m")
+    chi2: dict[str, Number] = Field({}, description="by kind of data: force, chord, shape")
+    data: dict[str, int] = Field({}, description="number of data by kind")
+
+
+# a simulation that found no equilibrium leaves an empty one
+MapOrNone = Annotated[ResidualMap | None, BeforeValidator(lambda given: given or None)]
+
+
+class ForceCorrectionPart(Part):
+    """Forces of some steps that were wrong together: shown = factor * force + offset; a finding says why."""
+
+    steps: list[int] = Field(description="numbers in the log")
+    factor: Number = Field(description="a plain number")
+    offset_N: Number = Field(description="N")
+    errors_N: list[list[Number]] = Field(
+        [], description="what the correction may be off by at each of the steps, N; a row is one std"
+    )
+
+
+class DiagnosisPart(Part):
+    """What the simulation gets wrong, and why."""
+
+    verdict: Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"] = Field(
+        description=(
+            "adequate: nothing beyond noise; named: one cause; class: one cause of several names; "
+            "two_causes; unexplained: no known cause suffices; underpowered: the data cannot tell"
+        )
+    )
+    headline: str = Field(description="one sentence in plain words")
+    causes: list[CausePart] = Field([], description="those that were named")
+    table: list[CauseRow] = Field([], description="every cause tried, with what the data say of it")
+    gain: GainPart | None = Field(None, description="what the extension bought")
+    blind_spots: list[BlindSpot] = Field([], description="causes that would hurt and cannot be seen here")
+    next_experiment: NextExperiment | None = Field(None, description="the cheapest measurement that tells more")
+    extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
+    extended_refuted: bool = Field(
+        False, description="whether the data refute the extended model, so that its curve is no answer"
+    )
+    leftover: dict[str, Any] | None = Field(
+        None,
+        description=(
+            "what no cause explains: message, p_value, share by kind of data, step, place (m), "
+            "pattern shape_m (m) over s_m (m)"
+        ),
+    )
+    residuals_before: MapOrNone = Field(None, description="of the fitted simulation")
+    residuals_after: MapOrNone = Field(None, description="of the model extended by the causes")
+    twins: dict[str, dict[str, Number]] = Field({}, description="cosines of confusable causes")
+    left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
+    left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
+    corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")

@@ -1,0 +1,68 @@
+"""The first screen: the answer in front, what could hide, what bands leave out; figures by the model that answers."""
+
+import pytest
+
+from pipeline.report.answer import first_screen
+from pipeline.report.document import report_html
+from pipeline.report.evidence import main_figure, pointer_data
+from pipeline.report.figures import steps_of_answer
+from pipeline.report.page import band_width
+from pipeline.report.words import Words
+from pipeline.result import BlindSpot, set_aside
+from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_result import measured_result
+
+SETTINGS, WORDS = ReportSettings(), Words("en")
+
+
+def with_spots(result, *spots):
+    blind = [
+        BlindSpot(name=name, stiffness_bias_at_plausible_size=bias, settled_by="unloading") for name, bias in spots
+    ]
+    return result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"blind_spots": blind})})
+
+
+def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
+    result = diagnosed("adequate")
+    curve = result.answer.curve
+    band = band_width(SETTINGS) * float((curve.tangent_std / curve.tangent).mean())
+    told = first_screen(
+        with_spots(result, ("force_gain", 0.5 * band), ("plastic_set", 2.0 * band), ("hysteresis", -0.27)),
+        WORDS,
+        SETTINGS,
+    ).hidden
+    assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
+    assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading."
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_bands_say_what_they_do_not_contain(diagnosed, language):
+    settings, words = ReportSettings(language=language), Words(language)
+    assert words("band_unexplained") in report_html(diagnosed("unexplained"), settings)
+    assert words("band_unexplained") not in report_html(diagnosed("named"), settings)
+
+
+def test_curves_without_the_cause_are_set_aside(diagnosed, full_result):
+    named = diagnosed("named")
+    assert set_aside(named) == {"inverse", "balance"}
+    refuted = named.model_copy(update={"diagnosis": named.diagnosis.model_copy(update={"extended_refuted": True})})
+    assert set_aside(refuted) == {"extended"}
+    assert set_aside(full_result) == set()
+
+
+def test_the_pointer_knows_which_curves_are_set_aside(diagnosed):
+    result = diagnosed("named")
+    ways = pointer_data(result, main_figure(result, WORDS, SETTINGS), WORDS, SETTINGS)["ways"]
+    assert {way["method"]: way["aside"] for way in ways} == {"inverse": True, "balance": True, "extended": False}
+
+
+def test_forces_are_those_of_the_model_that_answers(diagnosed):
+    result = diagnosed("named")
+    residuals = result.diagnosis.residuals_after
+    left = [0.001 * (place + 1) for place in range(len(residuals.steps))]
+    after = residuals.model_copy(update={"force_N": left})
+    result = result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"residuals_after": after})})
+    shown = {step.step: step for step in steps_of_answer(result)}
+    for number, rest in zip(after.steps, left, strict=True):
+        assert shown[number].force_N - shown[number].force_fit_N == pytest.approx(rest, rel=1e-9)
+    assert steps_of_answer(measured_result()) == measured_result().steps

@@ -1,0 +1,111 @@
+"""`cablebend check` looks at the photos: each fault of a picture is told with its code, and nothing is measured."""
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pipeline.cli import main
+from pipeline.intake.folder import read_specimen
+from pipeline.settings import Settings
+from pipeline.vision.look import look_at_photos
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRST, OTHER = "step_00.jpg", "step_01.jpg"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return Path(shutil.copytree(ROOT / "fixtures/specimens/three", tmp_path / "a"))
+
+
+def picture(path):
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+def truncated(path, _):
+    path.write_bytes(path.read_bytes()[:-20_000])
+
+
+def black(path, _):
+    cv2.imwrite(str(path), np.zeros_like(picture(path)))
+
+
+def blurred(path, _):
+    cv2.imwrite(str(path), cv2.GaussianBlur(picture(path), (0, 0), 40.0))
+
+
+def smaller(path, _):
+    pixels = picture(path)
+    cv2.imwrite(str(path), cv2.resize(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2)))
+
+
+def doubled(path, other):
+    shutil.copy(other, path)
+
+
+def checked(folder):
+    done = CliRunner().invoke(main, ["check", "--json", str(folder), "--set", "batch.in_process=true"])
+    return done.exit_code, json.loads(done.stdout)["specimens"][0]
+
+
+def test_good_photos_are_no_news(folder):
+    code, row = checked(folder)
+    assert (code, row["status"], row["runs"]) == (0, "ok", True)
+    assert not (folder / "result.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "codes"),
+    [
+        (truncated, {"photo/truncated"}),
+        (black, {"photo/blank"}),
+        (blurred, {"photo/blur", "photo/contrast"}),  # a cable smeared over forty pixels may hardly stand out
+        (smaller, {"photo/size"}),
+        (doubled, {"photo/doubled"}),
+    ],
+)
+def test_a_spoilt_photo_is_told(folder, spoil, codes):
+    spoil(folder / "images" / OTHER, folder / "images" / FIRST)
+    code, row = checked(folder)
+    told = {finding["code"]: finding for finding in row["findings"] if finding["level"] != "info"}
+    assert (code, row["status"], row["runs"]) == (0, "warning", True)
+    assert told.keys() & codes and OTHER in " ".join(finding["message"] for finding in told.values())
+
+
+def test_no_photo_that_can_be_used_is_an_error(folder):
+    for path in (folder / "images").iterdir():
+        black(path, None)
+    code, row = checked(folder)
+    assert (code, row["status"], row["runs"]) == (1, "error", True)
+    assert {f["code"] for f in row["findings"] if f["level"] == "error"} == {"photo/blank"}
+
+
+def test_one_photo_that_a_run_would_refuse_is_a_warning(folder):
+    black(folder / "images" / OTHER, None)
+    specimen = read_specimen(folder, Settings().intake)
+    (told,) = look_at_photos(specimen, Settings().vision)
+    assert (told.code, told.level) == ("photo/blank", "warning")
+
+
+def test_all_values_that_are_missing_or_wrong_are_named_at_once(folder):
+    file = folder / "specimen.toml"
+    lines = [line for line in file.read_text().splitlines() if not line.startswith(("length_mm", "diameter_mm"))]
+    file.write_text("\n".join(lines))
+    message = checked(folder)[1]["findings"][0]["message"]
+    assert "length_mm and diameter_mm are missing" in message and "add length_mm" in message
+    at = lines.index("[specimen]") + 1
+    file.write_text("\n".join([*lines[:at], "length_mm = 0.0", "diameter_mm = 0.0", *lines[at:]]))
+    message = checked(folder)[1]["findings"][0]["message"]
+    assert "length_mm = 0.0 and diameter_mm = 0.0 cannot be used" in message
+
+
+def test_a_spreadsheet_in_place_of_the_log_is_named(folder):
+    (folder / "force.csv").unlink()
+    (folder / "Messung 3.xlsx").write_bytes(b"PK\x03\x04")
+    message = checked(folder)[1]["findings"][0]["message"]
+    assert "has no force log but the spreadsheet Messung 3.xlsx; open it and save the table of forces" in message

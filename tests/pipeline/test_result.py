@@ -1,0 +1,76 @@
+"""result.json and its schema: every field says what it is, further ones are passed over, versions are named."""
+
+import json
+import re
+
+import jsonschema
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.result import from_json, read_result, schema, to_json
+from tests.pipeline.report.virtual_diagnosis import diagnosis_of
+from tests.pipeline.report.virtual_result import measured_result
+
+# end of a name -> unit in its description
+UNITS = {"_per_m": "1/m", "_Nm2": "N m^2", "_Nm": "N m", "_N": "N", "_m": "m", "_px": "px", "_rad": "rad", "_mm": "mil"}
+
+
+@pytest.fixture(scope="module")
+def document():
+    result = measured_result()
+    named = diagnosis_of("named", result.photos)
+    return json.loads(to_json(result.model_copy(update={"diagnosis": named, "answer_": result.answer.stored()})))
+
+
+def objects():
+    whole = schema()
+    return {"Result": whole, **whole["$defs"]}
+
+
+def test_a_result_keeps_the_schema_and_so_does_one_with_more(document):
+    validator = jsonschema.Draft202012Validator
+    validator.check_schema(schema())
+    validator(schema()).validate(document)
+    more = {**document, "tomorrow": 1, "specimen": {**document["specimen"], "tomorrow": [1]}}
+    validator(schema()).validate(more)
+    assert all(part["additionalProperties"] is True for part in objects().values())
+
+
+def test_the_schema_names_itself_and_is_asked_for(document):
+    assert schema()["$id"] == "urn:cablebend:result:1"
+    assert schema()["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    nameless = {name: value for name, value in document.items() if name != "schema"}
+    with pytest.raises(jsonschema.ValidationError, match="'schema' is a required property"):
+        jsonschema.validate(nameless, schema())
+    with pytest.raises(ValueError, match="names no schema"):
+        from_json(json.dumps(nameless))
+
+
+def test_every_property_says_what_it_is_and_its_unit():
+    told = [(part, name, text) for part, one in objects().items() for name, text in one["properties"].items()]
+    parts = [f"{part}.{name}" for part, name, text in told if not (text.get("description") or _refers(text))]
+    assert parts == []
+    ends = [(part, name, next((end for end in UNITS if name.endswith(end)), None), text) for part, name, text in told]
+    assert [
+        f"{part}.{name}"
+        for part, name, end, text in ends
+        if end and not re.search(rf"(^|\W){re.escape(UNITS[end])}", text.get("description", ""))
+    ] == []
+
+
+def _refers(text):
+    """Whether a property is a part of its own, which is described there."""
+    return "$ref" in text or any("$ref" in one for one in text.get("anyOf", ()))
+
+
+@pytest.mark.parametrize("version", ["cablebend/result/0", "cablebend/result/9"])
+def test_a_result_of_another_version_is_refused_by_name(document, version, tmp_path):
+    (tmp_path / "result.json").write_text(json.dumps({**document, "schema": version}))
+    with pytest.raises(InputError, match=f"is of version {version}, and this program reads cablebend/result/1") as told:
+        read_result(tmp_path)
+    assert told.value.code == "result/version"
+
+
+def test_a_result_from_before_there_were_answers_has_one(document):
+    earlier = from_json(json.dumps({name: value for name, value in document.items() if name != "answer"}))
+    assert earlier.answer.method == "extended" and earlier.answer.usable
