@@ -99,7 +99,8 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
             break
         noise = max(1.0, noise / LOWERED)
     if found.settled:
-        found = _settle(found.model, found.evaluation.unknowns, found.evaluation, FINELY, evaluations, smooth=True)
+        # once more along the law found: where the abscissa was laid before depends on the way here
+        found = _quieter(found, found.model.blur, FINELY, evaluations, smooth=True)
         used += found.evaluations
     return replace(found, evaluations=used)
 
@@ -113,12 +114,12 @@ def _needed(loud: Fit, quiet: Fit) -> tuple[float, float]:
     return needed[0], needed[1]
 
 
-def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations: int) -> Fit:
+def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations: int, *, smooth: bool = False) -> Fit:
     """From a fit on with another noise, the abscissa of the law laid along the law found."""
     model, u = found.model, found.evaluation.unknowns
     if found.posterior is not None:
         model, u = model.on(refreshed(model.law(u), *found.moments()), u)
-    return _settle(replace(model, blur=noise), u, found.evaluation, within, evaluations, smooth=False)
+    return _settle(replace(model, blur=noise), u, found.evaluation, within, evaluations, smooth=smooth)
 
 
 def _settle(model: FitModel, start: Array, near: Evaluation, within: float, evaluations: int, *, smooth: bool) -> Fit:
