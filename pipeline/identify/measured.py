@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.records import Centerline, LoadStep, Specimen, Traces
+from pipeline.records import Array, Centerline, LoadStep, Specimen, Traces
 from pipeline.settings.identify import IdentifySettings
 from rod.measurement import MeasuredStep, MeasuredTest
+
+HOLD_SAMPLES = 1000
+"""Of a hold, at most: what forces do during one, relax or drift, a thousand means show as well as a million samples,
+each of which would be a row of the diagnosis."""
 
 
 def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings) -> MeasuredTest:
@@ -69,12 +73,20 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         chord_std=None if line is None else line.chord_std_m,
         shape=None if line is None else line.shape,
         time=_time(step),
-        hold_times=step.times_s if step.times_s.size else None,
-        hold_forces=step.forces_N if step.forces_N.size else None,
+        hold_times=_thinned(step.times_s),
+        hold_forces=_thinned(step.forces_N),
         picture_centre=None if line is None else picture_centre(line, px_per_m),
         displacement_std=step.displacement_std_m,
         picture=None if line is None else picture,
     )
+
+
+def _thinned(samples: Array) -> Array | None:
+    """Samples of a hold, or means of neighbours where there are more than `HOLD_SAMPLES`; None without any."""
+    if samples.size > HOLD_SAMPLES:
+        first = np.unique(np.linspace(0, samples.size, HOLD_SAMPLES, endpoint=False).astype(int))
+        samples = np.add.reduceat(samples, first) / np.diff(np.append(first, samples.size))
+    return samples if samples.size else None
 
 
 def _time(step: LoadStep) -> float | None:

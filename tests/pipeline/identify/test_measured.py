@@ -95,6 +95,21 @@ def test_a_rejected_photo_leaves_the_force(specimen, traces):
     assert test.steps[2].force == specimen.steps[2].force_N
 
 
+def test_a_hold_of_200_000_samples_becomes_a_thousand_means(specimen, traces):
+    times = np.linspace(0.0, 200.0, 200_001)
+    forces = 0.5 + np.exp(-times / 20.0) + np.random.default_rng(1).normal(0.0, 1e-2, times.size)
+    long = replace(specimen.steps[1], times_s=times, forces_N=forces)
+    test = measured_test(replace(specimen, steps=(specimen.steps[0], long)), traces, IdentifySettings())
+    step = test.steps[1]
+    assert step.hold_times.size == step.hold_forces.size == 1000
+    assert step.hold_forces.mean() == pytest.approx(forces.mean(), abs=1e-5)
+    # means of 200 scatter by a fourteenth of a sample, about the same course
+    off = step.hold_forces - 0.5 - np.exp(-step.hold_times / 20.0)
+    assert np.std(off) == pytest.approx(1e-2 / np.sqrt(200), rel=0.1)
+    few = measured_test(specimen, traces, IdentifySettings()).steps[1]
+    assert np.array_equal(few.hold_forces, specimen.steps[1].forces_N)
+
+
 def test_forces_without_scatter_keep_a_finite_weight(specimen, traces):
     settings = IdentifySettings()
     quiet = tuple(
