@@ -29,9 +29,9 @@ ROD = [
 ]
 INSIDE = {
     "rod.inverse": [
-        ("whitening", "knots", "options"),
-        ("photo_residual", "law_prior"),
-        ("fit_model", "smoothness"),
+        ("whitening", "options"),
+        ("photo_residual",),
+        ("fit_model",),
         ("evaluation",),
         ("fit", "estimate"),
         ("problem",),
@@ -59,7 +59,9 @@ INSIDE = {
         ("leftover",),
     ],
     "pipeline.diagnosis.fits": [
-        ("base",),
+        ("knots",),
+        ("base", "spline_prior"),
+        ("spline_average",),
         ("extension",),
         ("bending", "step"),
         ("sensitivities",),

@@ -8,9 +8,9 @@ photos alike, the scale of the photos and the length of the cable. Every candida
 Parameters, in this order: logarithms of the ordinates over a reference stiffness (so the stiffness is positive), K0
 (1/m), errors of the axes along and across the chord (m; only if the measurement states any), errors of the displacement
 of single steps (m; only where the log scatters, or has none), relative error of the stated px/mm, relative error of the
-stated length. A weak prior keeps the law smooth, ``int (d^2 log f / dt^2)^2 dt /
-tau^2`` with t from 0 to 1 over the control points (see `rod.inverse.knots`): without a photo of the force-free cable,
-K0 and the stiffness near K0 are else free to run away together.
+stated length. A weak prior keeps the law smooth, ``int (d^2 log f / dt^2)^2 dt / tau^2`` with t from 0 to 1 over the
+control points (see `pipeline.diagnosis.fits.knots`): without a photo of the force-free cable, K0 and the stiffness near
+K0 are else free to run away together.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.camera import axes_off, scaled
+from pipeline.diagnosis.fits.knots import first_slope, place_knots, roughness
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
-from rod.inverse.knots import first_slope, place_knots, roughness
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

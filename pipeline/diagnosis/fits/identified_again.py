@@ -3,8 +3,8 @@
 The diagnosis looks for causes with a coarse law under one prior, since a law of many control points would eat them.
 What is named is in the model and can be eaten no more, so its law may be as fine as that of the identification: many
 control points, smooth along the curvature or along the moment, how smooth and how steep at rest averaged over by their
-evidence (`rod.inverse.law_prior`, `rod.inverse.smoothness`). Amounts and forms of the causes, the bearing axes, scale
-and length are unknowns beside the law, and their errors are in its band.
+evidence (`pipeline.diagnosis.fits.spline_prior`, `pipeline.diagnosis.fits.spline_average`). Amounts and forms of the
+causes, the bearing axes, scale and length are unknowns beside the law, and their errors are in its band.
 
 Where even the extended model leaves more than noise, rows of that kind (forces, chords and shapes) count so much less:
 the misfit then is an error of the model, and neither the law nor its band may take it for knowledge.
@@ -24,11 +24,11 @@ from pipeline.diagnosis.fits.extended import law_of
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.spline_average import Averaged, average
+from pipeline.diagnosis.fits.spline_prior import FIRST_SIZES, places_of
 from pipeline.diagnosis.fits.workbench import with_knots
 from pipeline.diagnosis.observations.observation import Observation, of_hold
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.law_prior import FIRST_SIZES, places_of
-from rod.inverse.smoothness import Averaged, average
 
 Array = NDArray[np.float64]
 
@@ -196,7 +196,7 @@ def _other_forms(observation: Observation, fitted: Fit, settings: DiagnosisSetti
 
 
 def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = None) -> Averaged:
-    """Posterior over all priors of the law's form, from the linearisation of a fit; see `rod.inverse.smoothness`.
+    """Posterior over all priors of the law's form, from the linearisation of a fit; see `spline_average`.
 
     ``beside`` (N, j) are traces of further unknowns, each of standard deviation one and mean zero.
     """

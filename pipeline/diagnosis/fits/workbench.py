@@ -19,13 +19,13 @@ from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit, fit, fit_from
+from pipeline.diagnosis.fits.knots import place_knots
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
 from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.knots import place_knots
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

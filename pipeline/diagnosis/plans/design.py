@@ -18,6 +18,7 @@ from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import fit
+from pipeline.diagnosis.fits.knots import place_knots
 from pipeline.diagnosis.fits.search import detectable_amount, suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe
@@ -30,7 +31,6 @@ from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.characteristic import MomentCurve
-from rod.inverse.knots import place_knots
 from rod.laws import StickSlip
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """Control points of the characteristic on the visited range: their places, and the natural spline through them.
 
 Quadratic forms of the spline through values z at k places are taken with ``t`` from 0 to 1 over these places, whatever
-their unit: what the smoothness prior (`rod.inverse.law_prior`) is made of.
+their unit: what the smoothness prior (`pipeline.diagnosis.fits.spline_prior`) is made of.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ Along what a law is smooth depends on the law. One that softens as layers slip d
 curvature but over a large part of the bending moment, and is smooth along the moment; one that stiffens is smooth along
 the curvature; a few that change most just beside rest along the root of the curvature beyond it. So ``t`` from 0 to 1
 runs with one of them (`places_of`), and which, tau and slope follow from the data: they are averaged over in
-`rod.inverse.smoothness`. Without the root, K0 of laws that are steepest at rest came out three standard deviations off
-where no force-free photo shows it.
+`pipeline.diagnosis.fits.spline_average`. Without the root, K0 of laws that are steepest at rest came out three standard
+deviations off where no force-free photo shows it.
 
 Units: knots in 1/m; z, t and the sizes are pure numbers.
 """
@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.fits.knots import first_slope, roughness
 from rod.characteristic import Characteristic
-from rod.inverse.knots import first_slope, roughness
 
 Array = NDArray[np.float64]
 

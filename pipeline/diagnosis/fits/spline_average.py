@@ -1,8 +1,8 @@
 """Linearised posterior of a fit with a spline of log f, averaged over the priors of the law's form.
 
 Near the optimum the whitened data are linear in the unknowns, so mean, covariance and evidence for every prior of the
-law's form (`rod.inverse.law_prior`: along what and how smooth, how steep at rest) follow from one normal matrix. What
-the data leave open about the prior widens the bands.
+law's form (`pipeline.diagnosis.fits.spline_prior`: along what and how smooth, how steep at rest) follow from one normal
+matrix. What the data leave open about the prior widens the bands.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.inverse.knots import first_slope, roughness
-from rod.inverse.law_prior import Along, LawPrior, log_volume
+from pipeline.diagnosis.fits.knots import first_slope, roughness
+from pipeline.diagnosis.fits.spline_prior import Along, LawPrior, log_volume
 
 Array = NDArray[np.float64]
 
