@@ -45,6 +45,7 @@ from pipeline.identify.parts import curve as curve_of
 from pipeline.records import Finding
 from pipeline.result import Curve, DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
 
 
@@ -73,6 +74,8 @@ def diagnose(
         return _nothing_to_compare("all forces in the log are zero"), ()
     if _stands_still(test, settings):
         return _nothing_to_compare("the log gives one displacement for all steps"), ()
+    if identification is not None and identification.inverse.outcome is InverseOutcome.OPPOSITE_FORCES:
+        return _nothing_to_compare("photos and forces contradict each other"), ()
     faults = faults_of_input(test, settings)
     if not faults.loaded_forces():
         return _nothing_to_compare("no force under load can be used"), faults.findings

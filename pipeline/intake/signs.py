@@ -54,7 +54,7 @@ def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[F
 def force_sign(
     forces: Array, displacements: Array, spec: LogSpec, *, name: str, settings: IntakeSettings
 ) -> tuple[float, list[Finding]]:
-    """Factor 1 or -1 that makes compression positive: as the user says, else as a bent cable pushes.
+    """Factor 1 or -1 that makes compression positive: as the user says, unless a bent cable would pull by it.
 
     Parameters
     ----------
@@ -68,21 +68,24 @@ def force_sign(
     loud = bent & (np.abs(forces) > settings.zero_force_relative * np.max(np.abs(forces)))
     if not np.any(loud):
         return said, []
-    negative = forces[loud] < 0.0
+    pulling = said * forces[loud] < 0.0
+    if np.mean(pulling) < settings.sign_share:
+        return said, []
     median = f"median {quantity(float(np.median(forces[loud])), 'N')}"
-    if spec.force_sign is None and np.mean(negative) >= settings.sign_share:
+    right = "tension" if said > 0.0 else "compression"
+    if spec.force_sign is None:
         message = (
-            f"{name}: {np.count_nonzero(negative)} of {negative.size} bent steps have a negative force ({median}); the "
+            f"{name}: {np.count_nonzero(pulling)} of {pulling.size} bent steps have a negative force ({median}); the "
             "sign was reversed, because a cable that is pushed together pushes back: confirm with "
-            'force_sign = "tension" in [rig], or keep the sign with "compression"'
+            f'force_sign = "{right}" in [rig]'
         )
-        return -1.0, [doubtful("log/force-sign", message)]
-    if np.mean(said * forces[loud] < 0.0) >= settings.sign_share:
+    else:
         message = (
-            f'{name}: the forces of the bent steps ({median}) contradict force_sign = "{spec.force_sign}" in [rig]'
+            f'{name}: by force_sign = "{spec.force_sign}" in [rig] the bent steps would pull (logged {median}); the '
+            "sign was reversed, because a cable that is pushed together pushes back: set "
+            f'force_sign = "{right}"'
         )
-        return said, [doubtful("log/force-sign", message)]
-    return said, []
+    return -said, [doubtful("log/force-sign", message)]
 
 
 def inferred_branches(

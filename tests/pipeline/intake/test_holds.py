@@ -108,10 +108,13 @@ def test_sign_of_the_force_as_the_user_says(read):
 
 
 @pytest.mark.parametrize(("sign", "said"), [(-1.0, "compression"), (1.0, "tension")])
-def test_contradicted_sign_is_kept_and_told(sign, said, read):
+def test_a_sign_by_which_a_pushed_cable_would_pull_is_reversed_and_told(sign, said, read):
     log = read(log_text(UP, sign=sign), force_sign=said)
-    assert log.steps[-1].force_N == pytest.approx(-2.75)
-    assert codes(log).count("log/force-sign") == 1
+    assert log.steps[-1].force_N == pytest.approx(2.75)
+    (finding,) = (f for f in log.findings if f.code == "log/force-sign")
+    other = {"tension": "compression", "compression": "tension"}[said]
+    assert f'by force_sign = "{said}" in [rig] the bent steps would pull' in finding.message
+    assert finding.message.endswith(f'set force_sign = "{other}"')
 
 
 def test_displacement_that_counts_downward(read):
