@@ -136,7 +136,7 @@ class Curve(Part):
         [], description="F (n, r) in N m^2, F F^T is the covariance of tangent_Nm2 along the grid; empty if not known"
     )
     pre_curvature_factor_per_m: Floats = Field(
-        [], description="g (r,) with F g the covariance of tangent_Nm2 with the pre-curvature; empty if not known"
+        [], description="g (r,) in 1/m, F g is the covariance of tangent_Nm2 with the pre-curvature; empty if not known"
     )
 
     @model_validator(mode="after")
