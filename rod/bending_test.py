@@ -182,8 +182,8 @@ def bend(
         raise ValueError("tip is the force on a free end: give it with right=FREE, and only there")
     if tip is not None:
         return solve(test.rod, Hold(tip=tip), start=start, branch=branch)
-    name, value = controls[0]
-    return simulate(test, **{name: [value]}, branch=branch, starts=None if start is None else [start])[0]
+    control: dict[str, Any] = {name: [value] for name, value in controls}
+    return simulate(test, **control, branch=branch, starts=None if start is None else [start])[0]
 
 
 def simulate(
@@ -194,6 +194,7 @@ def simulate(
     forces: ArrayLike | None = None,
     branch: Branch = "natural",
     starts: Sequence[Equilibrium | Start | None] | None = None,
+    patient: bool = True,
 ) -> tuple[Equilibrium, ...]:
     """Equilibria of all steps, in order; friction and set remember the steps before.
 
@@ -206,6 +207,8 @@ def simulate(
         Side of the bow, see `rod.equilibrium`.
     starts : (steps,) of Equilibrium, Start or None
         Warm starts, for example the equilibria of a nearby test. By default each step starts from the one before.
+    patient : bool
+        See `rod.equilibrium.solve`.
 
     Returns
     -------
@@ -228,7 +231,9 @@ def simulate(
     memory, last, steps = test.rod.virgin, None, []
     for index, value in enumerate(values):
         start = last if starts is None else starts[index]
-        here = solve(test.rod, test.hold(control, float(value)), memory=memory, start=start, branch=branch)
+        here = solve(
+            test.rod, test.hold(control, float(value)), memory=memory, start=start, branch=branch, patient=patient
+        )
         memory, last = here.after, here if here.good else None
         steps.append(here)
     return tuple(steps)

@@ -108,7 +108,9 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
     equilibria: tuple[Equilibrium, ...] = ()
     if bent:
         test = model.bending_test(u)
-        equilibria = simulate(test, chords=[imposed[k][0] for k in bent], branch="up", starts=starts or None)
+        equilibria = simulate(
+            test, chords=[imposed[k][0] for k in bent], branch="up", starts=starts or None, patient=not starts
+        )
         failure = next((e.outcome for e in equilibria if not e.good), None)
         if failure is not None:
             return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=failure)

@@ -91,7 +91,7 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         quiet = _quieter(found, (noise, noise), FINELY if noise == 1.0 else ROUGHLY, evaluations - used)
         used += quiet.evaluations
         if loud is not None and max(quiet.misfit) > FOLLOWS:
-            found = _quieter(loud, _needed(loud, quiet), FINELY, evaluations)
+            found = _quieter(loud, _needed(loud, quiet), ROUGHLY, evaluations)
             used += found.evaluations
             break
         found = loud = quiet
@@ -100,7 +100,8 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         noise = max(1.0, noise / LOWERED)
     if found.settled:
         # once more along the law found: where the abscissa was laid before depends on the way here
-        found = _quieter(found, found.model.blur, FINELY, evaluations, smooth=True)
+        within = FINELY if max(found.model.blur) == 1.0 else ROUGHLY
+        found = _quieter(found, found.model.blur, within, evaluations, smooth=True)
         used += found.evaluations
     return replace(found, evaluations=used)
 
@@ -128,13 +129,17 @@ def _settle(model: FitModel, start: Array, near: Evaluation, within: float, eval
     here, count = evaluate(model, start, starts=near.equilibria), 1
     if here.failure is not None:
         return Fit(model, here, None, count, False)
+    share, before = 1.0, np.zeros(len(model.basis.at_ends))
     while True:
         posterior = averaged(here.value, here.jacobian, here.unknowns, forms)
         move = posterior.mean - here.unknowns
         settled = bool(np.all(np.abs(move) <= within * np.sqrt(np.diag(posterior.covariance)) + 1e-12))
         if settled or count >= evaluations:
             return Fit(model, here, posterior, count, settled)
-        move = move * min(1.0, _reach(model, here, move))
+        # a step back on the one before overshot the same valley: half as far, until steps agree again
+        law = model.basis.at_ends @ move[: model.basis.size]
+        share = 0.5 * share if law @ before < 0.0 else min(1.0, 2.0 * share)
+        before, move = law, share * move * min(1.0, _reach(model, here, move))
         for _ in range(SHORTER):
             there = evaluate(model, here.unknowns + move, starts=here.equilibria)
             count += 1
