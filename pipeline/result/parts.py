@@ -154,9 +154,9 @@ class Curve(Part):
 
 
 class KnotPart(Part):
-    """A control point of the natural cubic spline, tangent reading."""
+    """A point of the fitted law, tangent reading."""
 
-    kappa_per_m: Number = Field(description="place of the control point, 1/m")
+    kappa_per_m: Number = Field(description="curvature, 1/m")
     tangent_Nm2: Number = Field(description="f_EI there, N m^2")
     std_Nm2: Number = Field(description="its standard deviation, N m^2")
 
