@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -107,7 +108,7 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
         If it is none of these, a table whose bends do not increase, or a moment that does not vanish at rest.
     """
     if hasattr(given, "bound"):
-        return given  # type: ignore[return-value]  # a Protocol cannot be asked for at run time without its cost
+        return cast(MomentCurve, given)  # a Protocol cannot be asked for at run time without its cost
     if not callable(given):
         values = np.asarray(given, float)
         if values.ndim == 0:
