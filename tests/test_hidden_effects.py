@@ -12,7 +12,7 @@ from fixtures.continuum import Cable
 from fixtures.effects import HIDE, LARGEST, PLAIN, PROTOCOLS, SPOT, Form, profile
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.make import hidden_specimen
-from fixtures.scores import FAR, answers, expected_scores, outlook
+from fixtures.scores import FAR, answers, expected, outlook
 from fixtures.study_table import correct
 from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
@@ -48,6 +48,15 @@ USUAL = {"pre_curvature_varying": PLAIN, "stiffness_varying": SPOT, "hysteresis"
 """The form people would meet; else the clearest one."""
 
 
+DRAWS = 3
+"""Of noise for every cause: each is weighed with all error models, a quarter of a second."""
+
+
+def by_chance(rate, draws):
+    """What a rate shows less by chance, once in a hundred times."""
+    return 2.33 * np.sqrt(rate * (1.0 - rate) / draws)
+
+
 def bench_of(test):
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots)
     assert not isinstance(bench, str), bench
@@ -80,7 +89,7 @@ def test_plausible_size_is_named_and_f_comes_back(name):
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize(("times", "target"), [(2.0, 0.95), (4.0, 0.99)])
 def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol, times, target):
-    """Every cause, hidden by collocation; rates over noise drawn on the scores, since one draw in twenty may miss."""
+    """Every cause, hidden by collocation; rates over noise drawn on the residual, since one draw in twenty may miss."""
     rng = np.random.default_rng(11)
     shares, beyond = {}, set()
     for name in VISIBLE:
@@ -88,13 +97,10 @@ def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol
         if not seen.possible(seen.amount(name, times)):
             beyond.add((protocol, name))
         elif (protocol, name) not in FAR:
-            scores = expected_scores(protocol, name, seen.amount(name, times))
-            shares[name] = float(answers(protocol, name, scores, draws=40, rng=rng).right.mean())
+            found = answers(protocol, expected(protocol, name, seen.amount(name, times)), draws=DRAWS, rng=rng)
+            shares[name] = np.mean([one.found and name in one.names for one in found])
     assert beyond <= BEYOND
-    # of the 560 to 680 draws a rate of 95 % (99 %) itself would show 0.9 % (0.4 %) less by chance
-    assert np.mean(list(shares.values())) > target - 0.01, shares
-    # 32 of 40: a rate of 95 % shows less than that once in ten thousand causes
-    assert min(shares.values()) >= 0.8, shares
+    assert np.mean(list(shares.values())) > target - by_chance(target, DRAWS * len(shares)), shares
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
@@ -108,18 +114,18 @@ def test_true_cause_is_in_the_set_at_a_plausible_size(protocol):
         if seen.plausible < 1.2 * seen.detectable:
             unseen.add(name)
         elif not far:
-            scores = expected_scores(protocol, name, seen.plausible, form)
-            shares[name] = float(answers(protocol, name, scores, draws=40, rng=rng).right.mean())
+            found = answers(protocol, expected(protocol, name, seen.plausible, form), draws=DRAWS, rng=rng)
+            shares[name] = np.mean([one.found and name in one.names for one in found])
     assert unseen == UNSEEN[protocol]
-    assert np.mean(list(shares.values())) > 0.94 and min(shares.values()) >= 0.8, shares
+    assert np.mean(list(shares.values())) > 0.95 - by_chance(0.95, DRAWS * len(shares)), shares
 
 
-def test_friction_of_a_plausible_size_on_loading_alone_is_one_class_with_the_law():
-    """A law with the friction in it loads the cable in the same way; the scores of single forms prefer the law."""
-    found = record(Trial("hidden", "six", 31, ("hysteresis",), 0.0))
-    assert set(found["set"]) >= {"nonlinear_stiffness", "hysteresis"} and not found["alien"]
-    # neither is likelier, and f_EI without friction lies in the band: with the friction in it f_EI is 13 % off
-    assert found["probability"] < 0.55 and found["f_covered"] > 0.75
+def test_friction_on_loading_alone_is_part_of_the_law_and_said_to_be_unseen():
+    """A law with the friction in it loads the cable in the same way: nothing is named, unloading would tell."""
+    cable, reading = HIDE["hysteresis"](outlook("six")["hysteresis"].plausible, Form())
+    part, _ = diagnose(hidden_test(cable, SIX, largest=LARGEST, seed=31, reading=reading), None, SETTINGS)
+    assert part.verdict == "adequate", part.headline
+    assert "unloading" in {spot.name: spot for spot in part.blind_spots}["hysteresis"].settled_by
 
 
 @pytest.mark.parametrize("times", [2.0, 4.0])

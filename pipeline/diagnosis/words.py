@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
-from pipeline.diagnosis.statistics.verdict import Verdict
+from pipeline.diagnosis.posterior.words import Verdict
 from pipeline.result import CausePart, CauseRow
 from pipeline.rounding import plain
 from pipeline.units import amount_unit
@@ -18,8 +18,6 @@ SPOKEN = {
     "stiffness_varying": "varying stiffness",
     "in_plane_load": "in-plane load",
 }
-
-IN_LAW = "; loading alone does not tell friction between the wires from f_EI, so the band of f_EI leaves room for it"
 
 
 def spoken(name: str) -> str:
@@ -41,7 +39,6 @@ def headline(
     change: float | None,
     weakest: str,
     leftover: str,
-    friction_in_law: bool = False,
 ) -> str:
     """One sentence.
 
@@ -58,8 +55,6 @@ def headline(
         What could have been seen, for ``adequate`` and ``underpowered``.
     leftover : str
         Where the unexplained misfit sits.
-    friction_in_law : bool
-        Whether loading alone leaves open what of the law is friction between the wires.
     """
     if verdict == "adequate":
         return f"Nothing beyond noise: the simulation explains forces and photos; {weakest}."
@@ -84,7 +79,7 @@ def headline(
     if verdict == "class":
         return (
             f"One cause that these data cannot name for certain: {listed(names[0])} (as {spoken(names[0][0])}: "
-            f"{sizes[0]}){gain}{shift}{IN_LAW if friction_in_law else ''}."
+            f"{sizes[0]}){gain}{shift}."
         )
     return f"The simulation lacks {listed(names[0])} ({sizes[0]}){gain}{shift}."
 

@@ -77,7 +77,7 @@ def diagnosis_view(
         ],
         next_what=words.said(following.what).sentence if following else "",
         next_separates=_separates(following.separates, words) if following else "",
-        leftover=_leftover(part, words, settings),
+        leftover=_leftover(part, words),
         figures=_figures(result, part, words, settings) if figures else {},
     )
 
@@ -152,19 +152,23 @@ def _row(row: CauseRow, words: Words) -> list[str]:
     ]
 
 
-def _leftover(part: DiagnosisPart, words: Words, settings: ReportSettings) -> list[str]:
+def _leftover(part: DiagnosisPart, words: Words) -> list[str]:
     """Sentences on what is left where anything was found: where it sits, unless noise leaves as much."""
     left = part.leftover
     if not left or part.verdict == "adequate":
         return []
-    if _is_noise(left, settings):
-        return [words("leftover_noise", p=words.probability(left["p_value"], name="p"))]
+    if _is_noise(left):
+        return [words("leftover_noise", p=words.probability(left["probability"], name="p"))]
     return [words.said(str(left[key])).sentence for key in ("message", "noise") if left.get(key)]
 
 
-def _is_noise(leftover: dict[str, Any], settings: ReportSettings) -> bool:
-    """Whether noise leaves as much too often for a place and a pattern to mean anything."""
-    return float(leftover.get("p_value", 0.0)) > settings.leftover_p_value
+def _is_noise(leftover: dict[str, Any]) -> bool:
+    """Whether something else is too improbable for a place and a pattern to mean anything."""
+    return float(leftover.get("probability", 1.0)) < LIKELY
+
+
+LIKELY = 0.5
+"""Probability of something else from which its place and pattern are told."""
 
 
 def _figures(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
@@ -191,7 +195,7 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     if before is not None and after is not None and result.answer.method == "extended":
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
-    told = part.verdict != "adequate" and not _is_noise(pattern, settings)
+    told = part.verdict != "adequate" and not _is_noise(pattern)
     if told and pattern.get("shape_m") and pattern.get("s_m"):
         drawn["leftover"] = drawing(
             "leftover",

@@ -17,6 +17,7 @@ from pipeline.result.diagnosed import (
     DiagnosisPart,
     ForceCorrectionPart,
     GainPart,
+    HypothesisPart,
     NextExperiment,
     ResidualMap,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "FindingPart",
     "ForceCorrectionPart",
     "GainPart",
+    "HypothesisPart",
     "InversePart",
     "KnotPart",
     "MisfitPart",

@@ -41,6 +41,14 @@ class CausePart(Part):
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
 
 
+class HypothesisPart(Part):
+    """One hypothesis of the posterior."""
+
+    causes: list[str] = Field(description="names; empty for the simulation as it is")
+    something_else: bool = Field(description="whether something acts besides that no cause of the catalogue makes")
+    probability: Number = Field(description="given the data")
+
+
 class CauseRow(Part):
     """One row of the table of causes; see `pipeline.diagnosis`."""
 
@@ -139,6 +147,8 @@ class DiagnosisPart(Part):
         )
     )
     headline: str = Field(description="one sentence in plain words")
+    hypotheses: list[HypothesisPart] = Field([], description="the whole posterior, most probable first")
+    none_of_these: Number = Field(0.0, description="probability that something acts that is no cause of the catalogue")
     causes: list[CausePart] = Field([], description="those that were named")
     table: list[CauseRow] = Field([], description="every cause tried, with what the data say of it")
     gain: GainPart | None = Field(None, description="what the extension bought")
@@ -151,7 +161,7 @@ class DiagnosisPart(Part):
     leftover: dict[str, Any] | None = Field(
         None,
         description=(
-            "what no cause explains: message, p_value, share by kind of data, step, place (m), "
+            "what no cause explains: message, probability, share by kind of data, step, place (m), "
             "pattern shape_m (m) over s_m (m)"
         ),
     )

@@ -26,11 +26,6 @@ class DiagnosisSettings(BaseModel):
         2e-6,
         description="m; of one displacement of the log against the chord: spindle and last digit of a log in 0.001 mm",
     )
-    displacement_scatter: float = Field(
-        5e-5,
-        description="m; largest scatter of the displacements that is asked for where no cause explains the data: a "
-        "dial gauge is read to 0.01 mm, and a spindle has some hundredths of play",
-    )
     section_blocks: int = Field(
         96, description="block means a photo; four per shape function, so that noise and misfit are measured apart"
     )
@@ -51,17 +46,9 @@ class DiagnosisSettings(BaseModel):
     noise_prior_weight: float = Field(
         20.0, description="samples; what the noise level stated by the photos counts for against the level seen"
     )
-    axis_doubt: float = Field(
-        0.4,
-        description="log of the variance; what a photo states of its bearing axes can be checked against nothing here,"
-        " and 20 % of a standard deviation is a common error of such statements",
-    )
 
     # detection
     false_alarm: float = Field(0.01, description="probability of naming anything on a specimen without effect")
-    alien_false_alarm: float = Field(
-        0.005, description="probability of `unexplained` on a specimen without effect; on top of false_alarm"
-    )
     null_draws: int = Field(20000, description="draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma")
     power: float = Field(0.9, description="probability at which the minimal detectable effect is stated")
     visible: float = Field(1e-3, description="surviving fraction below which a cause counts as invisible here")
@@ -69,19 +56,9 @@ class DiagnosisSettings(BaseModel):
         0.2, description="share of its plausible size at which a cause's trace is computed; see diagnosis/search.py"
     )
     seed: int = Field(20240229, description="of every simulated distribution, so that a report repeats to the digit")
-    bootstrap: int = Field(
-        40, description="refits of simulated data that confirm a score near its threshold; each costs one base fit"
-    )
-    bootstrap_margin: float = Field(
-        1.0, description="sigma; the bootstrap is asked where the largest score is this close to the threshold"
-    )
 
     # naming
     twin_cosine: float = Field(0.95, description="|cos| above which two causes that remove as much are one class")
-    twin_margin: float = Field(
-        4.0, description="chi-square a twin may remove less than the best cause and still share its class (2 sigma)"
-    )
-    set_level: float = Field(0.95, description="probability the set of possible causes contains the true one")
     refit_margin: float = Field(
         0.35, description="share of the best linear chi-square gain a cause may fall short of and still be refitted"
     )
@@ -107,48 +84,16 @@ class DiagnosisSettings(BaseModel):
     search_newton_steps: int = Field(
         40_000,
         gt=0,
-        description="Newton steps after which the search for two causes begins nothing further, those of the refits of"
-        " single causes included; about 1,000 a second, and what comes before and after takes 10 to 20 s of the minute"
-        " it all may take; searches that found their pair took 5,000 to 30,000",
-    )
-    all_newton_steps: int = Field(
-        45_000,
-        gt=0,
-        description="Newton steps after which a diagnosis begins no further search of any kind and presents what it"
-        " has; 1,000 to 3,000 a second; the last thing begun may take 10,000 more; of 18 photographed"
-        " specimens none took 30,000",
-    )
-    pair_prior: float = Field(
-        0.1, description="probability of two causes against one of as many free numbers, before the data are looked at"
+        description="Newton steps after which the search for two causes begins nothing further; 1,000 to 3,000 a"
+        " second; searches that found their pair took 5,000 to 30,000",
     )
     masked_least: float = Field(
         20.0,
-        description="chi-square of the best pair below which it is never significant, so no null is simulated; time",
-    )
-    masked_false_alarm: float = Field(
-        1e-3, description="probability of naming two causes where neither scores by itself; on top of false_alarm"
-    )
-    masked_draws: int = Field(5000, description="draws behind that threshold; five lie beyond it")
-    pair_share: float = Field(
-        0.02,
-        description="share of the first cause's chi-square that a second must remove besides being significant",
+        description="chi-square that the best pair must remove beyond the best single score for pairs to be refitted"
+        " where no cause is likely by itself; time",
     )
     explained_share: float = Field(
         0.10, description="share of the excess misfit a named model may leave; more is `unexplained`"
-    )
-    implausible: float = Field(
-        4.0, description="multiples of the plausible size from which a cause loses probability, by the inverse square"
-    )
-    impossible: float = Field(
-        20.0,
-        gt=0,
-        description="multiples of the plausible size beyond which a cause that is limited by its nature is none: a tilt"
-        " of 40 degrees, stiff ends over a third of the cable, all force lost in a hold",
-    )
-    unproven: float = Field(
-        0.05,
-        description="probability; a leftover rarer than this is no noise where steps held out refute the named cause"
-        " too: a second witness beside the 2.5 % of its interval, so both together are a rarer error than false_alarm",
     )
 
     extension_share: float = Field(
@@ -176,14 +121,9 @@ class DiagnosisSettings(BaseModel):
     separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart")
 
     # base model
-    knots: int = Field(5, description="control points of the base characteristic where no identification chose them")
-    knots_most: int = Field(
-        7,
-        description="control points of the base characteristic that causes are first looked for with; more would eat "
-        "causes, and come only where the law does as well as what was named",
-    )
-    knots_extended: int = Field(
-        9, description="control points of the extended model at most; what is named is in it and can be eaten no more"
+    knots: int = Field(
+        12,
+        description="control points of the base characteristic: a law of any form is followed, none becomes a cause",
     )
     knots_identified: int = Field(
         12,

@@ -36,12 +36,6 @@ class ReportSettings(BaseModel):
         gt=0.0,
         description="chi-square beyond expectation by this many standard deviations is misfit; 1 in 700 by chance",
     )
-    leftover_p_value: float = Field(
-        0.05,
-        gt=0.0,
-        lt=1.0,
-        description="what is left beside a named cause is called noise above this p value, and no place of it is told",
-    )
     index_curve_points: int = Field(
         24,
         ge=4,

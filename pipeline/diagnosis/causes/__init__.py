@@ -21,7 +21,7 @@ from pipeline.diagnosis.causes.rig import (
     RigidEnds,
 )
 
-__all__ = ["CATALOGUE", "Cause", "Variant"]
+__all__ = ["CATALOGUE", "SUSPECTS", "Cause", "Variant"]
 
 CATALOGUE: tuple[Cause, ...] = (
     NonlinearStiffness(),
@@ -44,3 +44,6 @@ CATALOGUE: tuple[Cause, ...] = (
     LensDistortion(),
     CameraTilt(),
 )
+
+SUSPECTS: tuple[Cause, ...] = tuple(cause for cause in CATALOGUE if not isinstance(cause, NonlinearStiffness))
+"""What may be wrong about a cable whose law has any form; the form itself is asked for in the paper's own two steps."""

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
-from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.pair_set import TwoCauses
-from pipeline.diagnosis.statistics.leftover import Leftover
+import numpy as np
+
+from pipeline.diagnosis.explanations.search import Search
+from pipeline.diagnosis.fits.workbench import Workbench, from_both_sides
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.explanation import Explanation
+from pipeline.diagnosis.posterior.hypotheses import Posterior
+from pipeline.diagnosis.statistics.twins import between_causes, cosines
+from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,40 +21,85 @@ class Conclusion:
 
     Attributes
     ----------
-    singles : list of Explanation
-        Refitted single causes, most probable first.
-    probability : list of float
-        Of each.
-    members : int
-        How many of them form the set of names.
+    posterior : Posterior
+        Probabilities of all hypotheses.
+    grid : ErrorGrid
+        Error models that were integrated over.
     accepted : Explanation or None
-        What the model is extended by: the most probable single cause, or a pair.
-    two : TwoCauses or None
-        The pairs that the data cannot tell from the accepted one, which is the first; None for a single cause.
-    left : Leftover
-        Test of what the accepted model (or the base model) leaves.
+        What the model is extended by: the likeliest cause or pair; where something else is likelier, the nearest one.
+    classes : tuple of tuple of int
+        For each of its causes the names that may stand in its place, itself first.
     alien : bool
-        Whether that exceeds noise and is no small share.
-    instead : list of int
-        Causes of pairs that may stand instead of a single cause of several forms.
-    impossible : list of Explanation
-        Single causes that would remove more than the accepted one, but only at a size that such a cause cannot have.
+        Whether something is likelier that no cause of the catalogue makes.
     curtailed : bool
         Whether the search for causes was ended before its end.
     """
 
-    singles: list[Explanation]
-    probability: list[float]
-    members: int
+    posterior: Posterior
+    grid: ErrorGrid
     accepted: Explanation | None
-    two: TwoCauses | None
-    left: Leftover
+    classes: tuple[tuple[int, ...], ...]
     alien: bool
-    instead: list[int] = field(default_factory=list)
-    impossible: list[Explanation] = field(default_factory=list)
     curtailed: bool = False
 
     @property
-    def names(self) -> list[int]:
-        """Causes that form the set of names of a single cause, most probable first."""
-        return list(dict.fromkeys([*(e.causes[0] for e in self.singles[: self.members]), *self.instead]))
+    def singles(self) -> list[Explanation]:
+        """Single causes that were refitted, most probable first."""
+        return [one.found for one in self.posterior.explanations(count=1) if one.found is not None]
+
+    @property
+    def rivals(self) -> list[tuple[Explanation, float]]:
+        """Other refits that these data cannot tell from the accepted one, with their probability among all of them."""
+        named = [one for one in self.posterior.credible() if one.found is not None]
+        whole = sum(one.probability for one in named)
+        own = None if self.accepted is None else set(self.accepted.causes)
+        return [(one.found, one.probability / whole) for one in named if one.found and set(one.causes) != own]
+
+
+def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings) -> Conclusion:
+    """The conclusion that the hypotheses of a search allow."""
+    believed = search.posterior
+    word = believed.word
+    if word == "base":
+        return Conclusion(believed, search.grid, None, (), alien=False, curtailed=search.curtailed)
+    alien = word == "rest"
+    count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
+    refits = believed.explanations()
+    first = next((one for one in refits if len(one.causes) == count or alien), None)
+    accepted = None if first is None or first.found is None else in_deeper_valley(bench, first.found, settings)
+    if accepted is None or alien:
+        alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)
+        return Conclusion(believed, search.grid, accepted, alone, alien=True, curtailed=search.curtailed)
+    classes = _classes(bench, believed, accepted)
+    return Conclusion(believed, search.grid, accepted, classes, alien=False, curtailed=search.curtailed)
+
+
+def in_deeper_valley(bench: Workbench, found: Explanation, settings: DiagnosisSettings) -> Explanation:
+    """The explanation fitted from both sides of its K0 as well, where no photo shows the force-free cable."""
+    fitted = from_both_sides(bench.observation, found.fitted, settings)
+    return replace(found, fitted=fitted, gain=bench.base.chi2 - fitted.chi2)
+
+
+def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tuple[tuple[int, ...], ...]:
+    """Names in the place of each cause of the accepted explanation, from the credible set.
+
+    In another pair each cause stands for the one it is closer to; a single cause that does what a pair does stands for
+    both, and both causes of a pair for the single one that they stand instead of. What holds the accepted causes and
+    another one says nothing against them.
+    """
+    suspicion = bench.suspicion
+    close = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
+    np.fill_diagonal(close, 2.0)
+    places: list[list[int]] = [[cause] for cause in accepted.causes]
+    for other in believed.credible():
+        if set(accepted.causes) < set(other.causes):
+            continue
+        if len(places) == 1 or len(other.causes) == 1:
+            for place in places:
+                place += other.causes
+            continue
+        (a, b), (c, d) = accepted.causes, other.causes
+        straight = close[a, c] + close[b, d] >= close[a, d] + close[b, c]
+        for place, cause in zip(places, (c, d) if straight else (d, c), strict=True):
+            place.append(cause)
+    return tuple(tuple(dict.fromkeys(place)) for place in places)

@@ -2,9 +2,7 @@
 
 Foreign data, or forms no catalogue has, leave every pair far above the noise: searches went on for minutes and found
 nothing better. What is given up first is what the right names need least: exchanges of causes, then pairs far down the
-linear list. The two best pairs and everything after the search are given up only with the diagnosis as a whole, which
-has an end of its own: then single causes of small scores are left out too, and what comes after: whether a finer law
-does as well, and whether displacements or photos scatter. The reader is told (`diagnose`).
+linear list. Single causes and the two best pairs are fitted in any case. The reader is told (`diagnose`).
 """
 
 from __future__ import annotations
@@ -29,10 +27,6 @@ class Effort:
     def of(cls, steps: int) -> Effort:
         """A search that begins now."""
         return cls(newton_steps() + steps)
-
-    def within(self, whole: Effort) -> Effort:
-        """The same search, ended with the whole of which it is a part at the latest."""
-        return Effort(min(self.end, whole.end))
 
     @property
     def spent(self) -> bool:

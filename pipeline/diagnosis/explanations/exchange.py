@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
-from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
-from pipeline.diagnosis.explanations.pair_fits import with_own_forms, worth
+from pipeline.diagnosis.explanations.pair_fits import settled, with_own_forms
 from pipeline.diagnosis.explanations.refit import fit_terms
-from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
+from pipeline.diagnosis.fits.fit import Fit, evaluated
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.settings.diagnosis import DiagnosisSettings
-
-ATTEMPTS = 3
-"""Fits at most that go on where the last one ran out of steps."""
 
 EXCHANGES = 2
 """Rounds at most; the second is for what the first has put right."""
@@ -29,27 +26,16 @@ def exchanged(
     """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
     every, done = list(found), set[frozenset[int]]()
     for _ in range(EXCHANGES):
-        best = max(every, key=worth, default=None)
+        best = max(every, key=lambda e: e.worth, default=None)
         if best is None or effort.spent or frozenset(best.causes) in done:
             break
         done.add(frozenset(best.causes))
         if not best.fitted.converged:
-            best = _settled(bench, best, settings)
+            best = settled(bench, best, settings)
             every.append(best)
         for place in (0, 1):
             every += _in_place_of(bench, best, place, settings, effort)
     return every[len(found) :]
-
-
-def _settled(bench: Workbench, pair: Explanation, settings: DiagnosisSettings) -> Explanation:
-    """A pair whose fit ran out of steps, fitted on from where it stands: beside a half-way cause scores mislead."""
-    fitted = pair.fitted
-    for _ in range(ATTEMPTS):
-        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted, settings)
-        gained, fitted = fitted.chi2 - further.chi2, further
-        if fitted.converged or gained < settings.shape_gain:
-            break
-    return explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
 
 
 def _in_place_of(
@@ -78,7 +64,7 @@ def _in_place_of(
             fitted = held if held is not None and held.chi2 < fitted.chi2 else fitted
         if fitted is not None:
             causes = (cause, other) if place == 0 else (other, cause)
-            new = explanation_of(causes, bench.base, fitted, suspicion)
+            new = explanation_of(causes, bench.base, fitted)
             found.append(with_own_forms(bench, new, settings, rival=pair.fitted.chi2))
     return found
 

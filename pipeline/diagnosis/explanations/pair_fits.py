@@ -16,12 +16,13 @@ import numpy as np
 from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
-from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
 from pipeline.diagnosis.explanations.forms import with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -61,7 +62,7 @@ def refitted_pairs(
         )
         if fitted is not None:
             causes = (int(suspicion.owner[one]), int(suspicion.owner[other]))
-            found.append(explanation_of(causes, bench.base, fitted, suspicion))
+            found.append(explanation_of(causes, bench.base, fitted))
     return found
 
 
@@ -76,7 +77,7 @@ def beside_best(
             continue
         fitted = fit_terms(bench.observation, best.fitted, second, (direction,), settings)
         if fitted is not None:
-            found.append(explanation_of((best.causes[0], cause), bench.base, fitted, bench.suspicion))
+            found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found
 
 
@@ -86,7 +87,7 @@ def with_all_forms(bench: Workbench, found: list[Explanation], settings: Diagnos
     A load at an angle to the chord is no better than half of itself beside another cause, as it is alone.
     """
     every: dict[frozenset[int], Explanation] = {}
-    for pair in sorted(found, key=lambda e: -worth(e)):
+    for pair in sorted(found, key=lambda e: -e.worth):
         if frozenset(pair.causes) not in every:
             rival = min((e.fitted.chi2 for e in every.values()), default=np.inf)
             every[frozenset(pair.causes)] = with_own_forms(bench, pair, settings, rival=rival)
@@ -104,7 +105,7 @@ def with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSetti
             continue
         for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
             fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
-    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted, bench.suspicion)
+    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
 
 
 def in_any_form(
@@ -120,7 +121,7 @@ def in_any_form(
     One that cannot come near the best one so far, ``rivals`` included, as far as its scores tell, is left out.
     """
     new: list[Explanation] = []
-    for pair in sorted(found, key=lambda e: -worth(e))[:IN_ANY_FORM]:
+    for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
         if effort.spent:
             break
         rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
@@ -134,7 +135,7 @@ def in_any_form(
             for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
                 fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
         if fitted is not pair.fitted:
-            new.append(explanation_of(pair.causes, bench.base, fitted, bench.suspicion))
+            new.append(explanation_of(pair.causes, bench.base, fitted))
     return new
 
 
@@ -142,6 +143,18 @@ IN_ANY_FORM = 2
 """Pairs, the best first, that get forms with a place of their own; time."""
 
 
-def worth(explanation: Explanation) -> float:
-    """Logarithm of its weight, as far as fit and free numbers go."""
-    return 0.5 * explanation.gain - explanation.weighed.tuned
+def settled(bench: Workbench, pair: Explanation, settings: DiagnosisSettings) -> Explanation:
+    """An explanation whose fit ran out of steps, fitted on: beside a half-way cause scores mislead."""
+    fitted = pair.fitted
+    if fitted.converged:
+        return pair
+    for _ in range(ATTEMPTS):
+        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted, settings)
+        gained, fitted = fitted.chi2 - further.chi2, further
+        if fitted.converged or gained < settings.shape_gain:
+            break
+    return explanation_of(pair.causes, bench.base, fitted)
+
+
+ATTEMPTS = 3
+"""Fits at most that go on where the last one ran out of steps."""

@@ -11,13 +11,13 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.explanation import Explanation, explanation_of
 from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -48,7 +48,7 @@ def refit_one(
             for setting, one in best.items():
                 best[setting] = _several(observation, one, kind, setting, settings, hopeless=hopeless)
         found = min(best.values(), key=_cost, default=None)
-    return None if found is None else explanation_of((cause,), base, found, suspicion)
+    return None if found is None else explanation_of((cause,), base, found)
 
 
 def _several(

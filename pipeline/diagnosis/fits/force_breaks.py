@@ -168,16 +168,22 @@ class _Told:
         nearest = steps[int(np.argmin(np.abs(np.log(ratio))))]
         priors = len(base.residual) - observation.rows.count
         is_force = np.r_[observation.rows.force, np.zeros(priors, dtype=bool)]
-        found = fit(
-            observation,
-            base.extension,
-            base.vector,
-            iterations=settings.iterations,
-            tolerance=settings.tolerance,
-            near=base.run,
-            begin=base,
-            kept=~is_force | np.r_[observation.rows.step == nearest, np.ones(priors, dtype=bool)],
-        )
+        kept = ~is_force | np.r_[observation.rows.step == nearest, np.ones(priors, dtype=bool)]
+        # a base model bent to wrong forces may be too far from what the photos ask for: then from its first guess
+        neutral = base.extension.base.neutral()
+        for begin, vector in ((base, base.vector), (None, neutral)):
+            found = fit(
+                observation,
+                base.extension,
+                vector,
+                iterations=settings.iterations,
+                tolerance=settings.tolerance,
+                near=base.run,
+                begin=begin,
+                kept=kept,
+            )
+            if found.converged:
+                break
         if not found.converged or found.run.prediction is None:
             return None
         rows = [np.flatnonzero(observation.rows.force & (observation.rows.step == i)) for i in steps]

@@ -1,7 +1,7 @@
 """Gain on held-out steps, computed: whole levels are left out, both models refitted, and asked for the rest.
 
-What the gain decides stands here too: whether it speaks against the named cause, and whether it speaks for the extended
-model where that cause does not explain everything.
+What the gain decides stands here too: whether it speaks for the extended model where that cause does not explain
+everything.
 """
 
 from __future__ import annotations
@@ -46,16 +46,6 @@ def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) 
         force_rmse_N=(force[0], force[1]),
         shape_rmse_m=(shape[0], shape[1]),
     )
-
-
-def unproven(p_value: float, gain: GainPart | None, settings: DiagnosisSettings) -> bool:
-    """Whether what is left is hardly noise, and on steps held out too large a share of the misfit.
-
-    Forms whose place and width are tuned to the steps fit away what they do not explain: a soft spot in the place of a
-    peg that pushes the cable left 2 % of the misfit, and 19 % of that of steps it had not seen.
-    """
-    shown = gain is None or not np.isfinite(gain.ci95[1]) or gain.ci95[1] >= 1.0 - settings.explained_share
-    return not shown and p_value < settings.unproven
 
 
 def answers(gain: GainPart | None, reduced_chi2: float, settings: DiagnosisSettings) -> bool:

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.extended import law_of
 from pipeline.diagnosis.fits.extension import Extension
@@ -73,7 +72,6 @@ def identified_again(
     fitted: Fit,
     settings: DiagnosisSettings,
     *,
-    in_law: Sequence[Cause] = (),
     force_errors: Sequence[Array] = (),
 ) -> Identified:
     """The law of a fitted model identified again, or the fit as it is where a finer law has no equilibrium.
@@ -81,7 +79,6 @@ def identified_again(
     Two fits: one under a wide prior, whose linearisation tells along what and how smooth the law is; then one under the
     likeliest prior, from whose linearisation mean and covariance over all priors follow.
 
-    ``in_law`` are causes that these data cannot tell from the law: its band leaves room for them at plausible size.
     ``force_errors`` (n,) N each are errors of one standard deviation that the forces of all steps share.
     """
     if fitted.extension.base.straight or len(fitted.extension.base.knots) < 3:
@@ -98,7 +95,7 @@ def identified_again(
     posterior = _averaged(observation, settled)
     mean = _at(observation, settled, posterior.mean)
     found = settled if mean is None else mean
-    covariance = _with_room_for(observation, found, in_law, settings) if in_law else posterior.covariance
+    covariance = posterior.covariance
     for errors in force_errors:
         moved = _moved_by_forces(observation, found, covariance, errors)
         covariance = covariance + np.outer(moved, moved)
@@ -116,19 +113,6 @@ def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, err
     shift = np.zeros(count)
     shift[observation.rows.force] = np.concatenate(rows)
     return np.asarray(response @ (fitted.jacobian[:count].T @ (_weights(observation, fitted) ** 2 * shift)))
-
-
-def _with_room_for(
-    observation: Observation, fitted: Fit, causes: Sequence[Cause], settings: DiagnosisSettings
-) -> Array:
-    """Covariance (p, p) of the vector where every form of the causes, of plausible size, is an unknown beside it."""
-    facts, size = fitted.extension.facts, fitted.extension.size
-    traces = [
-        cause.plausible(facts)
-        * suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace).columns
-        for cause in causes
-    ]
-    return _averaged(observation, fitted, beside=np.hstack(traces)).covariance[:size, :size]
 
 
 def _with_fine_law(fitted: Fit, count: int) -> tuple[Extension, Array]:

@@ -19,7 +19,7 @@ from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score, span
+from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
 
 Array = NDArray[np.float64]
 
@@ -126,34 +126,3 @@ def direction(observation: Observation, fitted: Fit, term: Term, *, amount: floa
 
 SMALLER = (1.0, 0.1, 0.01, 1e-3, 1e-4)
 """Of an amount: traces from the least one are still right to 1e-4 (measured where all have an equilibrium)."""
-
-
-def detectable_amount(
-    observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, needed: float, trace: float
-) -> float:
-    """Smallest amount of a cause, in its clearest form, whose score is ``needed`` sigma; infinite if none is.
-
-    A trace that grows otherwise than in proportion (stiff ends: with the square) is computed anew at the amount found,
-    by fixed-point steps in the logarithm; three reach a few per cent.
-    """
-    # a trace computed at a large amount says little of the smallest one that is seen
-    own = np.array([k for k in suspicion.of(cause) if suspicion.terms[k].variant.trace == 1.0], dtype=int)
-    if own.size == 0 or not np.any(suspicion.scores.norm[own] > 0.0):
-        return float("inf")
-    best = int(own[np.argmax(suspicion.scores.norm[own])])
-    amount = needed / float(suspicion.scores.norm[best])
-    plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
-    at = trace * plausible
-    basis = span(fitted.jacobian)
-    for _ in range(3):
-        if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > 30.0 * plausible:
-            column = direction(observation, fitted, suspicion.terms[best], amount=min(amount, 30.0 * plausible))
-            norm = float(np.linalg.norm(column - basis @ (basis.T @ column)))
-            if norm <= 0.0 or not np.isfinite(norm):
-                break
-            at, amount = amount, float(np.sqrt(amount * needed / norm))
-    return amount
-
-
-LINEAR = (0.02, 3.0)
-"""Amounts within these multiples of where a trace was computed are taken as proportional."""

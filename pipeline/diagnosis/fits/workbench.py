@@ -1,8 +1,8 @@
 """From a measured test to a fitted base model with all suspects scored: what every later step works on.
 
 Strategy: fit the base model to the data as stated; calibrate the noise of the photos by what is faster along the cable
-than any misfit; fit again; if another control point of the characteristic removes more than any cause does, take it
-(a law the spline cannot follow is no cause); then score the whole catalogue and simulate the family of scores.
+than any misfit; fit again; then score all suspects and simulate the family of scores. The law has so many control
+points that one of any form is followed: a law of another form is no cause.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes import CATALOGUE, Cause
-from pipeline.diagnosis.causes.law import LAW
+from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
@@ -71,9 +70,8 @@ def prepare(
     settings: DiagnosisSettings,
     *,
     knots: int,
-    causes: Sequence[Cause] = CATALOGUE,
+    causes: Sequence[Cause] = SUSPECTS,
     straight: bool = False,
-    refine: bool = True,
 ) -> Workbench | str:
     """Fit the base model and score all causes.
 
@@ -87,8 +85,6 @@ def prepare(
     causes : sequence of Cause
     straight : bool
         Hold K0 at zero.
-    refine : bool
-        Whether control points may be added.
 
     Returns
     -------
@@ -128,16 +124,6 @@ def prepare(
             again = fit_from(observation, fitted.extension, fitted.vector, fitted, settings)
         fitted = again
     suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
-    while (
-        refine
-        and 2 < len(fitted.extension.base.knots) < settings.knots_most
-        and _law_is_too_coarse(suspicion, settings)
-    ):
-        finer = with_more_knots(observation, fitted, settings)
-        if finer is None:
-            break
-        fitted = finer
-        suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     return scored(test, observation, fitted, suspicion, settings)
 
 
@@ -154,17 +140,6 @@ def scored(
     )
     limit = threshold(maxima, settings.false_alarm)
     return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
-
-
-def with_points(bench: Workbench, points: Array, settings: DiagnosisSettings) -> Workbench | None:
-    """The workbench with other control points (k,) 1/m in the base model; None where that has no equilibrium."""
-    extension, vector = _on(bench.base, points)
-    fitted = fit_from(bench.observation, extension, vector, bench.base, settings)
-    if fitted.run.prediction is None:
-        return None
-    causes = bench.suspicion.causes
-    suspicion = suspect(bench.observation, fitted, causes, visible=settings.visible, trace=settings.trace)
-    return scored(bench.test, bench.observation, fitted, suspicion, settings)
 
 
 def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
@@ -189,44 +164,16 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
     return found if best is None else best
 
 
-def _law_is_too_coarse(suspicion: Suspicion, settings: DiagnosisSettings) -> bool:
-    own = [k for k, term in enumerate(suspicion.terms) if term.cause.name == LAW]
-    if not own:
-        return False
-    gain = float(suspicion.statistic[own].max()) ** 2
-    return gain > settings.knot_gain and gain >= float(suspicion.statistic.max()) ** 2
-
-
 def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
     """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
-    return _on(fitted, place_knots(0.0, float(fitted.excess.max()), count))
-
-
-def _on(fitted: Fit, knots: Array) -> tuple[Extension, Array]:
-    """The model with control points (k,) 1/m, and its vector along the spline so far."""
-    base = fitted.extension.base
+    knots, base = place_knots(0.0, float(fitted.excess.max()), count), fitted.extension.base
     law = base.characteristic(fitted.vector)
     ordinates = np.log(np.maximum(law.f(knots), 0.02 * float(np.max(law.ordinates))) / base.stiffness)
     extension = replace(fitted.extension, base=replace(base, knots=knots))
     return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]
 
 
-def with_finer_law(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
-    """The model with as many control points as pay for themselves; f_EI is identified again.
-
-    Control points lie anew with every number of them, and one more may fit a steep law worse where two more fit it
-    much better (a fall by stick and slip close to rest: chi-square 279, 299, 241 with 5, 6, 7), so both are tried.
-    """
-    while 2 < len(fitted.extension.base.knots) < settings.knots_extended:
-        trials = (with_more_knots(observation, fitted, settings, more=more) for more in (1, 2))
-        finer = next((t for t in trials if t is not None and fitted.chi2 - t.chi2 >= settings.knot_gain), None)
-        if finer is None:
-            break
-        fitted = finer
-    return fitted
-
-
-def in_deeper_valley(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
+def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
     """The model fitted from both sides of its K0 as well, where no photo shows the force-free cable; the best of all.
 
     A law that rises from rest beside a K0 that is too small can fit three photos nearly as well as one that falls from
@@ -244,10 +191,3 @@ def in_deeper_valley(observation: Observation, fitted: Fit, settings: DiagnosisS
         if found.run.prediction is not None and found.chi2 < best.chi2:
             best = found
     return best
-
-
-def with_more_knots(observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, more: int = 1) -> Fit | None:
-    """The model with ``more`` control points, fitted again; None where that has no equilibrium."""
-    extension, vector = with_knots(fitted, len(fitted.extension.base.knots) + more)
-    finer = fit_from(observation, extension, vector, fitted, settings)
-    return None if finer.run.prediction is None else finer

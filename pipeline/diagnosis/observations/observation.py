@@ -79,6 +79,8 @@ class PhotoData:
         Index of the step.
     sections : Sections
     chord, chord_std : m
+    stated_chord_std : m
+        By the bearing axes alone, without the displacement's error.
     basis : (k, q)
         Smooth functions of the shape misfit.
     whiten : (1 + q, 1 + k)
@@ -89,6 +91,7 @@ class PhotoData:
     sections: Sections
     chord: float
     chord_std: float
+    stated_chord_std: float
     basis: Array
     whiten: Array
 
@@ -220,7 +223,8 @@ def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noi
     basis = smooth_basis(sections.s, float(step.shape.s[-1]), functions=functions)
     stated = step.chord_std if step.chord_std is not None else settings.chord_std * step.chord
     whiten = _whitening(step.chord, stated, sections, basis, settings, noise)
-    return PhotoData(index, sections, step.chord, float(np.hypot(stated, settings.displacement_std)), basis, whiten)
+    whole = float(np.hypot(stated, settings.displacement_std))
+    return PhotoData(index, sections, step.chord, whole, stated, basis, whiten)
 
 
 def _whitening(

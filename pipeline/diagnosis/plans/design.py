@@ -19,14 +19,14 @@ from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.knots import place_knots
-from pipeline.diagnosis.fits.search import detectable_amount, suspect
+from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
-from pipeline.diagnosis.statistics.score import sigma_needed
+from pipeline.diagnosis.posterior.detectable import detectable_amount
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -258,8 +258,9 @@ def _cause_plan(
         return CausePlan(cause.name, cause.unit, plausible, None, 0.0, "", 0.0, 0.0, False, cause.settled_by)
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
-    needed = sigma_needed(bench.limit, power=settings.power)
-    smallest = detectable_amount(bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace)
+    smallest = detectable_amount(
+        bench.observation, bench.base, suspicion, index, power=settings.power, trace=settings.trace
+    )
     bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
     twin, closeness = nearest(table)
     separated = ""

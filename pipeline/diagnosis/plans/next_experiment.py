@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, UNLOADING, Cause
-from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -22,6 +21,7 @@ from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
+from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 

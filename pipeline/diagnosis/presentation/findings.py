@@ -9,25 +9,29 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.words import spoken
 from pipeline.records import Finding
-from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import amount_unit
 
 
-def too_large(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> tuple[Finding, ...]:
+def too_large(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
     """What would explain an unexplained specimen if it could be that large."""
-    for explanation in conclusion.impossible[:1]:
-        cause = explanation.impossible(bench.suspicion.causes, settings.impossible)
-        if cause is None:
-            break
-        amount, std = explanation.amount(cause)
-        size = amount_unit(cause.unit, amount, std).text(amount, std)
+    if conclusion.accepted is None:
+        return ()
+    for cause in (bench.suspicion.causes[k] for k in conclusion.accepted.causes):
+        amount, std = conclusion.accepted.amount(cause)
         times = abs(amount) / cause.plausible(bench.facts)
+        if not cause.limited or abs(amount) - 2.0 * std < IMPOSSIBLE * cause.plausible(bench.facts):
+            continue
+        size = amount_unit(cause.unit, amount, std).text(amount, std)
         message = (
             f"{spoken(cause.name)} would remove the misfit, but only at {size}, {times:.0f} times its usual size: it "
             "is something else, or scale, length or photos are wrong"
         )
         return (Finding("diagnosis/impossible-size", "warning", message),)
     return ()
+
+
+IMPOSSIBLE = 20.0
+"""Plausible sizes: a tilt of 40 degrees, stiff ends over a third of the cable, all force lost in a hold."""
 
 
 def search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:

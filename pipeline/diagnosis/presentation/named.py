@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.explanations.explanation import Explanation
 from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.result import CausePart, Curve
+from pipeline.diagnosis.posterior.explanation import Explanation
+from pipeline.result import CausePart, Curve, HypothesisPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
@@ -34,48 +32,52 @@ def named_causes(
 
 def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     """The causes of the accepted explanation, each with whatever the data allow in its place."""
-    catalogue, accepted, two = bench.suspicion.causes, conclusion.accepted, conclusion.two
+    accepted = conclusion.accepted
     if accepted is None:
         return []
-    # a law with one more control point is no second cause, only a finer base
-    found = [cause for cause in accepted.causes if catalogue[cause].name != LAW] or [*accepted.causes]
-    if two is None or len(found) == 1:
-        class_ = list(dict.fromkeys([found[0], *conclusion.names]))
-        return [_part(bench, accepted, found[0], class_, conclusion.probability[0])]
-    return [
-        _part(bench, accepted, cause, two.names(place), two.chance(cause))
-        for place, cause in enumerate(accepted.causes)
-    ]
-
-
-def _part(bench: Workbench, found: Explanation, cause: int, class_: list[int], probability: float) -> CausePart:
     catalogue = bench.suspicion.causes
-    kind = catalogue[cause]
-    amount, std = found.amount(kind)
-    return CausePart(
-        name=kind.name,
-        **{"class": [catalogue[k].name for k in class_]},
-        probability=min(max(probability, 0.0), 1.0),
-        estimate=amount,
-        std=std,
-        unit=kind.unit,
-    )
+    parts = []
+    for cause, names in zip(accepted.causes, conclusion.classes, strict=True):
+        kind = catalogue[cause]
+        amount, std = accepted.amount(kind)
+        parts.append(
+            CausePart(
+                name=kind.name,
+                **{"class": [catalogue[k].name for k in names]},
+                probability=conclusion.posterior.of(cause),
+                estimate=amount,
+                std=std,
+                unit=kind.unit,
+            )
+        )
+    return parts
+
+
+def hypotheses(bench: Workbench, conclusion: Conclusion) -> tuple[list[HypothesisPart], float]:
+    """The whole posterior, most probable first, and the probability of none of these."""
+    catalogue, shown, none = bench.suspicion.causes, list[HypothesisPart](), 0.0
+    for one in conclusion.posterior.believed:
+        if one.something_else and not one.causes:
+            none = one.probability
+        elif one.probability >= TOLD:
+            names = [catalogue[k].name for k in one.causes]
+            shown.append(HypothesisPart(causes=names, something_else=one.something_else, probability=one.probability))
+    return shown, none
+
+
+TOLD = 1e-6
+"""Probability below which a hypothesis is not told; all of these together change no digit that is shown."""
 
 
 def extended_curve(again: Identified, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve:
     """f_EI of the extended model, with what the data cannot tell in its band: the law's smoothness, and the class."""
-    rivals = [*_rivals(conclusion), *again.rivals]
-    return curve(again.fitted, points=settings.curve_points, covariance=again.covariance, rivals=rivals)
-
-
-def _rivals(conclusion: Conclusion) -> list[tuple[Fit, float]]:
-    """The other members of the class of the accepted cause, or of the set of pairs, with their probability in it."""
-    if conclusion.two is not None:  # their probabilities are those within the set already
-        members, chance, whole = conclusion.two.pairs, conclusion.two.probability, 1.0
-    else:
-        members, chance = conclusion.singles[: conclusion.members], conclusion.probability[: conclusion.members]
-        whole = sum(chance)
-    return [(e.fitted, p / whole) for e, p in zip(members[1:], chance[1:], strict=True)]
+    rivals = [(one.fitted, chance) for one, chance in conclusion.rivals]
+    return curve(
+        again.fitted,
+        points=settings.curve_points,
+        covariance=again.covariance,
+        rivals=[*rivals, *again.rivals],
+    )
 
 
 def change_of_stiffness(

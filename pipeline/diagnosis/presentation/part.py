@@ -9,16 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.explanations.friction_in_law import hidden_in_law
-from pipeline.diagnosis.fits.heldout import answers, measured_gain, unproven
+from pipeline.diagnosis.fits.heldout import answers, measured_gain
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.plans.next_experiment import next_experiment
+from pipeline.diagnosis.posterior.words import verdict
 from pipeline.diagnosis.presentation.leftover import described
-from pipeline.diagnosis.presentation.named import change_of_stiffness, extended_curve, named_causes
+from pipeline.diagnosis.presentation.named import change_of_stiffness, extended_curve, hypotheses, named_causes
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
-from pipeline.diagnosis.statistics.verdict import decide
 from pipeline.diagnosis.words import could_have_been_seen, headline
 from pipeline.result import Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -32,44 +31,44 @@ def present(
     gain = None if accepted is None else measured_gain(bench, accepted.fitted, settings)
     rows = table(bench, conclusion, settings, gain=gain)
     seen = seen_at_plausible_size(bench, rows)
-    in_law = hidden_in_law(bench, conclusion.names) if conclusion.two is None else []
     again = None
     if accepted is not None:
         errors = [
             np.array([error.get(step.step, 0.0) for step in bench.test.steps])
             for error in bench.test.common_force_errors
         ]
-        again = identified_again(bench.observation, accepted.fitted, settings, in_law=in_law, force_errors=errors)
+        again = identified_again(bench.observation, accepted.fitted, settings, force_errors=errors)
     extended = None if again is None else extended_curve(again, conclusion, settings)
     causes = named_causes(bench, conclusion, again, extended)
-    verdict = decide(
-        detected=accepted is not None,
-        alien=conclusion.alien or unproven(conclusion.left.p_value, gain, settings),
-        two=len(causes) == 2,
-        names=len(conclusion.names),
+    word = verdict(
+        found=accepted is not None,
+        alien=conclusion.alien,
+        classes=conclusion.classes,
         powerless=len(seen) < settings.powerless * len(rows),
     )
-    leftover = described(bench, conclusion.left)
+    leftover = described(bench, conclusion)
+    believed, none = hypotheses(bench, conclusion)
     sentence = headline(
-        verdict,
+        word,
         causes=causes,
         explained=None if gain is None else gain.heldout_excess_removed,
         change=change_of_stiffness(bench, accepted, extended, identified),
         weakest=could_have_been_seen(seen, len(rows)),
         leftover=leftover["message"],
-        friction_in_law=bool(in_law),
     )
     photos, forces = left_out(bench)
     return DiagnosisPart(
-        verdict=verdict,
+        verdict=word,
         headline=sentence,
+        hypotheses=believed,
+        none_of_these=none,
         causes=causes,
         table=rows,
         gain=gain,
         blind_spots=blind_spots(bench, seen, settings),
-        next_experiment=what_next(bench, conclusion, settings, unexplained=verdict == "unexplained"),
+        next_experiment=what_next(bench, conclusion, settings, unexplained=word == "unexplained"),
         extended=extended,
-        extended_refuted=verdict == "unexplained"
+        extended_refuted=word == "unexplained"
         and not (accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)),
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
@@ -98,9 +97,8 @@ def what_next(
     The order is that of use: a class can be settled, a misfit of no name needs a second look at the same cable, what
     was never unloaded hides whole causes, and the force calibration is unseen always.
     """
-    confused = conclusion.two.pairs if conclusion.two else conclusion.singles[: conclusion.members]
-    if len(confused) > 1:
-        return next_experiment(bench, confused[0], confused[1:], settings)
+    if conclusion.accepted is not None and conclusion.rivals and not unexplained:
+        return next_experiment(bench, conclusion.accepted, [one for one, _ in conclusion.rivals], settings)
     if unexplained:
         turned = "turn the cable end for end and repeat the test"
         unload = "repeat the test with the cable turned end for end, and unload"

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.explanations.explanation import Explanation
-from pipeline.diagnosis.explanations.friction_in_law import FRICTION
 from pipeline.diagnosis.fits.extended import stiffness_change, stiffness_change_linear
-from pipeline.diagnosis.fits.search import detectable_amount
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.statistics.score import adjusted_p, sigma_needed
+from pipeline.diagnosis.posterior.detectable import detectable_amount
+from pipeline.diagnosis.posterior.explanation import Explanation
+from pipeline.diagnosis.statistics.score import adjusted_p
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.result import BlindSpot, CauseRow, GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -32,7 +31,6 @@ def table(
     """One row for every cause, the loudest first; ``gain`` is that of the accepted explanation."""
     suspicion, scores = bench.suspicion, bench.suspicion.scores
     p_values = adjusted_p(suspicion.statistic, bench.maxima) if suspicion.terms else suspicion.statistic
-    needed = sigma_needed(bench.limit, power=settings.power)
     twin, closeness = nearest(_closeness(bench))
     refitted = {e.causes[0]: e for e in conclusion.singles}
     rows = []
@@ -44,7 +42,7 @@ def table(
         found = refitted.get(index)
         size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found, loudest)
         detectable = detectable_amount(
-            bench.observation, bench.base, suspicion, index, needed=needed, trace=settings.trace
+            bench.observation, bench.base, suspicion, index, power=settings.power, trace=settings.trace
         )
         accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
         rows.append(
@@ -75,6 +73,9 @@ class _Size(NamedTuple):
     shift: float
     gain: float | None
 
+
+FRICTION = "hysteresis"
+"""On loading alone friction between the wires is part of the law, exactly: nothing tells them apart."""
 
 UNKNOWN = 1e3
 """Plausible sizes; a std beyond them says that the data do not determine the amount, and 0 is what the table takes for
@@ -143,7 +144,7 @@ def confusable(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSett
     suspicion, closeness = bench.suspicion, _closeness(bench)
     loudness = np.zeros(len(suspicion.causes))
     np.maximum.at(loudness, suspicion.owner, suspicion.statistic)
-    chosen = [e.causes[0] for e in conclusion.singles[: conclusion.members]]
+    chosen = list(dict.fromkeys(cause for names in conclusion.classes for cause in names))
     chosen += [int(k) for k in np.argsort(-loudness) if int(k) not in chosen and closeness[k, k] > 0.0]
     chosen = chosen[: settings.twins_shown]
     names = [suspicion.causes[k].name for k in chosen]

@@ -39,7 +39,7 @@ def row(outlook, name):
 def test_friction_needs_the_way_back(plans):
     for name in ("bearing_friction", "hysteresis", "plastic_set"):
         before, after = row(plans["loading"], name), row(plans["both ways"], name)
-        assert after.minimal_detectable < 0.2 * before.minimal_detectable
+        assert before.minimal_detectable is None or after.minimal_detectable < 0.2 * before.minimal_detectable
         assert after.surviving_fraction > 4.0 * before.surviving_fraction
     assert row(plans["loading"], "hysteresis").separated_by == "unload in the same steps, with photos"
 

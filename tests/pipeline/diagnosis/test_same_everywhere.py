@@ -9,7 +9,7 @@ import pytest
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test, nudged
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.diagnose import settled
+from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -21,10 +21,9 @@ def answer(test, names):
     """Names of the class, the causes accepted, whether more is left than noise; and the probability of the first."""
     causes = [cause for cause in CATALOGUE if cause.name in names]
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
-    _, found = settled(bench, SETTINGS)
-    accepted = [] if found.accepted is None else [causes[k].name for k in found.accepted.causes]
-    words = (" ".join(causes[k].name for k in found.names), " ".join(accepted), found.alien)
-    return words, found.probability[0] if found.probability else 0.0
+    found = conclude(bench, SETTINGS)
+    names = " / ".join(" ".join(causes[k].name for k in place) for place in found.classes)
+    return (names, found.alien), found.posterior.total(count=0, something_else=False)
 
 
 ON_LOADING = "bearing_friction displacement_offset hysteresis nonlinear_stiffness"

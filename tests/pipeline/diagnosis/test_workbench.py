@@ -8,11 +8,9 @@ from fixtures.effects import LARGEST
 from fixtures.hidden import SIX, THREE, hidden_test
 from fixtures.photographed.specimen import Order, make, write
 from fixtures.photographed.trial import answer
-from fixtures.scores import fitted_base, observed
-from fixtures.trials import Trial, f_error, made
+from fixtures.trials import Trial, made
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.fits import workbench
-from pipeline.diagnosis.fits.extended import curve as curve_of
 from pipeline.diagnosis.fits.extended import curve_change
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.result import Curve
@@ -21,24 +19,6 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 from tests.rod.virtual_photo import parted_axes
 
 SETTINGS = DiagnosisSettings()
-
-
-def test_a_finer_law_without_equilibrium_leaves_the_coarser_one(monkeypatch):
-    """Between control points moved by a refinement the moment may fall; the law is then kept as it was."""
-    faults = faults_of_input(hidden_test(Cable(), THREE, largest=0.0138, seed=6), SETTINGS)
-    plain = workbench.prepare(faults, SETTINGS, knots=5)
-    refined = workbench.with_knots
-
-    def falling(fitted, count):
-        extension, vector = refined(fitted, count)
-        vector[:count:2] -= 8.0  # every second control point at e^-8 of its stiffness: the spline swings below zero
-        return extension, vector
-
-    monkeypatch.setattr(workbench, "with_knots", falling)
-    assert workbench.with_more_knots(plain.observation, plain.base, SETTINGS) is None
-    kept = workbench.prepare(faults, SETTINGS, knots=5)
-    assert len(kept.base.extension.base.knots) == 5
-    assert kept.base.chi2 == pytest.approx(plain.base.chi2, rel=0.05)  # its control points stayed where they were
 
 
 def curve(kappa, tangent, supported):
@@ -60,22 +40,6 @@ def test_change_of_f_is_that_of_the_curves_where_both_are_supported():
     after = curve([1.0, 2.0, 3.0], [1.1, 0.9, 7.0], [True] * 3)
     assert curve_change(before, after) == pytest.approx(0.1)
     assert curve_change(before, curve([3.0, 4.0], [1.0, 1.0], [True] * 2)) is None
-
-
-def test_a_steep_law_gets_the_control_points_it_asks_for():
-    """A law that falls close to rest and is flat beyond: one more control point fits it worse, three more to the noise.
-
-    Its f_EI is 6 % off with five; what is left is the kink of the law's shoulder, which no spline follows.
-    """
-    cable = Cable(EI0=0.03, EI1=0.006, kc=2.2, K0=1.5, form="shoulder")
-    test = hidden_test(cable, SIX, largest=0.03, seed=3)
-    coarse, observation = fitted_base(test), observed(test)
-    finer = workbench.with_finer_law(observation, coarse, SETTINGS)
-    assert workbench.with_more_knots(observation, coarse, SETTINGS).chi2 > coarse.chi2
-    freedom = len(finer.residual) - finer.extension.size
-    assert finer.chi2 < freedom + 4.0 * np.sqrt(2.0 * freedom) < coarse.chi2
-    before, after = (f_error(curve_of(fitted, points=61), cable)[0] for fitted in (coarse, finer))
-    assert after < 0.5 * before
 
 
 @pytest.mark.parametrize("protocol", [THREE, SIX], ids=["three", "six"])

@@ -164,15 +164,15 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
 
 
-@pytest.mark.parametrize(("p_value", "told"), [(0.897, True), (1e-4, False)])
-def test_leftover_that_noise_makes_has_no_place(diagnosed, p_value, told):
+@pytest.mark.parametrize(("probability", "told"), [(0.1, True), (0.99, False)])
+def test_leftover_that_noise_makes_has_no_place(diagnosed, probability, told):
     result = diagnosed("named").model_copy(update={"photos": []})
-    left = diagnosed("unexplained").diagnosis.leftover | {"p_value": p_value}
+    left = diagnosed("unexplained").diagnosis.leftover | {"probability": probability}
     page = report_html(
         result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"leftover": left})}),
         ReportSettings(language="de"),
     )
-    assert ("So viel lässt der Zufall allein übrig (p = 0,9)" in Page(page).text) == told
+    assert ("nicht mehr als Rauschen" in Page(page).text) == told
     assert ('id="leftover"' in page) != told
 
 

@@ -1,0 +1,209 @@
+"""The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
+
+base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
+-> what scores beside the best of them, and pairs of the exhaustive linear search, refitted -> members of pairs
+exchanged, and pairs pruned of what they do not need -> probabilities of all.
+
+A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
+2.5 standard deviations of nothing is fitted again without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
+from pipeline.diagnosis.explanations.exchange import exchanged
+from pipeline.diagnosis.explanations.pair_fits import (
+    beside_best,
+    in_any_form,
+    linear_pairs,
+    refitted_pairs,
+    settled,
+    with_all_forms,
+)
+from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.fits.displacements import displacement_columns
+from pipeline.diagnosis.fits.fit import Fit, fit_from
+from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
+from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
+from pipeline.diagnosis.posterior.hypotheses import Hypothesis, Posterior, posterior
+from pipeline.diagnosis.posterior.weigh import refitted, weighed
+from pipeline.diagnosis.statistics.pairs import Pair
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+MATTERS = 0.1
+"""Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
+
+ALSO = 0.01
+"""Probability of a cause by the linear model from which it is refitted besides those that come near the best score."""
+
+LIKELIEST = 4
+"""Refits, the likeliest first, that are weighed with something else besides."""
+
+NEEDED = 2.5
+"""Standard deviations from nothing that each member of a pair must have to be left in it."""
+
+
+class Search:
+    """Hypotheses about one specimen as they are found, and their probabilities."""
+
+    def __init__(self, bench: Workbench, settings: DiagnosisSettings) -> None:
+        self.bench, self.settings, self.effort = bench, settings, TO_THE_END
+        displacements = displacement_columns(bench.observation, bench.base)
+        self.grid: ErrorGrid = error_grid(bench.observation, bench.facts, displacements)
+        self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
+        first = weighed(self.grid, bench.base, bench.suspicion)
+        self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]
+        self.hypotheses += [Hypothesis((cause,), *values) for cause, values in first.further.items()]
+        self.curtailed = False
+
+    @property
+    def posterior(self) -> Posterior:
+        """Of all that was found so far."""
+        return posterior(self.hypotheses, self.causes)
+
+    def add(self, found: Sequence[Explanation]) -> list[Explanation]:
+        """Weigh refits; the likeliest fitted to their end and weighed with something else besides. Returned: all.
+
+        Weighing that takes ten times the time; where something else is likelier than all causes, few add to it.
+        """
+        rest = self.hypotheses[0].rest
+        new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
+        new.sort(key=lambda pair: -pair[0])
+        best = [settled(self.bench, one, self.settings) for _, one in new[:LIKELIEST]]
+        self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
+        self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
+        return [*best, *(one for _, one in new[LIKELIEST:])]
+
+    def singles(self) -> list[Explanation]:
+        """Refit causes that matter or come near the best score; all where none explains what it promised."""
+        bench, settings = self.bench, self.settings
+        linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
+        loading_only = "mounted" not in bench.facts.branch
+        near = candidates(bench.suspicion, settings, any_sign=loading_only)
+        found = list(self._each([*near, *sorted(linear - set(near))]))
+        best = max(found, key=lambda e: e.gain, default=None)
+        if best is None or best.gain < CONFIRMED * bench.largest**2 or (loading_only and not _foreseen(bench, best)):
+            # a base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit
+            tried = {*near, *linear}
+            found += self._each([k for k in range(len(bench.suspicion.causes)) if k not in tried])
+        return self.add(found)
+
+    def _each(self, causes: Sequence[int]) -> Iterator[Explanation]:
+        rival = np.inf
+        for cause in causes:
+            if not self.bench.suspicion.of(cause).size:
+                continue
+            one = refit_one(
+                self.bench.observation, self.bench.base, self.bench.suspicion, cause, self.settings, rival=rival
+            )
+            if one is not None and one.gain > 0.0:
+                rival = min(rival, one.fitted.chi2)
+                yield one
+
+    def pairs(self, best: Explanation | None, linear: list[Pair]) -> None:
+        """Refit pairs: of the linear search, and what scores beside the best single cause."""
+        bench, settings = self.bench, self.settings
+        self.effort = Effort.of(settings.search_newton_steps)
+        hopeless = bench.base.chi2 if best is None else best.fitted.chi2
+        found = refitted_pairs(bench, linear, settings, hopeless=hopeless, effort=self.effort)
+        if best is not None:
+            second = suspect(
+                bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
+            )
+            found += beside_best(bench, best, second, settings)
+        found = self.add(found)
+        self.add(list(self._pruned(found)))
+        if self.posterior.total(count=2) < PAIRS_MATTER and best is not None and len(best.fitted.extension.terms) == 1:
+            return
+        forms = with_all_forms(bench, found, settings)
+        new = [one for one in forms if one not in found]
+        new += in_any_form(bench, forms, settings, effort=self.effort)
+        new += (swapped := exchanged(bench, [*forms, *new], settings, self.effort))
+        new += in_any_form(bench, swapped, settings, rivals=[*forms, *new], effort=self.effort)
+        new = self.add(new)
+        self.add(list(self._pruned(new)))
+        self.curtailed |= self.effort.spent
+
+    def _pruned(self, pairs: Sequence[Explanation]) -> Iterator[Explanation]:
+        """Pairs without a member that they do not need, the rest fitted again where no single refit is as good."""
+        reached = {one.causes: one.found.fitted.chi2 for one in self.posterior.explanations(count=1) if one.found}
+        for pair in pairs:
+            weak = min(pair.causes, key=lambda k: pair.sigma(self.bench.suspicion.causes[k]))
+            kind, left = self.bench.suspicion.causes[weak], tuple(k for k in pair.causes if k != weak)
+            known = reached.get(left, np.inf) < pair.fitted.chi2 + NEEDED**2
+            if known or pair.sigma(kind) > NEEDED:
+                continue
+            extension, vector = pair.fitted.extension.without(pair.fitted.vector, pair.fitted.extension.terms_of(kind))
+            rest = fit_from(self.bench.observation, extension, vector, pair.fitted, self.settings)
+            if rest.run.prediction is not None and rest.chi2 < self.bench.base.chi2:
+                reached[left] = min(rest.chi2, reached.get(left, np.inf))
+                yield explanation_of(left, self.bench.base, rest)
+
+    def pairs_speak(self, best: Explanation | None, linear: list[Pair]) -> bool:
+        """Whether two causes, or something else, may explain more than the best single cause."""
+        bench, settings = self.bench, self.settings
+        for pair in linear[:1]:
+            own = weighed(self.grid, linear_fit(bench, pair)).own
+            causes = (int(bench.suspicion.owner[pair.first]), int(bench.suspicion.owner[pair.second]))
+            self.hypotheses.append(Hypothesis(causes, own.plain, own.rest))
+        if best is not None:
+            second = suspect(
+                bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
+            )
+            beside = weighed(self.grid.plain, best.fitted, second)
+            mine = next(one for one in self.hypotheses if one.found is best)
+            for cause, (plain, _) in beside.further.items():
+                if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
+                    lost = mine.plain - beside.own.plain
+                    self.hypotheses.append(Hypothesis((*best.causes, cause), plain + lost, self.hypotheses[0].rest))
+        believed = self.posterior
+        composed = best is not None and len(best.fitted.extension.terms) > 1
+        return composed or believed.total(count=2) + believed.total(something_else=True) > PAIRS_MATTER
+
+
+CONFIRMED = 0.5
+"""Share of a score's chi-square that its refit must remove: a score that no refit confirms is no finding."""
+
+PAIRS_MATTER = 0.02
+"""Probability of two causes, or of something else, from which pairs are refitted."""
+
+
+def linear_fit(bench: Workbench, pair: Pair) -> Fit:
+    """The linear model of the base with two further columns, as if it had been fitted with both amounts zero."""
+    base, columns = bench.base, bench.suspicion.columns[:, [pair.first, pair.second]]
+    terms = [bench.suspicion.terms[k] for k in (pair.first, pair.second)]
+    held = tuple(term._replace(variant=replace(term.variant, tuned=())) for term in terms)
+    extension = replace(base.extension, terms=(*base.extension.terms, *held))
+    return replace(
+        base, extension=extension, vector=np.r_[base.vector, 0.0, 0.0], jacobian=np.hstack([base.jacobian, columns])
+    )
+
+
+def _foreseen(bench: Workbench, found: Explanation) -> bool:
+    """Whether a score of admissible sign announced what a refit found, or it was found in another valley."""
+    announced = max(float(bench.suspicion.statistic[bench.suspicion.of(k)].max()) for k in found.causes)
+    return announced**2 >= CONFIRMED * min(found.gain, bench.limit**2)
+
+
+def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
+    """All hypotheses about a specimen that are worth it, weighed."""
+    search = Search(bench, settings)
+    linear = [pair for pair in linear_pairs(bench, settings) if pair.gain > bench.largest**2 + settings.masked_least]
+    first = search.posterior
+    silent = all(one.probability < MATTERS for one in first.believed if one.causes)
+    if silent and first.word == "base" and not linear and bench.largest < bench.limit:
+        return search
+    singles = search.singles()
+    believed = search.posterior.explanations(count=1)
+    best = believed[0].found if believed else max(singles, key=lambda e: e.gain, default=None)
+    if search.pairs_speak(best, linear):
+        search.pairs(best, linear or linear_pairs(bench, settings))
+    return search

@@ -1,0 +1,84 @@
+"""Displacements that scatter more than the log tells: what they do to a fit, and the test with their scatter in it.
+
+A bow rises with the square root of the travel, so photos tell the travel of a step to a micrometre, where a dial gauge
+or a spindle is read to ten. Taken as exact, a scatter of five micrometres is a misfit that no cause removes. It is one
+of the sizes that the error models of `pipeline.diagnosis.posterior.error_grid` integrate over; where it is likelier
+than none, the test is diagnosed again with displacements known to that scatter only, so that f_EI allows for it.
+
+Code: ``log/displacement-scatter``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fits.faults import Faults
+from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.records import Finding
+from pipeline.rounding import plain
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+Array = NDArray[np.float64]
+
+LEAST_STEPS = 4
+"""A line of displacements is a zero or a scale that is off and takes two; two more are the least that scatter."""
+
+
+def displacement_columns(observation: Observation, fitted: Fit) -> Array:
+    """Whitened sensitivities (N, k) of a fitted model to errors (m) of the displacements under load.
+
+    None (k = 0) with fewer than four of them, and where the model has such errors among its unknowns already.
+    """
+    base, facts = fitted.extension.base, fitted.extension.facts
+    at = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
+    none, count = np.zeros((len(fitted.residual), 0)), len(base.names) - 2
+    if len(at) < LEAST_STEPS or base.moved:
+        return none
+    loose = replace(base, moved=tuple(at), moved_std=np.ones(len(at)), moved_first=np.zeros(len(at)))
+    vector = np.r_[fitted.vector[:count], np.zeros(len(at)), fitted.vector[count:]]
+    made = evaluated(observation, replace(fitted.extension, base=loose), vector, fitted.run)
+    if made.run.prediction is None:
+        return none
+    columns = np.zeros((len(fitted.residual), len(at)))
+    columns[: observation.rows.count] = made.jacobian[: observation.rows.count, count : count + len(at)]
+    return columns
+
+
+def with_exact_displacements(
+    observation: Observation, exact: Fit, scattered: Fit, settings: DiagnosisSettings
+) -> Fit | None:
+    """A model fitted beside displacements that scatter, fitted to the same test with exact ones; None where it cannot.
+
+    ``exact`` is a fit of the base model with exact displacements.
+    """
+    known, given = exact.extension.base, scattered.extension.base
+    law, moved, first = given.characteristic(scattered.vector), len(given.moved), len(given.knots)
+    rest = np.delete(scattered.vector[first:], np.arange(moved) + len(given.names) - 2 - moved - first)
+    ordinates = np.log(np.maximum(law.f(known.knots), FLOOR * float(np.max(law.ordinates))) / known.stiffness)
+    extension = replace(scattered.extension, base=known, facts=exact.extension.facts)
+    found = fit_from(observation, extension, np.r_[ordinates, rest], exact, settings)
+    return None if found.run.prediction is None else found
+
+
+FLOOR = 0.02
+"""Share of the largest ordinate below which no law starts: beyond its own control points a spline may fall to zero."""
+
+
+def with_scatter(faults: Faults, std: float) -> Faults:
+    """The test with displacements under load known to ``std`` (m), or as badly as before, and a finding."""
+    steps = tuple(
+        step
+        if step.branch == "mounted" or step.displacement is None
+        else replace(step, displacement_std=max(std, step.displacement_std or 0.0))
+        for step in faults.test.steps
+    )
+    message = (
+        f"the displacements of the log scatter by about {plain(1e6 * std, 1)} um about what photos and forces say of "
+        "each step, more than the log tells; the diagnosis allowed for that"
+    )
+    finding = Finding("log/displacement-scatter", "warning", message)
+    return replace(faults, test=replace(faults.test, steps=steps), findings=(*faults.findings, finding))

@@ -1,0 +1,332 @@
+"""How wrong the data may be: a grid of error models, and the products that each of them makes of whitened rows.
+
+A fit whitens its rows by the noise that is likeliest beforehand. What is known less well is integrated over here:
+
+    slow      slow errors of a photo and errors of its bearing axes, times 0.3, 1 or 3
+    hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean
+    moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
+    shapes    something else in the shapes, a share of the length across the cable
+    forces    something else in the forces, a share of the largest
+
+"Something else" is what no cause makes, of one of these kinds, coefficients normal:
+
+    smooth    sum_k c_k sin(k pi s / L) / k^2, k to 12; over the steps sum_o t_o / (1 + o), t_o cosines of order o
+    rough     the same with 1 / k, at each step for itself, as the forces
+    pattern   one wave sin(k pi s / L), or one bump at a place, as large as it likes at each step
+
+In whitened rows the covariance is
+
+    C = 1 + (slow^2 - 1) E + shapes^2 D       in the photos (E: slow errors and axes),
+    C = 1 + hold^2 + forces^2 D'              for the means of the holds; what varies within a hold is as whitened,
+
+and displacements are further unknowns, known to ``moved``. Along the eigenvectors of D all other sizes cost a sum.
+Notation of the products: G grid points, o own columns, k added ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.observations.noise import by_axes
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.observations.prediction import Facts
+from rod.measurement import slow_covariance
+
+Array = NDArray[np.float64]
+Forms = Callable[[Array], Array]
+
+SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
+HOLD = {0.0: 0.7, 1.0: 0.3}
+MOVED = {0.0: 0.6, 1e-5: 0.3, 5e-5: 0.1}
+"""Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
+several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen."""
+
+SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
+"""Of the cable's length: from below what any photo shows to a bow that is another experiment."""
+
+FORCES = (0.0, *np.geomspace(1e-3, 0.3, 5))
+"""Of the largest force."""
+
+BENDS = 12
+"""Half waves along the cable: finer ones are no cable's at these weights."""
+
+PLACES, WIDTH = np.linspace(0.08, 0.92, 8), 0.06
+"""Of the length: middles of bumps and their standard deviation, so that neighbours overlap at half their height."""
+
+SEEN = 0.03
+"""Standard deviations: directions in which the largest something else adds less are left as they are."""
+
+
+class Spread(NamedTuple):
+    """Orthonormal directions ``turn`` (d, n) of rows along which something else adds the variances ``size`` (d,)."""
+
+    turn: Array
+    size: Array
+
+
+class Kind(NamedTuple):
+    """A kind of something else: ``shapes`` for the first of `SLOW`, ``holds``, and pairs of positions in the sizes."""
+
+    shapes: tuple[Spread, ...]
+    holds: Spread
+    pairs: NDArray[np.int_]
+    chance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Sums over whitened rows for every error model.
+
+    Attributes
+    ----------
+    own : (G, o, o)
+        ``M' C^-1 M`` of the own columns; prior knowledge and, last, the displacements in it.
+    cross : (G, o, k)
+        Of own and added columns.
+    square : (G, k)
+        Of each added column.
+    log_det : (G,)
+        Of C.
+    log_prior : (G,)
+        Probability of the error model, given whether there is something else.
+    rest : (G,) bool
+        Whether there is something else.
+    moved : (G,) m
+        Scatter of the displacements.
+    sizes : (G, 5)
+        Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, `SHAPES` and `FORCES`.
+    """
+
+    own: Array
+    cross: Array
+    square: Array
+    log_det: Array
+    log_prior: Array
+    rest: NDArray[np.bool_]
+    moved: Array
+    sizes: NDArray[np.int_]
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorGrid:
+    """All error models of a test.
+
+    Attributes
+    ----------
+    photos, forces : (n,) int
+        Rows.
+    roots : (slow, n, n)
+        Whitening of photo rows for each of `SLOW`.
+    log_det : (slow,)
+        Of the covariance that takes away.
+    kinds : tuple of Kind
+        The first has nothing else.
+    displacements : (N, m)
+        Whitened sensitivities to the displacements, per m.
+    """
+
+    photos: NDArray[np.int_]
+    forces: NDArray[np.int_]
+    roots: tuple[Array, ...]
+    log_det: Array
+    kinds: tuple[Kind, ...]
+    displacements: Array
+
+    @property
+    def plain(self) -> ErrorGrid:
+        """Without something else."""
+        return replace(self, kinds=self.kinds[:1])
+
+    def products(self, columns: Array, known: Array, added: Array) -> Products:
+        """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k)."""
+        whole = np.hstack([columns, self.displacements[: len(columns)], added])
+        extra, count = self.displacements.shape[1], added.shape[1]
+        own, force = columns.shape[1] + extra, whole[self.forces]
+        prior = np.zeros((own, own))
+        prior[: own - extra, : own - extra] = known.T @ known
+        fixed = _sums(force, own)
+        fixed[: own * own] += prior.ravel()
+        tables, log_det, log_prior, sizes = [], [], [], []
+        for slow, root, det, chance in zip(range(len(SLOW)), self.roots, self.log_det, SLOW.values(), strict=True):
+            photo = root @ whole[self.photos]
+            by_slow = fixed + _sums(photo, own)
+            for number, kind in enumerate(self.kinds):
+                if slow >= len(kind.shapes):
+                    continue
+                a, b = kind.pairs.T
+                shape, shape_det = _along(kind.shapes[slow], photo, np.zeros(1), np.array(SHAPES), own)
+                held, held_det = _along(kind.holds, force, np.array([*HOLD]), np.array(FORCES), own)
+                tables.append((held[:, b] + shape[:, a] + by_slow).reshape(-1, fixed.size))
+                log_det.append((held_det[:, b] + shape_det[:, a] + det).ravel())
+                share = (chance if len(kind.shapes) > 1 else 1.0) * kind.chance / len(a)
+                log_prior.append(np.repeat(np.log(np.array([*HOLD.values()]) * share), len(a)))
+                held_at = np.repeat(np.arange(len(HOLD)), len(a))
+                where = np.column_stack([held_at, np.tile(kind.pairs, (len(HOLD), 1))])
+                sizes.append(np.hstack([np.tile([slow, number], (len(where), 1)), where]))
+        table, positions = np.concatenate(tables), np.concatenate(sizes)
+        grid = len(table)
+        found = Products(
+            own=table[:, : own * own].reshape(grid, own, own),
+            cross=table[:, own * own : own * (own + count)].reshape(grid, own, count),
+            square=table[:, own * (own + count) :],
+            log_det=np.concatenate(log_det),
+            log_prior=np.concatenate(log_prior),
+            rest=positions[:, 1] > 0,
+            moved=np.zeros(grid),
+            sizes=positions,
+        )
+        return _with_displacements(found, extra) if extra else found
+
+    def something_else(self, position: NDArray[np.int_], rows: Array) -> Array:
+        """What is likeliest of whitened rows (N,) to be something else, as large as an error model (5,) says."""
+        slow, number, hold, shape, force = position
+        kind, found = self.kinds[number], np.zeros(len(rows))
+        own, held = kind.shapes[slow], kind.holds
+        in_photos = SHAPES[shape] ** 2 * own.size
+        along = in_photos / (1.0 + in_photos) * (own.turn @ (self.roots[slow] @ rows[self.photos]))
+        found[self.photos] = np.linalg.solve(self.roots[slow], own.turn.T @ along)
+        in_forces = FORCES[force] ** 2 * held.size
+        means = in_forces / (1.0 + [*HOLD][hold] ** 2 + in_forces) * (held.turn @ rows[self.forces])
+        found[self.forces] = held.turn.T @ means
+        return found
+
+
+def _along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -> tuple[Array, Array]:
+    """What other variances along some directions change: sums (c, a, T) and log-determinants (c, a)."""
+    wide = 1.0 + common[:, None, None] ** 2 + sizes[None, :, None] ** 2 * spread.size
+    turned = spread.turn @ rows
+    change = (1.0 / wide - 1.0).reshape(len(common) * len(sizes), len(spread.size))
+    found = np.array([_sums(turned, own, weight) for weight in change])
+    return found.reshape(*wide.shape[:-1], -1), np.log(wide).sum(axis=-1)
+
+
+def _sums(rows: Array, own: int, weight: Array | None = None) -> Array:
+    """Weighted sums (T,) over rows (n, c): own by own columns, own by added ones, added ones squared; flat."""
+    heavy = rows if weight is None else weight[:, None] * rows
+    both = rows[:, :own].T @ heavy
+    return np.concatenate(
+        [both[:, :own].ravel(), both[:, own:].ravel(), np.einsum("nk,nk->k", rows[:, own:], heavy[:, own:])]
+    )
+
+
+def _with_displacements(fixed: Products, extra: int) -> Products:
+    """The products with displacements that scatter by each of `MOVED`, in units of it."""
+    count = fixed.own.shape[1] - extra
+    known = np.diag(np.r_[np.zeros(count), np.ones(extra)])
+    scales = [np.r_[np.ones(count), np.full(extra, std)] for std in MOVED]
+    times = len(MOVED)
+    return Products(
+        own=np.concatenate([fixed.own * scale * scale[:, None] + known for scale in scales]),
+        cross=np.concatenate([fixed.cross * scale[:, None] for scale in scales]),
+        square=np.tile(fixed.square, (times, 1)),
+        log_det=np.tile(fixed.log_det, times),
+        log_prior=np.concatenate([fixed.log_prior + np.log(chance) for chance in MOVED.values()]),
+        rest=np.tile(fixed.rest, times),
+        moved=np.repeat([*MOVED], len(fixed.log_det)),
+        sizes=np.tile(fixed.sizes, (times, 1)),
+    )
+
+
+def error_grid(observation: Observation, facts: Facts, displacements: Array) -> ErrorGrid:
+    """The error models of an observation.
+
+    Parameters
+    ----------
+    observation : Observation
+    facts : Facts
+    displacements : (N, m)
+        Whitened sensitivities to displacements that may scatter, per m; ``m`` may be 0.
+    """
+    rows, count = observation.rows, len(facts.branch)
+    forces, photos = np.flatnonzero(rows.force), np.flatnonzero(~rows.force)
+    share, along = np.linalg.eigh(_slow_errors(observation, photos))
+    share = np.clip(share, 0.0, 1.0 - 1e-9)
+    wide = [1.0 + (slow**2 - 1.0) * share for slow in SLOW]
+    roots = tuple(along / np.sqrt(one) @ along.T for one in wide)
+    every = np.array([(a, b) for a in range(len(SHAPES)) for b in range(len(FORCES))])
+    none = Spread(np.zeros((0, len(photos))), np.zeros(0))
+    over_steps = (_smooth_over_steps(count), np.eye(count))
+    kinds = [Kind((none,) * len(SLOW), _of_holds(observation, facts, forces, over_steps[1]), every[:1], 1.0)]
+    for smooth, power in zip(over_steps, (2, 1), strict=True):
+        shown = _shown(observation, facts, photos, partial(_waves, power=power))
+        shapes = tuple(_of_photos(observation, photos, root, shown, smooth) for root in roots)
+        kinds.append(Kind(shapes, _of_holds(observation, facts, forces, smooth), every[1:], 1.0 / 3.0))
+    bumps = _shown(observation, facts, photos, lambda u: np.exp(-0.5 * (np.subtract.outer(u, PLACES) / WIDTH) ** 2))
+    waves_and_bumps = np.hstack([_shown(observation, facts, photos, partial(_waves, power=0)), bumps])
+    alone = every[(every[:, 1] == 0) & (every[:, 0] > 0)]
+    for pattern in waves_and_bumps.T:
+        spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
+        kinds.append(Kind((spread,), kinds[0].holds, alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
+    log_det = np.array([np.sum(np.log(one)) for one in wide])
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), displacements)
+
+
+def _waves(u: Array, *, power: int) -> Array:
+    """Half waves (n, k) at shares u (n,) of the length, weighed by a power of their number."""
+    order = np.arange(1, BENDS + 1)
+    return np.asarray(np.sin(np.pi * np.outer(u, order)) / order**power)
+
+
+def _smooth_over_steps(count: int) -> Array:
+    """Covariance (count, count) of what comes and goes smoothly over the steps, of mean variance 1."""
+    order, at = np.arange(count), np.pi * (np.arange(count) + 0.5) / count
+    waves = np.cos(np.outer(at, order)) / (1.0 + order)
+    covariance = waves @ waves.T
+    return np.asarray(covariance / np.mean(np.diag(covariance)))
+
+
+def _of_holds(observation: Observation, facts: Facts, forces: NDArray[np.int_], over_steps: Array) -> Spread:
+    """Means of the holds, and what an error of the largest force adds to each."""
+    held = [i for i in range(len(facts.branch)) if len(observation.forces[i])]
+    count = [len(observation.forces[i]) for i in held]
+    step = observation.rows.step[forces]
+    means = np.array([np.where(step == i, n**-0.5, 0.0) for i, n in zip(held, count, strict=True)])
+    shown = facts.force_scale * np.sqrt(count) / observation.force_std[held]
+    size, turn = np.linalg.eigh(np.outer(shown, shown) * over_steps[np.ix_(held, held)])
+    return Spread(turn.T @ means.reshape(len(held), len(forces)), np.maximum(size, 0.0))
+
+
+def _shown(observation: Observation, facts: Facts, photos: NDArray[np.int_], forms: Forms) -> Array:
+    """Whitened photo rows (n, j) of forms across the cable, each as large as the cable is long."""
+    step = observation.rows.step[photos]
+    parts = [np.zeros((0, 0))] * len(photos)
+    for photo in observation.photos:
+        own = facts.length * photo.whiten[:, 1:] @ forms(photo.sections.s / facts.length)
+        for k, row in zip(np.flatnonzero(step == photo.step), own, strict=True):
+            parts[k] = row
+    return np.array(parts).reshape(len(photos), -1)
+
+
+def _of_photos(
+    observation: Observation, photos: NDArray[np.int_], root: Array, shown: Array, over_steps: Array
+) -> Spread:
+    """Directions of photo rows, whitened by ``root``, along which forms ``shown`` (n, j) lie, and their variances."""
+    values, orders = np.linalg.eigh(over_steps)
+    at_step = (orders * np.sqrt(np.maximum(values, 0.0)))[observation.rows.step[photos]]
+    factor = (at_step[:, :, None] * shown[:, None, :]).reshape(len(photos), -1)
+    if observation.common is not None:
+        factor = observation.common.whitened(factor)
+    turn, size, _ = np.linalg.svd(root @ factor, full_matrices=False)
+    seen = size * SHAPES[-1] > SEEN
+    return Spread(turn.T[seen], size[seen] ** 2)
+
+
+def _slow_errors(observation: Observation, photos: NDArray[np.int_]) -> Array:
+    """Share (n, n) of the variance of whitened photo rows that slow errors and the bearing axes have."""
+    step, share = observation.rows.step[photos], np.zeros((len(photos), len(photos)))
+    for photo in observation.photos:
+        own = np.flatnonzero(step == photo.step)
+        sections, axes = photo.whiten[:, 1:], photo.whiten @ by_axes(photo.sections, photo.chord)
+        share[np.ix_(own, own)] = (
+            sections @ slow_covariance(photo.sections.s, photo.sections.slow) @ sections.T
+            + 0.5 * photo.stated_chord_std**2 * axes @ axes.T
+        )
+    if observation.common is None:
+        return share
+    return observation.common.whitened(observation.common.whitened(share).T)

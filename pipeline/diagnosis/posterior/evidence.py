@@ -1,0 +1,232 @@
+"""How probable the data are under a fitted model, and under that model with one more column: evidence of hypotheses.
+
+About a fit the model is linear: with whitened residual r, sensitivities J, rows of prior knowledge (r_p, J_p) and an
+error model C of `error_grid`, b = J' C^-1 r + J_p' r_p and H = J' C^-1 J + J_p' J_p,
+
+    log p = -1/2 (r' C^-1 r + r_p' r_p - b' H^-1 b) - 1/2 log|C| - 1/2 log|H| + (p / 2) log 2 pi,
+
+flat in all that has no prior row: law and K0, which all hypotheses share, and amounts. An amount has beforehand a
+normal distribution about zero, of a size s times the plausible one, s anywhere from 0.003 to 10. With its estimate a
+and variance S (flat, from H) that multiplies p by
+
+    mean over s of  N(a; 0, S + s^2 plausible^2) * 2 Phi(m / d)        m, d: mean and std of the amount given s,
+
+the second factor where its sign is known. A place or a width that is tuned has the variance of a uniform distribution
+over its range. Hypotheses that differ by a column c of the linear model alone follow from one H:
+
+    S = 1 / (c' C^-1 c - u' H^-1 u),   a = S (c' C^-1 r - u' H^-1 b),   u = J' C^-1 c.
+
+Source: MacKay (1992), Bayesian interpolation, eqs. 2.4 and 2.5; the size of an amount is integrated over, not chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp
+
+from pipeline.diagnosis.fits.extension import Term
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
+
+Array = NDArray[np.float64]
+
+SIZES = np.geomspace(0.003, 10.0, 8)
+"""Sizes s of an amount, in plausible ones: steps of a factor three, over which a normal density hardly changes."""
+
+ROUNDING, INVISIBLE = 1e-11, 1e-9
+"""Of the scale of an unknown, and of a column's square: what falls below is rounding."""
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+class Evidence(NamedTuple):
+    """Log probability of the data, by the model alone (``plain``) and with something else besides (``rest``).
+
+    ``moved``: probability that displacements scatter beyond the log, without something else, and by how much if so (m).
+    """
+
+    plain: float
+    rest: float
+    moved: tuple[float, float]
+
+
+class WithColumn(NamedTuple):
+    """The same (k,) for the fit with each of k further columns."""
+
+    plain: Array
+    rest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The fit's own unknowns for every error model (G, ...): inverse of H, H^-1 b, log p flat in the amounts."""
+
+    products: Products
+    inverse: Array
+    move: Array
+    flat: Array
+
+
+def evidence(
+    grid: ErrorGrid, fitted: Fit, terms: Sequence[Term] = (), columns: Array | None = None
+) -> tuple[Evidence, WithColumn]:
+    """Evidence of a fit, and of the fit with each of some further columns.
+
+    Parameters
+    ----------
+    grid : ErrorGrid
+    fitted : Fit
+    terms : (k,) of Term
+        What the columns are.
+    columns : (N, k) or None
+        Whitened traces per unit of amount.
+    """
+    count = len(fitted.residual)
+    more = np.zeros((count, 0)) if columns is None else columns
+    solved = _solved(grid, fitted, more)
+    own = solved.flat + _amounts(fitted, solved)
+    added = own[:, None] + _column_gain(fitted, terms, solved)
+    prior, rest = solved.products.log_prior, solved.products.rest
+    posterior = own + prior
+    plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
+    further = (_total(added[part] + prior[part, None]) for part in (~rest, rest))
+    moved = _moved(solved.products.moved[~rest], posterior[~rest])
+    return Evidence(float(plain), float(disturbed), moved), WithColumn(*further)
+
+
+def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
+    """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
+    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)))
+    weight = np.where(solved.products.rest, solved.flat + solved.products.log_prior, -np.inf)
+    best = int(np.argmax(weight))
+    size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
+    moved = grid.displacements[:data] @ (solved.products.moved[best] * solved.move[best, size:])
+    left = fitted.residual[:data] - fitted.jacobian[:data] @ solved.move[best, :size] - moved
+    return grid.something_else(solved.products.sizes[best], left)
+
+
+def _total(logs: Array) -> Array:
+    """Log of the sum over the error models (G, ...); minus infinity where a grid has none of a kind."""
+    return np.asarray(logsumexp(logs, axis=0) if len(logs) else np.full(logs.shape[1:], -np.inf))
+
+
+def _moved(scatter: Array, log_weight: Array) -> tuple[float, float]:
+    weight = np.exp(log_weight - logsumexp(log_weight))
+    chance = float(weight[scatter > 0.0].sum())
+    return chance, float(np.sqrt(weight @ scatter**2 / chance)) if chance > 0.0 else 0.0
+
+
+def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
+    """The fit's unknowns, columns in the order r, J, displacements."""
+    size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
+    value, jacobian = fitted.residual, fitted.jacobian
+    places, mid, std = _places(fitted)
+    first = len(value) - data
+    known = np.zeros((first + len(places), 1 + size))
+    known[:first] = np.column_stack([value[data:], jacobian[data:]])
+    for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=first):
+        known[row, [0, 1 + at]] = (middle - fitted.vector[at]) / width, 1.0 / width
+    products = grid.products(np.column_stack([value, jacobian])[:data], known, more[:data])
+    H, b = products.own[:, 1:, 1:], products.own[:, 1:, 0]
+    scale = np.sqrt(np.maximum(np.einsum("gii->gi", H), 1e-300))
+    root = np.linalg.cholesky(H / scale[:, :, None] / scale[:, None, :] + ROUNDING * np.eye(H.shape[1]))
+    half = np.linalg.inv(root) / scale[:, None, :]
+    inverse = np.swapaxes(half, 1, 2) @ half
+    move = np.einsum("gij,gj->gi", inverse, b)
+    log_det = 2.0 * (np.sum(np.log(np.einsum("gii->gi", root)), axis=1) + np.sum(np.log(scale), axis=1))
+    chi2 = products.own[:, 0, 0] - np.sum(b * move, axis=1)
+    amounts = sum(not np.isfinite(term.variant.known) for term in fitted.extension.terms)
+    # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
+    normal = 0.5 * amounts * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
+    flat = normal - 0.5 * (chi2 + products.log_det + log_det)
+    return _Solved(products, inverse, move, flat)
+
+
+def _places(fitted: Fit) -> tuple[list[int], list[float], list[float]]:
+    """Positions in the vector of places and widths that are tuned, the middle and the std of their range."""
+    at, mid, std = [], [], []
+    for first, term in zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True):
+        for j, name in enumerate(term.variant.tuned, start=first + 1):
+            low, high = term.variant.range(name)
+            at.append(j)
+            mid.append(0.5 * (low + high))
+            std.append((high - low) / np.sqrt(12.0))
+    return at, mid, std
+
+
+def _log_known(fitted: Fit) -> list[float]:
+    """Logarithms of the densities' heights of amounts that prior rows state already (waves along the cable)."""
+    facts = fitted.extension.facts
+    terms = [term for term in fitted.extension.terms if np.isfinite(term.variant.known)]
+    return [-float(np.log(term.variant.known * term.cause.plausible(facts))) for term in terms]
+
+
+def _amounts(fitted: Fit, solved: _Solved) -> Array:
+    """Log of the factor (G,) by which the prior of the fit's own amounts changes p."""
+    extension = fitted.extension
+    own = [
+        (at, term)
+        for at, term in zip(extension.amounts_at, extension.terms, strict=True)
+        if not np.isfinite(term.variant.known)
+    ]
+    total = np.zeros(len(solved.flat))
+    for cause in {term.cause.name: term.cause for _, term in own}.values():
+        at = [k for k, term in own if term.cause is cause]
+        value = fitted.vector[at] + solved.move[:, at]
+        covariance = solved.inverse[:, at, :][:, :, at]
+        total += _size_unknown(value, covariance, cause.plausible(extension.facts), cause.sign)
+    return total
+
+
+def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) -> Array:
+    """Log mean over s of N(value; 0, covariance + s^2 plausible^2), times 2 Phi for each amount of known sign.
+
+    Shapes: value (..., k), covariance (..., k, k).
+    """
+    sizes = (SIZES * plausible) ** 2
+    if value.shape[-1] == 1:
+        return _one_size_unknown(value, covariance[..., 0], sizes, sign)
+    wide = covariance[..., None, :, :] + sizes[:, None, None] * np.eye(value.shape[-1])
+    there = np.linalg.solve(wide, np.broadcast_to(value[..., None, :, None], (*wide.shape[:-1], 1)))[..., 0]
+    log = -0.5 * (np.sum(value[..., None, :] * there, axis=-1) + np.linalg.slogdet(2.0 * np.pi * wide)[1])
+    if sign:
+        mean = sizes[:, None] * there
+        # the variance of each given s: prior minus what the data take of it
+        left = sizes[:, None] * (1.0 - sizes[:, None] * np.einsum("...ii->...i", np.linalg.inv(wide)))
+        log = log + np.sum(np.log(2.0) + log_ndtr(sign * mean / np.sqrt(np.maximum(left, 1e-300))), axis=-1)
+    return np.asarray(logsumexp(log, axis=-1) - np.log(len(SIZES)))
+
+
+def _column_gain(fitted: Fit, terms: Sequence[Term], solved: _Solved) -> Array:
+    """Log of the factor (G, k) by which each further column changes p."""
+    u = solved.products.cross[:, 1:]
+    square, across = solved.products.square, np.sum(u * (solved.inverse @ u), axis=1)
+    precision = np.maximum(square - across, INVISIBLE * square + 1e-300)
+    score = solved.products.cross[:, 0] - np.einsum("gik,gi->gk", u, solved.move)
+    amount, facts = score / precision, fitted.extension.facts
+    gains = [
+        log_gain(amount[:, k], 1.0 / precision[:, k], term.cause.plausible(facts), term.cause.sign)
+        for k, term in enumerate(terms)
+    ]
+    return np.column_stack(gains) if gains else np.zeros(score.shape)
+
+
+def log_gain(amount: Array | float, variance: Array | float, plausible: float, sign: int) -> Array:
+    """Log of the factor (G,) by which a cause of a flat estimate and its variance (G,) changes p."""
+    value, wide = np.atleast_1d(amount)[:, None], np.atleast_1d(variance)[:, None]
+    flat = 0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
+    return np.asarray(flat[:, 0] + _one_size_unknown(value, wide, (SIZES * plausible) ** 2, sign))
+
+
+def _one_size_unknown(value: Array, variance: Array, sizes: Array, sign: int) -> Array:
+    """The same for a single amount: value and variance (..., 1)."""
+    wide = variance + sizes
+    log = -0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
+    if sign:
+        log = log + np.log(2.0) + log_ndtr(sign * value * np.sqrt(sizes / (wide * variance)))
+    return np.asarray(logsumexp(log, axis=-1) - np.log(len(SIZES)))

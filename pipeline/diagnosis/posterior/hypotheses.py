@@ -1,0 +1,128 @@
+"""What is believed: probabilities of all hypotheses about one specimen, each with and without something else besides.
+
+    hypothesis                      beforehand   what it says
+    base                            0.55         the simulation is right
+    one cause                       0.30         shared by all causes the data can show, and by the forms of each
+    two causes                      0.06         shared by all pairs
+    something else                  0.05         none of these: what no cause makes (see `error_grid`)
+    one cause and something else    0.03
+    two causes and something else   0.01
+
+The probability of each is that share times its evidence (`evidence`): at its own refit where it has one, else by the
+linear model about the base, the mean over the forms of the cause. Ten times another share changes few words: with base
+0.8 three more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
+
+What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes the
+smallest set that holds 95 % of their probability cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.posterior.explanation import Explanation
+
+SHARES = {0: (0.55, 0.05), 1: (0.30, 0.03), 2: (0.06, 0.01)}
+"""Probability beforehand by the number of causes, without and with something else."""
+
+LEVEL = 0.95
+"""Probability that a set of names holds."""
+
+
+class Hypothesis(NamedTuple):
+    """Causes (indices of the catalogue) with log evidence, ``plain`` and with something else; ``found``: the refit."""
+
+    causes: tuple[int, ...]
+    plain: float
+    rest: float
+    found: Explanation | None = None
+
+
+class Believed(NamedTuple):
+    """A hypothesis with its probability."""
+
+    causes: tuple[int, ...]
+    something_else: bool
+    probability: float
+    found: Explanation | None
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """All hypotheses, most probable first; probabilities sum to 1."""
+
+    believed: tuple[Believed, ...]
+
+    def total(self, *, count: int | None = None, something_else: bool | None = None) -> float:
+        """Probability of all with so many causes (any if None), with or without something else (either if None)."""
+        return sum(
+            one.probability
+            for one in self.believed
+            if count in (None, len(one.causes)) and something_else in (None, one.something_else)
+        )
+
+    @property
+    def word(self) -> Literal["base", "causes", "rest"]:
+        """What is likeliest."""
+        base, rest = self.total(count=0, something_else=False), self.total(something_else=True)
+        return max((("base", base), ("causes", 1.0 - base - rest), ("rest", rest)), key=lambda pair: pair[1])[0]  # type: ignore[return-value]
+
+    def of(self, cause: int) -> float:
+        """Probability of all that hold a cause and nothing else."""
+        return sum(one.probability for one in self.believed if cause in one.causes and not one.something_else)
+
+    def explanations(self, *, count: int | None = None) -> list[Believed]:
+        """Refitted causes without something else, most probable first; so many of them if asked."""
+        return [
+            one
+            for one in self.believed
+            if one.found is not None and not one.something_else and count in (None, len(one.causes))
+        ]
+
+    def credible(self) -> list[Believed]:
+        """The smallest set of causes, without something else, that holds 95 % of the probability of all these."""
+        named = [one for one in self.believed if one.causes and not one.something_else]
+        enough, whole, found = 0.0, sum(one.probability for one in named), []
+        for one in named:
+            found.append(one)
+            enough += one.probability
+            if enough >= LEVEL * whole:
+                break
+        return found
+
+
+def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Posterior:
+    """Probabilities of hypotheses; of several about the same causes the likeliest refit counts.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        With the base model, which has no causes.
+    causes : sequence of Cause
+        That share what is given to one cause, and to pairs, beforehand.
+    """
+    best: dict[frozenset[int], Hypothesis] = {}
+    for one in hypotheses:
+        key = frozenset(one.causes)
+        if key not in best or (one.found is not None, one.plain) > (best[key].found is not None, best[key].plain):
+            best[key] = one
+    many = max(len(causes), 1)
+    ways = {0: 1, 1: many, 2: max(many * (many - 1) // 2, 1)}
+    rows = []
+    for one in best.values():
+        for something_else, value in ((False, one.plain), (True, one.rest)):
+            share = SHARES[len(one.causes)][something_else] / ways[len(one.causes)]
+            rows.append((value + np.log(share), one, something_else))
+    top = max(value for value, *_ in rows)
+    weights = [float(np.exp(value - top)) for value, *_ in rows]
+    whole = sum(weights)
+    believed = [
+        Believed(one.causes, something_else, weight / whole, one.found)
+        for weight, (_, one, something_else) in zip(weights, rows, strict=True)
+    ]
+    return Posterior(tuple(sorted(believed, key=lambda one: -one.probability)))

@@ -1,0 +1,59 @@
+"""From fitted models to hypotheses: each refit weighed at its own fit, causes without one by the linear model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.observations.prediction import Facts
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.evidence import Evidence, evidence
+from pipeline.diagnosis.posterior.explanation import Explanation
+from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A fit and what the linear model says of each further cause beside it.
+
+    Attributes
+    ----------
+    own : Evidence
+    further : dict of cause -> (plain, rest)
+        Mean over the forms of the cause.
+    """
+
+    own: Evidence
+    further: dict[int, tuple[float, float]]
+
+
+def weighed(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion | None = None) -> Weighed:
+    """Evidence of a fit, and of every cause beside it that ``suspicion``, the scores about it, has forms of."""
+    if suspicion is None or not suspicion.terms:
+        return Weighed(evidence(grid, fitted)[0], {})
+    own, added = evidence(grid, fitted, suspicion.terms, suspicion.columns)
+    further = {}
+    for cause in range(len(suspicion.causes)):
+        forms = suspicion.of(cause)
+        if forms.size:
+            plain, rest = (float(logsumexp(values[forms]) - np.log(forms.size)) for values in added)
+            further[cause] = plain, rest
+    return Weighed(own, further)
+
+
+def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
+    """The hypothesis of a refit, its forms one choice of many each."""
+    own = evidence(grid, found.fitted)[0]
+    terms = (term for term in found.fitted.extension.terms if not np.isfinite(term.variant.known))
+    tried = sum(_kinds(term.cause, facts) for term in terms)
+    return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
+
+
+def _kinds(cause: Cause, facts: Facts) -> float:
+    """Log of the number of forms of a cause that differ by more than a place."""
+    return float(np.log(max(len({(form.label, form.setting) for form in cause.variants(facts)}), 1)))
