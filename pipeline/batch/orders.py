@@ -127,7 +127,8 @@ def code_version() -> str:
     """Version of the program: that of the distribution, and a digest of its source, so that a changed copy counts."""
     digest = hashlib.sha256()
     root = Path(__file__).resolve().parents[2]
-    for path in sorted((*(root / "rod").rglob("*.py"), *(root / "pipeline").rglob("*.py"))):
+    messages = (root / "pipeline" / "messages").glob("*.toml")
+    for path in sorted((*(root / "rod").rglob("*.py"), *(root / "pipeline").rglob("*.py"), *messages)):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:12]}"

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import chosen_language, language_option, settings_options
+from pipeline.cli.speech import entry, table, told
+from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.result import Curve, Result
@@ -28,11 +30,11 @@ def demo(
     ctx: click.Context,
     out: Path,
     seed: int,
-    language: str | None,
     settings_file: Path | None,
     assignments: tuple[str, ...],
 ) -> None:
     """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
+    from pipeline.assembly import headline
     from pipeline.batch import run_batch
     from pipeline.cli.configuration import as_options, read_settings
     from pipeline.cli.progress import progress
@@ -40,38 +42,29 @@ def demo(
     from pipeline.result import from_json
     from pipeline.simulate import demo_specimen
 
-    settings = read_settings(settings_file, (*assignments, *chosen_language(language)))
+    settings = read_settings(settings_file, (*assignments, *chosen_language()))
     specimen = out / "specimen" / f"demo-{seed}"
     specimen.mkdir(parents=True, exist_ok=True)
-    click.echo("simulating and photographing the specimen", err=True)
+    click.echo(told(Message("cli.simulating")), err=True)
     truth = demo_specimen(specimen, seed, truth_file=out / f"demo-{seed}.truth.json").truth
-    click.echo("measuring it", err=True)
+    click.echo(told(Message("cli.measuring")), err=True)
     results = out / "results"
     with progress(1) as show:
-        tally = run_batch(
-            [specimen], results, settings, options=as_options(settings_file, assignments), on_outcome=show
-        )
+        options = as_options(settings_file, assignments)
+        tally = run_batch([specimen], results, settings, options=options, on_outcome=show.ended, on_stage=show.doing)
     if tally.measured:
         (name,) = tally.names
         result = from_json((results / name / "result.json").read_text(encoding="utf-8"))
         echo_comparison(result, truth)
-        click.echo(f"\n{result.headline}\n{results / name / 'report.html'}")
+        click.echo(f"\n{entry('', told(headline(result)))}\n{results / name / 'report.html'}")
     ctx.exit(exit_code(tally))
 
 
 def echo_comparison(result: Result, truth: dict[str, Any]) -> None:
     """Print f_EI, K0 and forces, measured and true, with standard deviations and the difference in these."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=SIMPLE_HEAD)
-    for heading in ("quantity", "measured", "truth", "off by"):
-        table.add_column(heading, justify="left" if heading == "quantity" else "right")
-    for label, value, std, true in compared(result, truth):
-        table.add_row(Text(label), *_shown(value, std, true))
-    Console(width=100).print(table)
+    heads = [told(Message(f"cli.demo-{name}")) for name in ("quantity", "measured", "truth", "off")]
+    rows = [(label, *_shown(value, std, true)) for label, value, std, true in compared(result, truth)]
+    click.echo("\n".join(table([heads, *rows])))
 
 
 def compared(result: Result, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
@@ -113,4 +106,4 @@ def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
 
     text = rounded(value, std)
     places = len(text.partition(" ")[0].partition(".")[2])
-    return text, fixed(true, places), f"{fixed((value - true) / std, 1)} std" if std > 0.0 else ""
+    return text, fixed(true, places), f"{fixed((value - true) / std, 1)} σ" if std > 0.0 else ""

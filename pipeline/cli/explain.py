@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pipeline.cli.options import language_option
+from pipeline.cli.speech import language
 
 if TYPE_CHECKING:
     from pipeline.report.words import Words
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 @click.command(short_help="What a cause or a message is and what to do.")
 @click.argument("name", required=False)
 @language_option
-def explain(name: str | None, language: str | None) -> None:
+def explain(name: str | None) -> None:
     """Explain a cause of deviations, or the code of a message.
 
     NAME is a cause such as bearing_friction, or the code that stands beside a message, such as photo/blur. Without NAME
@@ -25,7 +26,7 @@ def explain(name: str | None, language: str | None) -> None:
     from pipeline.diagnosis.causes import CATALOGUE
     from pipeline.report.words import Words, documented_codes
 
-    words = Words(language or "en")
+    words = Words(language())
     causes, codes = ("pre_curvature", *(cause.name for cause in CATALOGUE)), tuple(documented_codes())
     if name is None:
         for cause in causes:

@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
+from pipeline.cli.speech import LANGUAGE
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
@@ -28,14 +30,23 @@ def settings_options(command: Command) -> Command:
 
 
 def language_option(command: Command) -> Command:
-    """Add ``--language``, as ``language``; it is the setting ``report.language`` under a name one remembers."""
+    """Add ``--language``: the language of what the command says, kept where `speech` finds it."""
     return click.option(
         "--language",
         type=click.Choice(["de", "en"]),
-        help="Language of reports, index and explanations; all else in the terminal is English. English by default.",
+        expose_value=False,
+        is_eager=True,
+        callback=_keep,
+        help="Language of reports and messages; English by default. This help is English.",
     )(command)
 
 
-def chosen_language(language: str | None) -> tuple[str, ...]:
-    """The option as an assignment of a setting. It changes no result, so it is no part of the command in one."""
-    return () if language is None else (f"report.language={language}",)
+def _keep(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        context.meta[LANGUAGE] = value
+
+
+def chosen_language() -> tuple[str, ...]:
+    """The language as an assignment of a setting. It changes no result, so it is no part of the command in one."""
+    chosen = click.get_current_context().meta.get(LANGUAGE)
+    return () if chosen is None else (f"report.language={chosen}",)

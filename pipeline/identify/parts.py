@@ -192,7 +192,7 @@ def agreement_part(found: Identification) -> AgreementPart:
         level=agreement.level,
         range_per_m=agreement.range_per_m,
         pre_curvature=sources,
-        hints=list(agreement.hints),
+        hints=list(map(str, agreement.hints)),
     )
 
 

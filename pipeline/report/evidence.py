@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.curves import seen_range
@@ -177,7 +178,8 @@ def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[
 
 def _reason(photo: PhotoPart, words: Words) -> str:
     """Why a photo was not used, without its name, which stands beside it."""
-    return words.said((photo.reason or "").removeprefix(f"{photo.image}: ")).text
+    missing = Message("photo/missing.part") if photo.status == "missing" else None
+    return words.said(missing or (photo.reason or "").removeprefix(f"{photo.image}: ")).text
 
 
 def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
