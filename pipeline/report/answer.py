@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
@@ -132,9 +133,9 @@ def _sentence(result: Result, words: Words) -> str:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
     fault = leading(result.findings)
-    lead = f"{words.said(fault.said).sentence.rstrip('.')}. " if fault is not None else ""
+    lead = f"{words.said(_brief(fault.said)).sentence.rstrip('.')}. " if fault is not None else ""
     if not told.usable:
-        lead = f"{words('answer_unusable', id=name, reason=str(words.said(told.said)).rstrip('.'))} "
+        lead = f"{words('answer_unusable', id=name, reason=str(words.said(_brief(told.said))).rstrip('.'))} "
     unit = stiffness_unit(result, words)
     (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
     beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
@@ -148,6 +149,12 @@ def _sentence(result: Result, words: Words) -> str:
     )
     rest = _together(words.measured(curve.pre_curvature, curve.pre_curvature_std))
     return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
+
+
+def _brief(said: Message | str) -> Message | str:
+    """What is wrong without the figures that show it: they stand with the finding."""
+    reading = said.values.get("reading") if isinstance(said, Message) else None
+    return reading if isinstance(reading, Message) else said
 
 
 def _together(quantity: str) -> str:

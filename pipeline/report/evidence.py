@@ -173,13 +173,13 @@ def map_rms(residuals: ResidualMap, words: Words) -> str:
 
 def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[PhotoView]:
     """All photos in the order of the test."""
-    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(result.photos)]
+    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(maps.photos_of_answer(result))]
 
 
 def _reason(photo: PhotoPart, words: Words) -> str:
     """Why a photo was not used, without its name, which stands beside it."""
-    missing = Message("photo/missing.part") if photo.status == "missing" else None
-    return words.said(missing or (photo.reason or "").removeprefix(f"{photo.image}: ")).text
+    reason, missing = (photo.reason or "").removeprefix(f"{photo.image}: "), Message("photo/missing.part")
+    return words.said(missing if reason == str(missing) else reason).text
 
 
 def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
