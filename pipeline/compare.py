@@ -15,7 +15,8 @@ Curvature in 1/m, f in N m^2; ratios are f_B / f_A, above one where B is stiffer
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,16 +84,16 @@ class Comparison:
     methods: tuple[str, str]
     verdict: str
     said: Message
-    range_per_m: tuple[float, float] | None
-    kappa_per_m: Array
-    ratio: Array
-    ratio_std: Array
-    rms_relative: float | None
-    max_relative: float | None
-    mean_stiffness: Difference | None
-    p_characteristic: float | None
-    pre_curvature: Difference | None
     level: float
+    range_per_m: tuple[float, float] | None = None
+    kappa_per_m: Array = field(default_factory=lambda: np.empty(0))
+    ratio: Array = field(default_factory=lambda: np.empty(0))
+    ratio_std: Array = field(default_factory=lambda: np.empty(0))
+    rms_relative: float | None = None
+    max_relative: float | None = None
+    mean_stiffness: Difference | None = None
+    p_characteristic: float | None = None
+    pre_curvature: Difference | None = None
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -116,21 +117,23 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     """
     settings = settings or CompareSettings()
     one, two = a.answer.curve, b.answer.curve
+    names = (a.specimen.id, b.specimen.id)
+    nothing = partial(Comparison, *names, verdict="not comparable", level=settings.level)
     if one is None or two is None:
         lacking = [r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None]
-        return _not_comparable(a, b, ("", ""), Message("comparison.no-curve", names=lacking), settings)
+        return nothing(methods=("", ""), said=Message("comparison.no-curve", names=lacking))
     methods = (one.method, two.method)
     unusable = [r for r in (a, b) if not r.answer.usable]
     faults = [Message("comparison.unusable", name=r.specimen.id, reason=as_message(r.answer.said)) for r in unusable]
     negative = [r.specimen.id for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
     faults += [Message("comparison.not-positive", name=name) for name in negative]
     if faults:
-        return _not_comparable(a, b, methods, Message("headline.sentences", sentences=faults), settings)
+        return nothing(methods=methods, said=Message("headline.sentences", sentences=faults))
     first, second = _log_curve(one), _log_curve(two)
     grid = first.common_grid(second)
     if grid is None:
         ranges = [Message("comparison.range", low_per_m=c.kappa[0], high_per_m=c.kappa[-1]) for c in (one, two)]
-        return _not_comparable(a, b, methods, Message("comparison.no-range", ranges=ranges), settings)
+        return nothing(methods=methods, said=Message("comparison.no-range", ranges=ranges))
     ratio = np.exp(second.log_on(grid) - first.log_on(grid))
     bands = first.onto(grid) @ first.log_covariance @ first.onto(grid).T
     bands += second.onto(grid) @ second.log_covariance @ second.onto(grid).T
@@ -140,13 +143,12 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     apart = float(np.hypot(one.pre_curvature_std, two.pre_curvature_std))
     rest = _difference(one.pre_curvature, two.pre_curvature, apart)
     mean = _mean(first, second, grid, bands)
-    verdict = _verdict(a, b, Tested(p, rest, mean), ratio, settings)
+    verdict, said = _verdict(names, p, rest, mean, ratio, settings)
     return Comparison(
-        a=a.specimen.id,
-        b=b.specimen.id,
+        *names,
         methods=methods,
-        verdict=verdict.name,
-        said=verdict.said,
+        verdict=verdict,
+        said=said,
         range_per_m=(float(grid[0]), float(grid[-1])),
         kappa_per_m=grid,
         ratio=ratio,
@@ -181,68 +183,22 @@ def _difference(a: float, b: float, std: float) -> Difference:
     return Difference(a, b, b - a, std, float(2.0 * ndtr(-float(z))))
 
 
-@dataclass(frozen=True)
-class Tested:
-    """What two results were compared by: p of their whole curves (None where that is not known), K0, mean stiffness."""
-
-    p_characteristic: float | None
-    rest: Difference
-    mean: Difference
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Verdict, and in plain words why."""
-
-    name: str
-    said: Message
-
-
 def _verdict(
-    a: Result,
-    b: Result,
-    tested: Tested,
-    ratio: Array,
-    settings: CompareSettings,
-) -> Verdict:
-    """Verdict and statement in plain words."""
-    p, rest, mean = tested.p_characteristic, tested.rest, tested.mean
+    names: tuple[str, str], p: float | None, rest: Difference, mean: Difference, ratio: Array, settings: CompareSettings
+) -> tuple[str, Message]:
+    """Verdict and statement, by the p of the whole curves (None where it is not known), K0 and the mean stiffness."""
     sizes = {"rms": np.sqrt(np.mean((ratio - 1.0) ** 2)), "most": np.max(np.abs(ratio - 1.0))}
     if p is None:
-        return Verdict("not comparable", Message("comparison.no-covariance", **sizes))
-    names = {"a": a.specimen.id, "b": b.specimen.id}
+        return "not comparable", Message("comparison.no-covariance", **sizes)
     seen = []
     if min(1.0, TESTS * p) < settings.level:
-        seen.append(Message("comparison.curve", p=p, stiffer=names["b" if mean.difference > 0.0 else "a"]))
+        seen.append(Message("comparison.curve", p=p, stiffer=names[mean.difference > 0.0]))
     if min(1.0, TESTS * rest.p_value) < settings.level:
         seen.append(Message("comparison.rest", by_per_m=(rest.difference, rest.std), p=rest.p_value))
     if seen:
-        return Verdict("differ", Message("comparison.differ", seen=seen, **names, **sizes))
+        return "differ", Message("comparison.differ", seen=seen, a=names[0], b=names[1], **sizes)
     least = 2.0 * mean.std / mean.a
-    return Verdict("no difference seen", Message("comparison.alike", p=p, least=least, **names, **sizes))
-
-
-def _not_comparable(
-    a: Result, b: Result, methods: tuple[str, str], said: Message, settings: CompareSettings
-) -> Comparison:
-    none = np.empty(0)
-    return Comparison(
-        a=a.specimen.id,
-        b=b.specimen.id,
-        methods=methods,
-        verdict="not comparable",
-        said=said,
-        range_per_m=None,
-        kappa_per_m=none,
-        ratio=none,
-        ratio_std=none,
-        rms_relative=None,
-        max_relative=None,
-        mean_stiffness=None,
-        p_characteristic=None,
-        pre_curvature=None,
-        level=settings.level,
-    )
+    return "no difference seen", Message("comparison.alike", p=p, least=least, a=names[0], b=names[1], **sizes)
 
 
 def _findings(

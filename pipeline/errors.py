@@ -6,7 +6,9 @@ nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a 
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from pipeline.messages import Message, free_text, printable, shortened
 
@@ -41,7 +43,8 @@ class InputError(Exception):
         self.said = free_text(f"{shortened(said)}; {shortened(remedy)}") if isinstance(said, str) else said
         self.message, self.remedy = (said, remedy) if isinstance(said, str) else (said.parts()[0], said.parts()[-1])
         self.path, self.line, self.code = path, line, code or self.said.code
-        self._given = (said, path, line, code, remedy)
+        self._said = said
+        self._given: dict[str, Any] = {"path": path, "line": line, "code": code, "remedy": remedy}
         super().__init__(self.sentence)
 
     @property
@@ -58,8 +61,4 @@ class InputError(Exception):
         return printable(str(self.placed))
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
-        return (_rebuild, self._given)
-
-
-def _rebuild(said: Message | str, path: Path | str | None, line: int | None, code: str, remedy: str) -> InputError:
-    return InputError(said, path=path, line=line, code=code, remedy=remedy)
+        return partial(InputError, **self._given), (self._said,)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.run import found, nothing_found
 from pipeline.cli.speech import say, told
 from pipeline.messages import Message
@@ -32,14 +32,10 @@ def check(
     folders: tuple[Path, ...],
     timeout: float | None,
     as_json: bool,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
-    from pipeline.cli.configuration import read_settings
-
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
-    settings = read_settings(settings_file, (*assignments, *limit))
+    settings = chosen_settings(*limit)
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))
@@ -80,17 +76,11 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
         told = (*specimen.findings, *look_at_photos(specimen, settings.vision))
     except Exception as error:  # one folder never costs the others
         return _failed(folder, refusal(error))
-    findings = [f.document for f in dict.fromkeys(told)]
-    levels = {finding["level"] for finding in findings}
-    return {
-        "folder": str(folder),
-        "id": specimen.id,
-        "status": "error" if "error" in levels else "warning" if "warning" in levels else "ok",
-        "runs": True,
-        "steps": len(specimen.steps),
-        "photos": len(specimen.images),
-        "findings": findings,
-    }
+    levels = {finding.level for finding in told}
+    status = "error" if "error" in levels else "warning" if "warning" in levels else "ok"
+    findings = [finding.document for finding in dict.fromkeys(told)]
+    counts = {"steps": len(specimen.steps), "photos": len(specimen.images)}
+    return {"folder": str(folder), "id": specimen.id, "status": status, "runs": True, **counts, "findings": findings}
 
 
 def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any]:
@@ -103,15 +93,8 @@ def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any
 
 
 def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
-    return {
-        "folder": str(folder),
-        "id": None,
-        "status": "error",
-        "runs": False,
-        "steps": 0,
-        "photos": 0,
-        "findings": [told.model_dump()],
-    }
+    row = {"folder": str(folder), "id": None, "status": "error", "runs": False, "steps": 0, "photos": 0}
+    return row | {"findings": [told.model_dump()]}
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:

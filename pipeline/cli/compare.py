@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pipeline.cli.options import language_option, settings_options
+from pipeline.cli.options import chosen_settings, language_option, settings_options
 from pipeline.cli.predict import echo_findings
 from pipeline.cli.speech import entry, say, told
 
@@ -32,8 +32,6 @@ def compare(
     b: Path,
     as_json: bool,
     out: Path | None,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Say whether the results A and B differ beyond their bands.
 
@@ -42,11 +40,10 @@ def compare(
 
     Exit codes: 0 compared, whatever came out; 3 not comparable.
     """
-    from pipeline.cli.configuration import read_settings
     from pipeline.compare import compare as compared
     from pipeline.result import read_result
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     comparison = compared(read_result(a), read_result(b), settings=settings.compare)
     if out is not None:
         from pipeline.report.frames import comparison_frame

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import chosen_language, language_option, settings_options
+from pipeline.cli.options import chosen_options, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, table, told
 from pipeline.messages import Message
 
@@ -30,19 +30,16 @@ def demo(
     ctx: click.Context,
     out: Path,
     seed: int,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
     from pipeline.assembly import headline
     from pipeline.batch import run_batch
-    from pipeline.cli.configuration import as_options, read_settings
     from pipeline.cli.progress import progress
     from pipeline.cli.run import exit_code
     from pipeline.result import from_json
     from pipeline.simulate import demo_specimen
 
-    settings = read_settings(settings_file, (*assignments, *chosen_language()))
+    settings = chosen_settings()
     specimen = out / "specimen" / f"demo-{seed}"
     specimen.mkdir(parents=True, exist_ok=True)
     click.echo(told(Message("cli.simulating")), err=True)
@@ -50,7 +47,7 @@ def demo(
     click.echo(told(Message("cli.measuring")), err=True)
     results = out / "results"
     with progress(1) as show:
-        options = as_options(settings_file, assignments)
+        options = chosen_options()
         tally = run_batch([specimen], results, settings, options=options, on_outcome=show.ended, on_stage=show.doing)
     if tally.measured:
         (name,) = tally.names

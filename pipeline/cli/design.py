@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import columns, entry, language, say, table, told
 from pipeline.messages import Message, free_text
 
@@ -55,16 +54,13 @@ def design(
     steps: int,
     step_mm: float,
     as_json: bool,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
     **plan: Any,
 ) -> None:
     """Say what a planned test will know of f_EI, which causes it would show, and which stay invisible."""
-    from pipeline.cli.configuration import read_settings
     from pipeline.diagnosis.plans.design import Plan
     from pipeline.diagnosis.plans.design import design as outlook
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     try:
         planned = Plan(
             length=length_mm * 1e-3,

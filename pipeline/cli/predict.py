@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, note, say, told
 from pipeline.messages import Message, as_message
 
@@ -56,8 +56,6 @@ def predict(
     extrapolate: bool,
     as_json: bool,
     out: Path | None,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Predict forces and shapes of a new experiment by the model identified in RESULT.
 
@@ -67,11 +65,10 @@ def predict(
 
     Exit codes: 0 all steps predicted; 1 some were refused; 3 nothing could be predicted.
     """
-    from pipeline.cli.configuration import read_settings
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     measured = read_result(result)
     name, answer = measured.specimen.id, measured.answer
     if answer.method is not None and not answer.usable:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from pipeline.cli.options import chosen_language, language_option, settings_options
+from pipeline.cli.options import chosen_settings, language_option, settings_options
 from pipeline.cli.speech import refuse, told
 from pipeline.errors import InputError
 from pipeline.messages import Message
@@ -17,12 +17,11 @@ from pipeline.messages import Message
 @language_option
 @settings_options
 @click.pass_context
-def report(ctx: click.Context, out: Path, settings_file: Path | None, assignments: tuple[str, ...]) -> None:
+def report(ctx: click.Context, out: Path) -> None:
     """Draw everything in the results folder OUT again without measuring, for instance with `--language de`."""
     from pipeline.batch import redraw
-    from pipeline.cli.configuration import read_settings
 
-    settings = read_settings(settings_file, (*assignments, *chosen_language()))
+    settings = chosen_settings()
     drawn = 0
     for name, trouble in redraw(out, settings):
         drawn += trouble is None

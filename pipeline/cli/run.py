@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_language, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, note, refuse, say, told
 from pipeline.errors import InputError
 from pipeline.messages import UNREADABLE, Message
@@ -43,8 +43,6 @@ def run(
     timeout: float | None,
     no_reports: bool,
     as_json: bool,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Measure specimens and write their reports.
 
@@ -52,13 +50,12 @@ def run(
     program is kept, so the same command resumes an interrupted run.
     """
     from pipeline.batch import Store, run_batch
-    from pipeline.cli.configuration import as_options, read_settings
     from pipeline.cli.progress import progress
 
     given = {"batch.workers": workers, "batch.timeout_s": timeout, "batch.reports": "false" if no_reports else None}
     limits = [f"{name}={value}" for name, value in given.items() if value is not None]
-    options = as_options(settings_file, assignments)
-    settings = read_settings(settings_file, (*assignments, *limits, *chosen_language()))
+    options = chosen_options()
+    settings = chosen_settings(*limits)
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))

@@ -108,7 +108,10 @@ def test_repeat_specimens_are_pooled_by_type(full_result, tmp_path):
     ]
     page = write_index(repeats, tmp_path)[0].read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert page.count("<figcaption>") == 1
-    assert "3 specimens, bent to 2.00 to 8.70 1/m by all. They may all be the same cable: f_EI and K0 scatter" in page
+    assert (
+        "3 specimens, bent to 2.00 to 8.70 1/m by all. They may all be the same cable: the scatter of f_EI and K0 "
+        in page
+    )
     assert '<td>f_EI</td><td>K0</td></tr><tr><th scope="row">mean</th><td>13.2' in page
 
 
@@ -117,7 +120,9 @@ def test_repeats_that_are_not_one_cable_are_told_and_the_farthest_is_named(full_
     inverse = full_result.inverse.model_copy(update={"pre_curvature_per_m": other})
     turned = named(full_result, "turned", "B").model_copy(update={"inverse": inverse, "answer_": None})
     page = write_index([*(named(full_result, str(i), "B") for i in range(3)), turned], tmp_path)[0].read_text("utf-8")
-    assert "They are not all the same cable: K0 scatter" in page and "Farthest off for its band is turned." in page
+    assert (
+        "They are not all the same cable: the scatter of K0 " in page and "Farthest off for its band is turned." in page
+    )
 
 
 def test_german_index(batch, tmp_path):
