@@ -1,4 +1,4 @@
-"""A whole batch: orders out, outcomes in, log and index written, interrupts survived."""
+"""A whole batch: specimens are handed out, results collected, log and index written; an interrupt loses nothing."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
 
 
 def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
-    """Write the index over everything stored; a folder that takes no more files is a trouble of the tally."""
+    """Write the index over everything stored; a folder that takes no more files is told."""
     try:
         told: tuple[Message | str, ...] = tuple(stages.write_index(store.out, settings) or ())
     except OSError as error:
@@ -159,7 +159,7 @@ class _LogFile(logging.FileHandler):
     """A log on a disk that may be full."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Lose the line: the default prints a traceback for every one."""
+        """Leave the line out: the default prints a traceback for each."""
 
 
 @contextmanager

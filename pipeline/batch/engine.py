@@ -60,7 +60,7 @@ def measure_all(
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Ctrl-C and SIGTERM as an event, a second one as ever.
+    """Note Ctrl-C and SIGTERM as an event; a second one ends the program as usual.
 
     Raised wherever this thread happens to be, KeyboardInterrupt is lost where that is a finalizer of a library, and the
     batch would run on; so it is noted, and raised between two outcomes.

@@ -100,7 +100,7 @@ def _key(name: tuple[str, ...]) -> str:
 
 
 def _digested(name: str, folder: Path) -> str:
-    """The begin of a name, and a digest of the path that it does not tell whole."""
+    """The beginning of a name, and a digest of the whole path."""
     digest = hashlib.sha256(os.fsencode(folder.absolute())).hexdigest()[:DIGITS]
     begin = name.encode()[: LONGEST_NAME - DIGITS - 2].decode(errors="ignore")
     return f"{begin}--{digest}"

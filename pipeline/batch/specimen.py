@@ -269,7 +269,7 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
 
 
 def store_death(order: Order, told: str, started: float) -> Outcome:
-    """Store a specimen whose worker ended without an outcome, and not by its fault as far as its notes tell."""
+    """Store a specimen whose worker ended without an outcome, as far as its notes tell not by its own fault."""
     return store_failure(order, FindingPart.of("error", Message("specimen/worker-died.told", told=told)), started)
 
 

@@ -169,7 +169,7 @@ class Store:
         return self._work("attempts") / f"{name}.overdue"
 
     def end(self, name: str) -> None:
-        """Forget the attempts of a specimen that came to an end."""
+        """Remove the notes of attempts at a specimen that came to an end."""
         (self._work("attempts") / name).unlink(missing_ok=True)
         self.overdue(name).unlink(missing_ok=True)
 

@@ -98,7 +98,7 @@ def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:
-    """A line a specimen, below it a line for each thing that was inferred or is wrong, never broken into columns."""
+    """Print a line a specimen, and below it a line for each thing that was inferred or is wrong."""
     from pipeline.result import FindingPart
 
     colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}

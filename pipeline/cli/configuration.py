@@ -1,4 +1,4 @@
-"""Settings from a TOML file and from ``--set section.key=value``; unknown names are answered with the nearest one."""
+"""Settings from a TOML file and from ``--set section.key=value``; an unknown name is told with a near one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cablebend demo``: a specimen with known truth, measured as any other, and laid beside its truth."""
+"""``cablebend demo``: a simulated specimen is measured as any other and compared with its truth."""
 
 from __future__ import annotations
 

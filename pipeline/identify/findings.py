@@ -36,14 +36,10 @@ def _outcomes(found: Identification) -> Iterator[Finding]:
         open_ = [free_text(text) for text in found.inverse.invisible]
         key = "way.inverse-open" if open_ else "way.inverse"
         said = Message(key, outcome=free_text(inverse.value), open=open_)
-        yield Finding(f"identify/inverse-{_code(inverse.name)}", level, said)
+        yield Finding(f"identify/inverse-{inverse.name.lower().replace('_', '-')}", level, said)
     if graph is not BalanceOutcome.MEASURED:
         said = Message("way.balance", outcome=free_text(graph.value))
-        yield Finding(f"identify/balance-{_code(graph.name)}", "warning", said)
-
-
-def _code(name: str) -> str:
-    return name.lower().replace("_", "-")
+        yield Finding(f"identify/balance-{graph.name.lower().replace('_', '-')}", "warning", said)
 
 
 def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:

@@ -65,7 +65,7 @@ def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:
     except OSError as error:
         raise unreadable(path, error) from error
     if len(data) > limit:
-        raise _too_large(path, len(data), limit, setting)
+        raise InputError(Message("file/too-large", bytes=len(data), limit=limit, setting=setting), path=path)
     return data
 
 
@@ -78,7 +78,7 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise InputError(Message("file/not-a-file"), path=path)
     if status.st_size > limit:
-        raise _too_large(path, status.st_size, limit, setting)
+        raise InputError(Message("file/too-large", bytes=status.st_size, limit=limit, setting=setting), path=path)
 
 
 def read_begin(path: Path, count: int) -> bytes:
@@ -122,7 +122,3 @@ def outside(path: Path, name: str, line_of: Callable[[], int | None] | None = No
 def unreadable(path: Path, error: OSError) -> InputError:
     """The error for a file the operating system does not hand over."""
     return InputError(Message("file/unreadable", why=(error.strerror or type(error).__name__).lower()), path=path)
-
-
-def _too_large(path: Path, size: int, limit: int, setting: str) -> InputError:
-    return InputError(Message("file/too-large", bytes=size, limit=limit, setting=setting), path=path)

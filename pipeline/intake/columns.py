@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.intake.dialect import SEPARATORS, Row, Rows, column_names, head_rows, looks_like_number
+from pipeline.intake.dialect import SEPARATORS, Rows, column_names, head_rows, looks_like_number
 from pipeline.intake.specimenfile import MEASURED, ROLES, LogSpec
 from pipeline.messages import Message
 from pipeline.settings.intake import IntakeSettings
@@ -111,17 +111,13 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
                 best = found, row, separator
     if best is None:
         rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
-        raise _no_header(rows, path)
+        # the columns may stand apart by what is no separator here
+        apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
+        told = Message("log/no-header.apart" if apart else "log/no-header", first=column_names(rows))
+        raise InputError(told, path=path, line=rows[0][0])
     _, row, separator = best
     whole = Rows.of(text, separator)
     return _columns(whole, row, spec, path), whole
-
-
-def _no_header(rows: list[Row], path: Path) -> InputError:
-    """The error for a log without known names; its columns may stand apart by what is no separator here."""
-    apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
-    key = "log/no-header.apart" if apart else "log/no-header"
-    return InputError(Message(key, first=column_names(rows)), path=path, line=rows[0][0])
 
 
 def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:

@@ -252,7 +252,7 @@ def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
 
 
 def _check_count(runs: Sequence[Run], path: Path, settings: IntakeSettings) -> None:
-    """Refuse a log of more steps than anybody holds: a ramp without holds, or a step column that counts the rows."""
+    """Refuse a log of too many steps: a ramp without holds, or a step column that counts the rows."""
     if len(runs) > settings.steps_max:
         raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
 
@@ -268,7 +268,7 @@ def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
 
 
 def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[int]:
-    """Rows whose force no cable could have: a slipped digit, a word of the transmission lost.
+    """Rows whose force no cable could have: a slipped digit, a damaged transmission.
 
     Only where the other samples of the hold agree that it is wrong, which takes four of them.
     """
@@ -292,7 +292,7 @@ def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> It
 
 
 def _place_findings(places: HoldPlaces, tolerance: float, name: str) -> Iterator[Finding]:
-    """A displacement that scatters by more than holds are told apart by."""
+    """A displacement that scatters by more than the difference that makes a new hold."""
     if places.sigma > tolerance:
         largest = max(std for std in places.std if std is not None)
         yield inferred("log/displacement-noise", file=name, scatter_m=places.sigma, std_m=largest)

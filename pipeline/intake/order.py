@@ -1,4 +1,4 @@
-"""Do the steps of a force log follow each other as those of a bending test do? Doubled, missing, on the wrong way."""
+"""Whether the steps of a force log follow each other as in a bending test: none doubled, missing or going back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does the size of things fit? Units off by a thousand show before anything is measured.
+"""Whether lengths, forces and scale fit together: a unit wrong by a thousand shows before anything is measured.
 
 The check of the force: a bent cable between pins pushes with about its buckling load, so ``P L^2 / pi^2`` estimates EI
 (Euler), and divided by ``I = pi d^4 / 64`` of a full round section a modulus that hardly any cable leaves: rubber alone

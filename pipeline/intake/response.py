@@ -1,4 +1,4 @@
-"""Does the load cell answer to the bending? A force that is the same at every step is none of the cable's.
+"""Whether the load cell responds to the bending: a force that is the same at every step is not that of a cable.
 
 A mounted cable is free of force and a bent one pushes with about its buckling load. Without a mounted step the force
 still changes: by half the travel over the length where the law is straight (elastica, for small bows), more where it is

@@ -148,7 +148,7 @@ def _losses(
 
 
 def _last_digit(places: int) -> float:
-    """Value of the last of so many decimals; a zero may be written with any power of ten."""
+    """Value of one unit in the last of so many decimals."""
     return float(10.0 ** -min(max(places, -300), 300))
 
 

@@ -22,7 +22,7 @@ BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most o
 def from_mounted(
     displacements: Array, mounted: NDArray[np.bool_], name: str, *, travel: float
 ) -> tuple[Array, list[Finding]]:
-    """Displacements counted from the mounted cable where the log counts from the end of a machine's own way.
+    """Displacements counted from the mounted cable where the log counts from the end stop of the machine.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
 
 
 def _split(rows: Rows, columns: Columns) -> tuple[Table, int]:
-    """All rows that do not repeat one above the table, and the first that has more cells than the header."""
+    """All rows but repeated headers, and the first row that has more cells than the header."""
     head = [cells for _, cells in map(rows.__getitem__, range(columns.first_row))]
     again = {tuple(cells) for cells in head if len(cells) >= columns.width}
     places, surplus = array("q"), len(rows)

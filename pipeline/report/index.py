@@ -63,7 +63,7 @@ def write_index(
 
 
 def index_rows(results: Iterable[Result] | Path, out: Path, settings: ReportSettings) -> list[IndexRow]:
-    """Rows of all results, those that cannot be specimens of their type as not usable; parameters as `write_index`."""
+    """Rows of all results; those whose stiffness cannot be that of their type are not usable; see `write_index`."""
     if isinstance(results, str | Path):
         rows = (_row_of(Path(results), name, out, settings) for name in result_folders(Path(results)))
     else:
@@ -115,7 +115,7 @@ def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> Ind
 
 
 def _as_entered(path: Path, entered: float) -> bool:
-    """Whether a ``result.json`` is, by its time, its beginning and its end, the one an entry tells of."""
+    """Whether a ``result.json`` is still the one of ``entry.json``, by its time, its beginning and its end."""
     with path.open("rb") as file:
         status = os.fstat(file.fileno())
         head = file.read(HEAD)

@@ -137,7 +137,7 @@ THIRTYFOLD = 30.0
 
 
 def outlying(stiffness: Array) -> NDArray[np.bool_]:
-    """Which of repeat specimens (n,) have a stiffness that most of the others leave a factor of thirty away.
+    """Which of repeat specimens (n,) are a factor of thirty or more away in stiffness from most of the others.
 
     A specimen is believed if more than half of all, itself included, lie within that factor: of two that are further
     apart neither is.

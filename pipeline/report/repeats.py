@@ -1,4 +1,4 @@
-"""Repeat specimens of one cable type on the index: which of them cannot be, and whether the rest are one cable.
+"""Repeat specimens of one cable type on the index: which must be wrong, and whether the others may be the same cable.
 
 Only specimens that are usable are pooled. A specimen whose stiffness is a thirtieth or thirty times that of most others
 of its type is not: that is a wrong unit of the force, which no specimen shows on its own if its cable is soft.
@@ -55,7 +55,7 @@ def by_type(rows: list[IndexRow]) -> list[tuple[str, list[tuple[int, RowCurve]]]
 
 
 def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
-    """The rows, those that cannot be specimens of their type as not usable."""
+    """The rows; a specimen whose stiffness cannot be that of its type is marked as not usable."""
     judged = list(rows)
     for name, group in by_type(rows):
         means = np.array([float(np.mean(curve.tangent)) for _, curve in group])

@@ -156,7 +156,7 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
 
 
 def _thinned(curve: Visited, points: int) -> RowCurve:
-    """The curve on so many points."""
+    """The curve interpolated to so many points."""
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
     columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
     return RowCurve(

@@ -119,7 +119,7 @@ def _best(result: Result) -> Visited | None:
 
 
 def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The finding that comes before every number: with data at fault the numbers may be wrong, however well they fit.
+    """The fault of the data that is told before every number; None without one: faulty data may fit very well.
 
     An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
     refused for stands where its numbers would be, and an error of the program is none of the data.
@@ -200,7 +200,7 @@ def _moving_apart(result: Result) -> Message | None:
 
 
 def _negative(curve: Visited | None) -> Message | None:
-    """A cable that helps to bend itself."""
+    """The stiffness comes out negative: the cable would help to bend itself."""
     return None if curve is None or float(np.mean(curve.tangent)) > 0.0 else Message("fault.negative")
 
 
