@@ -212,6 +212,22 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
             "in length_mm umbenennen oder entfernen.",
         ),
         (
+            Message("log/not-a-number", role="force", cell="'1.2.3'", sign="point"),
+            "Kraft '1.2.3' ist keine Zahl (Zahlen dieser Datei haben als Dezimalzeichen: Punkt); "
+            "die Zelle berichtigen oder die Zeile entfernen",
+        ),
+        (
+            Message(
+                "log/branch-inferred",
+                file="log.csv",
+                counts=[
+                    Message("log/branch-inferred.count", count=count, branch=branch)
+                    for branch, count in (("mounted", 1), ("loading", 5), ("unloading", 4))
+                ],
+            ),
+            "log.csv: Äste nach der Reihenfolge der Verschiebungen: 1 eingelegt, 5 Belastung, 4 Entlastung",
+        ),
+        (
             Message("log/force-std", file="force.csv", share=0.005, std_N=0.002),
             "force.csv: keine wiederholten Messwerte; als Standardabweichung einer Kraft gilt 0,5 % der größten Kraft, "
             "2\u00a0mN",
