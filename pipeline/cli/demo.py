@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from pipeline.cli.speech import entry, table, told
 from pipeline.messages import Message
 
 if TYPE_CHECKING:
-    from pipeline.result import Curve, Result
+    from pipeline.result import Result, Visited
 
 COMPARED = 5  # places along the visited range at which f_EI is laid beside the truth
 
@@ -66,35 +67,26 @@ def echo_comparison(result: Result, truth: dict[str, Any]) -> None:
 
 def compared(result: Result, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
     """Label, measured value, standard deviation and truth of everything the demo knows."""
-    rows: list[tuple[str, float, float, float]] = []
-    inverse, balance = result.inverse, result.balance
-    ways = {"inverse": inverse.curve if inverse else None, "balance": balance.curve if balance else None}
-    for way, curve in ways.items():
-        if curve is not None:
-            rows += _stiffness(way, curve, truth)
-    for way, part in (("inverse", inverse), ("balance", balance)):
-        if part is not None and part.pre_curvature_per_m is not None and part.pre_curvature_std_per_m is not None:
-            rows.append((f"K0, {way} [1/m]", part.pre_curvature_per_m, part.pre_curvature_std_per_m, truth["K0"]))
+    from pipeline.result import curves
+
+    ways = [way for way in curves(result).values() if way.method != "extended"]
+    rows = [row for way in ways for row in _stiffness(way, truth)]
+    rows += [(f"K0, {way.method} [1/m]", way.pre_curvature, way.pre_curvature_std, truth["K0"]) for way in ways]
     for step, true in zip(result.steps, truth["steps"], strict=True):
-        at = f"{step.displacement_m * 1e3:.2f} mm"
-        rows.append((f"force, {at} [N]", step.force_N, step.force_std_N, true["F"]))
+        rows.append((f"force, {1e3 * step.displacement_m:.2f} mm [N]", step.force_N, step.force_std_N, true["F"]))
     return rows
 
 
-def _stiffness(way: str, curve: Curve, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
+def _stiffness(way: Visited, truth: dict[str, Any]) -> Iterator[tuple[str, float, float, float]]:
     """f_EI (tangent) at a few curvatures of the visited range."""
     import numpy as np
 
-    seen = np.flatnonzero(curve.supported)
     law = truth["law"]
-    rows = []
-    for place in np.unique(np.linspace(0, len(seen) - 1, COMPARED).round().astype(int)):
-        at = int(seen[place])
-        kappa = curve.kappa_per_m[at]
+    for at in np.unique(np.linspace(0, way.kappa.size - 1, COMPARED).round().astype(int)):
+        kappa = way.kappa[at]
         true = float(np.interp(kappa - truth["K0"], law["excess_per_m"], law["tangent_Nm2"]))
-        label = f"f_EI({kappa:.2f} 1/m), {way} [mN m²]"
-        rows.append((label, 1e3 * curve.tangent_Nm2[at], 1e3 * curve.tangent_std_Nm2[at], 1e3 * true))
-    return rows
+        label = f"f_EI({kappa:.2f} 1/m), {way.method} [mN m²]"
+        yield label, 1e3 * float(way.tangent[at]), 1e3 * float(way.tangent_std[at]), 1e3 * true
 
 
 def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
