@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from pipeline.batch.store import write_entry
+from pipeline.messages import Message
 from pipeline.report.index import write_index
 from pipeline.report.row import as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
@@ -254,3 +255,10 @@ def test_of_two_that_contradict_each_other_neither_is_believed(full_result, tmp_
     assert not pd.read_csv(write_index(pair, tmp_path)[1]).usable.any()
     pair = [named(full_result, "a", "B"), scaled(named(full_result, "b", "B"), 20.0)]
     assert pd.read_csv(write_index(pair, tmp_path)[1]).usable.all()
+
+
+def test_a_reason_is_no_formula_in_the_summary(failed_result, tmp_path):
+    hostile = Message("error.file", path="=cmd|' /C calc'!A0", said=Message("log/empty"))
+    failed = failed_result.model_copy(update={"findings": [FindingPart.of("error", hostile, code="log/empty")]})
+    summary = write_index([failed], tmp_path)[1].read_text(encoding="utf-8")
+    assert "'=cmd|' /C calc'!A0: is empty; export the forces again." in summary
