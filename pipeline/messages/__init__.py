@@ -83,7 +83,7 @@ class Message:
     def parts(self, language: str = "en", free: Callable[[str], str] = str) -> tuple[str, ...]:
         """What is wrong and, where the catalogue has it, what to do."""
         if self.key == "text":
-            return (free(self.values["text"]),)
+            return (free(str(self.values["text"])),)
         return tuple(_Gaps(language, free).vformat(text, (), self.values) for text in catalogue(language)[self.key])
 
     def stored(self) -> dict[str, Any]:
