@@ -21,6 +21,7 @@ import numpy as np
 from pipeline import __version__
 from pipeline.identify import Identification, IdentificationParts, identification_parts
 from pipeline.identify.parts import PhotoResidual
+from pipeline.messages import Message, as_message, free_text
 from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces
 from pipeline.result import (
     DiagnosisPart,
@@ -32,7 +33,6 @@ from pipeline.result import (
     SpecimenPart,
     leading,
 )
-from pipeline.rounding import plain, rounded
 from pipeline.settings import Settings
 
 PROGRAM = "cablebend"
@@ -104,7 +104,7 @@ def assemble(
         findings=_gathered(specimen, traces, parts, list(findings)),
         provenance=provenance(specimen, settings, command),
     )
-    return result.model_copy(update={"answer_": result.answer.stored(), "headline": headline(result)})
+    return result.model_copy(update={"answer_": result.answer.stored(), "headline": str(headline(result))})
 
 
 def _gathered(
@@ -118,7 +118,7 @@ def _gathered(
         *parts.findings,
     ]
     found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
-    return [FindingPart(code=f.code, level=f.level, message=f.message) for f in found]
+    return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 
 
 def _specimen_part(specimen: Specimen) -> SpecimenPart:
@@ -132,10 +132,7 @@ def _specimen_part(specimen: Specimen) -> SpecimenPart:
     )
 
 
-WAYS = {"inverse": "inverse problem", "balance": "balance equations", "extended": "extended model"}
-
-
-def headline(result: Result) -> str:
+def headline(result: Result) -> Message:
     """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
 
     Where no photo could be used, why the first was not. A fault of the data comes before all that.
@@ -143,24 +140,22 @@ def headline(result: Result) -> str:
     answer, agreement, diagnosis = result.answer, result.agreement, result.diagnosis
     curve = answer.curve
     if curve is None and result.photos and all(photo.reason for photo in result.photos):
-        return f"None of the {len(result.photos)} photos could be used. The first: {result.photos[0].reason}"
+        reason = free_text(result.photos[0].reason or "")
+        return Message("headline.no-photo", count=len(result.photos), reason=reason)
     if curve is None:
-        advice = result.inverse.advice if result.inverse else answer.reason
-        return f"No characteristic was measured: {advice}."
-    low, high = (
-        f"{rounded(1e3 * f, 1e3 * std)} mN m² at {plain(kappa, zeros=True)} 1/m" for kappa, f, std in curve.ends()
-    )
+        advice = free_text(result.inverse.advice) if result.inverse else answer.said
+        return Message("headline.none", advice=advice)
+    low, high = (Message("headline.end", value_Nm2=(f, std), at_per_m=kappa) for kappa, f, std in curve.ends())
     fault = leading(result.findings)
-    said = fault.message if fault else "" if answer.usable else answer.reason
-    lead = f"{said[:1].upper()}{said[1:].rstrip('.')}. " if said else ""
-    rest = rounded(curve.pre_curvature, curve.pre_curvature_std)
-    told = f"By the {WAYS[curve.method]}, f_EI (tangent) goes from {low} to {high}; pre-curvature {rest} 1/m"
+    said = fault.said if fault else None if answer.usable else answer.said
+    values = {"low": low, "high": high, "K0_per_m": (curve.pre_curvature, curve.pre_curvature_std)}
+    parts = [Message("headline.range", method=curve.method, **values)]
     if agreement is not None and agreement.compatible is not None and agreement.rms_relative is not None:
-        share = f"{plain(100 * agreement.rms_relative, 2)} % rms"
-        told += f"; both ways {'agree' if agreement.compatible else 'disagree beyond their bands'} ({share})"
-    if diagnosis is not None:
-        told += f". {diagnosis.headline}"
-    return lead + (told if told.endswith(".") else f"{told}.")
+        key = "headline.agree" if agreement.compatible else "headline.disagree"
+        parts.append(Message(key, rms=agreement.rms_relative))
+    lead = [] if said is None else [as_message(said)]
+    rest = [] if diagnosis is None else [free_text(diagnosis.headline)]
+    return Message("headline.sentences", sentences=[*lead, Message("headline.whole", parts=parts), *rest])
 
 
 def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:
@@ -177,7 +172,8 @@ def photo_findings(photo: Centerline | Rejected) -> tuple[Finding, ...]:
     """What was noticed on a photo; of a rejected one, that it is and why."""
     if isinstance(photo, Centerline):
         return tuple(photo.findings)
-    return (Finding(photo.code, "warning", f"{photo.image}: {photo.reason.removeprefix(f'{photo.image}: ')}"),)
+    reason = free_text(photo.reason.removeprefix(f"{photo.image}: "))
+    return (Finding(photo.code, "warning", Message("photos.one", image=photo.image, said=reason)),)
 
 
 def folded(noticed: Iterable[tuple[str, Finding]]) -> list[Finding]:
@@ -195,10 +191,9 @@ def _said_once(group: list[tuple[str, Finding]]) -> Finding:
     if len(names) == 1:
         return first
     told = {finding.message.removeprefix(f"{own}: ") for own, finding in group}
-    message, listed = first.message.removeprefix(f"{image}: "), ", ".join(names)
-    if len(told) > 1:  # the numbers are those of one photo
-        return Finding(first.code, first.level, f"{len(names)} photos ({listed}), on {image}: {message}")
-    return Finding(first.code, first.level, f"{len(names)} photos ({listed}): {message}")
+    key = "photos.several-on" if len(told) > 1 else "photos.several"  # the numbers are those of one photo
+    said = free_text(first.message.removeprefix(f"{image}: "))
+    return Finding(first.code, first.level, Message(key, count=len(names), names=names, image=image, said=said))
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
@@ -227,7 +222,7 @@ def without_those_told_better(earlier: Iterable[Finding], diagnosed: Iterable[Fi
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
     image = str(step.image)
     if photo is None:
-        reason = "the photo named in the force log is not in the folder"
+        reason = str(Message("photo/missing.part"))
         return PhotoPart(image=image, step=step.step, status="missing", reason=reason, code="photo/missing")
     if isinstance(photo, Rejected):
         return PhotoPart(

@@ -15,17 +15,17 @@ Curvature in 1/m, f in N m^2; ratios are f_B / f_A, above one where B is stiffer
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
-from pipeline.records import Finding
+from pipeline.messages import Message, as_message, free_text
+from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import Result, Visited, leading
-from pipeline.rounding import p_value as p_text
-from pipeline.rounding import plain, rounded
 from pipeline.settings.compare import CompareSettings
 
 Array = NDArray[np.float64]
@@ -60,8 +60,8 @@ class Comparison:
     methods : (str, str)
         Way that each answers with.
     verdict : {"differ", "no difference seen", "not comparable"}
-    statement : str
-        In plain words.
+    said : Message
+        The outcome in plain words; `statement` in English.
     range_per_m : (low, high) or None
         Curvatures that both visited.
     kappa_per_m, ratio, ratio_std : (n,)
@@ -83,18 +83,23 @@ class Comparison:
     b: str
     methods: tuple[str, str]
     verdict: str
-    statement: str
-    range_per_m: tuple[float, float] | None
-    kappa_per_m: Array
-    ratio: Array
-    ratio_std: Array
-    rms_relative: float | None
-    max_relative: float | None
-    mean_stiffness: Difference | None
-    p_characteristic: float | None
-    pre_curvature: Difference | None
+    said: Message
     level: float
+    range_per_m: tuple[float, float] | None = None
+    kappa_per_m: Array = field(default_factory=lambda: np.empty(0))
+    ratio: Array = field(default_factory=lambda: np.empty(0))
+    ratio_std: Array = field(default_factory=lambda: np.empty(0))
+    rms_relative: float | None = None
+    max_relative: float | None = None
+    mean_stiffness: Difference | None = None
+    p_characteristic: float | None = None
+    pre_curvature: Difference | None = None
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def statement(self) -> str:
+        """The outcome in plain words."""
+        return str(self.said)
 
 
 def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) -> Comparison:
@@ -112,19 +117,23 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     """
     settings = settings or CompareSettings()
     one, two = a.answer.curve, b.answer.curve
+    names = (a.specimen.id, b.specimen.id)
+    nothing = partial(Comparison, *names, verdict="not comparable", level=settings.level)
     if one is None or two is None:
-        lacking = " and ".join(r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None)
-        return _not_comparable(a, b, ("", ""), f"No characteristic was measured on {lacking}.", settings)
+        lacking = [r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None]
+        return nothing(methods=("", ""), said=Message("comparison.no-curve", names=lacking))
     methods = (one.method, two.method)
-    faults = [f"{r.specimen.id} is not usable: {r.answer.reason.rstrip('.')}." for r in (a, b) if not r.answer.usable]
-    faults += [f"f_EI of {r.specimen.id} is not positive." for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
+    unusable = [r for r in (a, b) if not r.answer.usable]
+    faults = [Message("comparison.unusable", name=r.specimen.id, reason=as_message(r.answer.said)) for r in unusable]
+    negative = [r.specimen.id for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
+    faults += [Message("comparison.not-positive", name=name) for name in negative]
     if faults:
-        return _not_comparable(a, b, methods, " ".join(faults), settings)
+        return nothing(methods=methods, said=Message("headline.sentences", sentences=faults))
     first, second = _log_curve(one), _log_curve(two)
     grid = first.common_grid(second)
     if grid is None:
-        ranges = " and ".join(f"{c.kappa[0]:.3g} to {c.kappa[-1]:.3g} 1/m" for c in (one, two))
-        return _not_comparable(a, b, methods, f"No curvature was visited by both ({ranges}).", settings)
+        ranges = [Message("comparison.range", low_per_m=c.kappa[0], high_per_m=c.kappa[-1]) for c in (one, two)]
+        return nothing(methods=methods, said=Message("comparison.no-range", ranges=ranges))
     ratio = np.exp(second.log_on(grid) - first.log_on(grid))
     bands = first.onto(grid) @ first.log_covariance @ first.onto(grid).T
     bands += second.onto(grid) @ second.log_covariance @ second.onto(grid).T
@@ -134,13 +143,12 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     apart = float(np.hypot(one.pre_curvature_std, two.pre_curvature_std))
     rest = _difference(one.pre_curvature, two.pre_curvature, apart)
     mean = _mean(first, second, grid, bands)
-    verdict = _verdict(a, b, Tested(p, rest, mean), ratio, settings)
+    verdict, said = _verdict(names, p, rest, mean, ratio, settings)
     return Comparison(
-        a=a.specimen.id,
-        b=b.specimen.id,
+        *names,
         methods=methods,
-        verdict=verdict.name,
-        statement=verdict.statement,
+        verdict=verdict,
+        said=said,
         range_per_m=(float(grid[0]), float(grid[-1])),
         kappa_per_m=grid,
         ratio=ratio,
@@ -175,75 +183,22 @@ def _difference(a: float, b: float, std: float) -> Difference:
     return Difference(a, b, b - a, std, float(2.0 * ndtr(-float(z))))
 
 
-@dataclass(frozen=True)
-class Tested:
-    """What two results were compared by: p of their whole curves (None where that is not known), K0, mean stiffness."""
-
-    p_characteristic: float | None
-    rest: Difference
-    mean: Difference
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Verdict, and the statement in plain words that says why."""
-
-    name: str
-    statement: str
-
-
 def _verdict(
-    a: Result,
-    b: Result,
-    tested: Tested,
-    ratio: Array,
-    settings: CompareSettings,
-) -> Verdict:
-    """Verdict and statement in plain words."""
-    p, rest, mean = tested.p_characteristic, tested.rest, tested.mean
-    names = f"{a.specimen.id} and {b.specimen.id}"
-    rms, most = np.sqrt(np.mean((ratio - 1.0) ** 2)), np.max(np.abs(ratio - 1.0))
-    size = f"f_EI differs by {plain(100 * rms, 2)} % rms, {plain(100 * most, 2)} % at most"
+    names: tuple[str, str], p: float | None, rest: Difference, mean: Difference, ratio: Array, settings: CompareSettings
+) -> tuple[str, Message]:
+    """Verdict and statement, by the p of the whole curves (None where it is not known), K0 and the mean stiffness."""
+    sizes = {"rms": np.sqrt(np.mean((ratio - 1.0) ** 2)), "most": np.max(np.abs(ratio - 1.0))}
     if p is None:
-        return Verdict(
-            "not comparable", f"{size}, but a result holds no covariance along its curve: it cannot be tested."
-        )
-    bent = min(1.0, TESTS * p) < settings.level
-    set_off = min(1.0, TESTS * rest.p_value) < settings.level
-    stiffer = b.specimen.id if mean.difference > 0.0 else a.specimen.id
+        return "not comparable", Message("comparison.no-covariance", **sizes)
     seen = []
-    if bent:
-        seen.append(f"the bending stiffness characteristic ({p_text(p)}; {stiffer} is stiffer on the mean)")
-    if set_off:
-        seen.append(f"the pre-curvature (by {rounded(rest.difference, rest.std)} 1/m, {p_text(rest.p_value)})")
+    if min(1.0, TESTS * p) < settings.level:
+        seen.append(Message("comparison.curve", p=p, stiffer=names[mean.difference > 0.0]))
+    if min(1.0, TESTS * rest.p_value) < settings.level:
+        seen.append(Message("comparison.rest", by_per_m=(rest.difference, rest.std), p=rest.p_value))
     if seen:
-        return Verdict("differ", f"{names} differ beyond their bands in {' and in '.join(seen)}. {size}.")
-    found = f"{size}, which is within both bands ({p_text(p)})"
-    seen_from = f"a mean difference of {plain(200 * mean.std / mean.a, 2)} % is twice its standard deviation"
-    return Verdict("no difference seen", f"{names} do not differ beyond their bands: {found}; {seen_from}.")
-
-
-def _not_comparable(
-    a: Result, b: Result, methods: tuple[str, str], statement: str, settings: CompareSettings
-) -> Comparison:
-    none = np.empty(0)
-    return Comparison(
-        a=a.specimen.id,
-        b=b.specimen.id,
-        methods=methods,
-        verdict="not comparable",
-        statement=statement,
-        range_per_m=None,
-        kappa_per_m=none,
-        ratio=none,
-        ratio_std=none,
-        rms_relative=None,
-        max_relative=None,
-        mean_stiffness=None,
-        p_characteristic=None,
-        pre_curvature=None,
-        level=settings.level,
-    )
+        return "differ", Message("comparison.differ", seen=seen, a=names[0], b=names[1], **sizes)
+    least = 2.0 * mean.std / mean.a
+    return "no difference seen", Message("comparison.alike", p=p, least=least, a=names[0], b=names[1], **sizes)
 
 
 def _findings(
@@ -253,28 +208,22 @@ def _findings(
     yield from _scale_findings(a, b, mean)
     lengths = [r.specimen.length_m for r in (a, b) if r.specimen.length_m is not None]
     if len(lengths) == len(curves) and max(lengths) > (1.0 + settings.length_relative) * min(lengths):
-        message = (
-            f"The cables were measured with lengths of {1e3 * lengths[0]:.4g} and {1e3 * lengths[1]:.4g} mm: what "
-            "belongs to the ends (covers, friction, springs) weighs differently, and passes for a difference."
-        )
-        yield Finding("compare/length", "warning", message)
+        yield doubtful("compare/length", lengths_m=[Message("length", value_m=length) for length in lengths])
     spans = [float(c.kappa[-1] - c.kappa[0]) for c in curves]
     common = min(float(c.kappa[-1]) for c in curves) - max(float(c.kappa[0]) for c in curves)
     if common < settings.least_overlap * max(spans):
-        message = f"Only {100 * common / max(spans):.0f} % of the larger visited range was visited by both."
-        yield Finding("compare/range", "warning", message)
+        yield doubtful("compare/range", share=common / max(spans))
     if curves[0].method != curves[1].method:
-        message = f"One answers with the {curves[0].method} curve, the other with the {curves[1].method} one."
-        yield Finding("compare/method", "warning", message)
+        yield doubtful("compare/method", a=curves[0].method, b=curves[1].method)
     for result in (a, b):
         settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
         fault = leading(result.findings)
-        doubtful = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
-        doubts = [f.message.rstrip(".") for f in doubtful]
+        noticed = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
+        doubts = [as_message(f.said) for f in noticed]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
-            doubts.append("its simulation leaves a misfit that no known cause removes")
+            doubts.append(Message("compare/doubt.unexplained"))
         if doubts:
-            yield Finding("compare/doubt", "warning", f"{result.specimen.id}: {'; '.join(doubts)}.")
+            yield doubtful("compare/doubt", name=result.specimen.id, doubts=doubts)
 
 
 def _scale_findings(a: Result, b: Result, mean: Difference) -> Iterator[Finding]:
@@ -282,20 +231,11 @@ def _scale_findings(a: Result, b: Result, mean: Difference) -> Iterator[Finding]
     if a.scale is None or b.scale is None:
         return
     if (a.scale.source, a.scale.px_per_mm) == (b.scale.source, b.scale.px_per_mm):
-        message = (
-            f"Both have the scale {a.scale.px_per_mm:.5g} px/mm ({a.scale.source}): an error of it changes both f_EI "
-            "alike and does not show here; the bands contain it twice, so small differences are judged too mildly."
-        )
-        yield Finding("compare/scale-shared", "info", message)
+        yield inferred("compare/scale-shared", px_per_mm=a.scale.px_per_mm, source=free_text(a.scale.source))
         return
     share = 2.0 * float(np.hypot(a.scale.std_relative, b.scale.std_relative))
     size, std = abs(float(np.log(mean.b / mean.a))), mean.std / mean.a
-    message = (
-        f"The scales come apart ({a.scale.source}; {b.scale.source}); their stated errors make up to "
-        f"{plain(100 * share, 2)} % of f_EI. The mean difference of {plain(100 * size, 2)} % would follow from scales "
-        f"{plain(50 * size, 2)} % apart."
-    )
-    if 2.0 * std < size < 3.0 * share:
-        yield Finding("compare/scale", "warning", message)
-    elif size < 3.0 * share:
-        yield Finding("compare/scale", "info", message)
+    sources = {"a": free_text(a.scale.source), "b": free_text(b.scale.source)}
+    if size < 3.0 * share:
+        level = doubtful if size > 2.0 * std else inferred
+        yield level("compare/scale", share=share, size=size, half=0.5 * size, **sources)

@@ -6,11 +6,11 @@ nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a 
 
 from __future__ import annotations
 
-import unicodedata
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-# Letters of a message or a remedy. Both quote files, where a line may have a million; what is cut is their middle.
-LONGEST = 600
+from pipeline.messages import Message, free_text, printable, shortened
 
 
 class InputError(Exception):
@@ -18,42 +18,47 @@ class InputError(Exception):
 
     Parameters
     ----------
-    message : str
-        What is wrong, without the path and without a final full stop.
+    said : Message or str
+        What is wrong and what to do; as a text what is wrong, without the path and without a final full stop.
     path : Path or str or None
         The file or folder.
     line : int or None
         Line of the file, from 1.
     code : str
-        Stable code such as ``toml/unknown-key``; every code has a folder in ``fixtures/broken``.
+        Stable code such as ``toml/unknown-key``, that of the message by default; each has a folder in
+        ``fixtures/broken``.
     remedy : str
-        What to do, as an order: "rename it to length_mm".
+        Beside a text: what to do, as an order: "rename it to length_mm".
     """
 
     def __init__(
-        self, message: str, *, path: Path | str | None = None, line: int | None = None, code: str, remedy: str
+        self,
+        said: Message | str,
+        *,
+        path: Path | str | None = None,
+        line: int | None = None,
+        code: str = "",
+        remedy: str = "",
     ) -> None:
-        self.message, self.path, self.line, self.code, self.remedy = message, path, line, code, remedy
+        self.said = free_text(f"{shortened(said)}; {shortened(remedy)}") if isinstance(said, str) else said
+        self.message, self.remedy = (said, remedy) if isinstance(said, str) else (said.parts()[0], said.parts()[-1])
+        self.path, self.line, self.code = path, line, code or self.said.code
+        self._said = said
+        self._given: dict[str, Any] = {"path": path, "line": line, "code": code, "remedy": remedy}
         super().__init__(self.sentence)
+
+    @property
+    def placed(self) -> Message:
+        """The whole sentence, place, trouble and remedy, as a message."""
+        if self.path is None:
+            return Message("error", said=self.said)
+        place = {"path": self.path, "said": self.said}
+        return Message("error.file", **place) if self.line is None else Message("error.line", line=self.line, **place)
 
     @property
     def sentence(self) -> str:
         """One readable sentence: place, trouble, remedy; a single line, and nothing in it that a terminal obeys."""
-        place = "" if self.path is None else f"{self.path}{'' if self.line is None else f', line {self.line}'}: "
-        return printable(f"{place}{_shortened(self.message)}; {_shortened(self.remedy)}.")
+        return printable(str(self.placed))
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
-        return (_rebuild, (self.message, self.path, self.line, self.code, self.remedy))
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 100]} ... {text[-95:]}"
-
-
-def printable(text: str) -> str:
-    """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
-    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
-
-
-def _rebuild(message: str, path: Path | str | None, line: int | None, code: str, remedy: str) -> InputError:
-    return InputError(message, path=path, line=line, code=code, remedy=remedy)
+        return partial(InputError, **self._given), (self._said,)

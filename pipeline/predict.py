@@ -29,7 +29,8 @@ from scipy.optimize import brentq
 
 from pipeline.diagnosis.words import spoken
 from pipeline.identified_model import IdentifiedModel, Zero, identified_model
-from pipeline.records import Finding
+from pipeline.messages import Message, free_text
+from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
 from pipeline.rounding import plain
 from pipeline.settings.predict import PredictSettings
@@ -66,15 +67,15 @@ class PredictedStep:
     ----------
     displacement_m : float
     status : {"predicted", "extrapolated", "refused", "no equilibrium"}
-    reason : str
-        Why not simply predicted.
+    said : Message or None
+        Why not simply predicted; `reason` in English.
     chord_m, force_N, force_std_N, kappa_max_per_m : float or None
     s_m, x_m, x_std_m, y_m, y_std_m, theta_rad, theta_std_rad, kappa_per_m, kappa_std_per_m : (m,)
     """
 
     displacement_m: float
     status: Status
-    reason: str = ""
+    said: Message | None = None
     chord_m: float | None = None
     force_N: float | None = None
     force_std_N: float | None = None
@@ -88,6 +89,11 @@ class PredictedStep:
     theta_std_rad: Sequence[float] = ()
     kappa_per_m: Sequence[float] = ()
     kappa_std_per_m: Sequence[float] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why the step is not simply predicted; empty if it is."""
+        return "" if self.said is None else str(self.said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,14 +233,14 @@ def _steps(
         return tuple(
             _step(test, model, path, d, extrapolate, settings) for path, d in zip(paths, displacements, strict=True)
         )
-    whole, steps, lost = simulate(test, displacements, branch="up"), [], ""
+    whole, steps, lost = simulate(test, displacements, branch="up"), [], None
     for count, displacement in enumerate(displacements, start=1):
         if lost:
             steps.append(PredictedStep(displacement, "refused", lost))
             continue
         steps.append(_step(test, model, whole[:count], displacement, extrapolate, settings))
         if steps[-1].force_N is None:
-            lost = f"the cable remembers the step to {1e3 * displacement:.4g} mm, which is not predicted"
+            lost = Message("prediction.lost", displacement_m=displacement)
     return tuple(steps)
 
 
@@ -249,27 +255,25 @@ def _step(
     """The last step of a path."""
     step = path[-1]
     if not step.good:
-        return PredictedStep(displacement, "no equilibrium", step.outcome.advice)
+        return PredictedStep(displacement, "no equilibrium", free_text(step.outcome.advice))
     (low, high), sharpest = model.visited, float(step.kappa.max())
     slack = settings.range_slack * (high - low)
     status: Status = "predicted"
-    reason = ""
+    said = None
     if sharpest > high + slack or step.kappa.min() < min(low, float(test.rod.section.pre_curvature.min())) - slack:
-        reason = (
-            f"curvature {step.kappa.min():.3g} to {sharpest:.3g} 1/m leaves the visited range {low:.3g} to {high:.3g}"
-        )
+        reach = {"from_per_m": step.kappa.min(), "to_per_m": sharpest}
+        said = Message("prediction.beyond", low_per_m=low, high_per_m=high, **reach)
         if not extrapolate:
-            return PredictedStep(displacement, "refused", reason, chord_m=step.chord, kappa_max_per_m=sharpest)
+            return PredictedStep(displacement, "refused", said, chord_m=step.chord, kappa_max_per_m=sharpest)
         status = "extrapolated"
-    return replace(_with_bands(test, model, path), displacement_m=displacement, status=status, reason=reason)
+    return replace(_with_bands(test, model, path), displacement_m=displacement, status=status, said=said)
 
 
 def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
     """A step without equilibrium that lies beyond the visited range: what the continued law does there says nothing."""
     if step.status != "no equilibrium" or limit is None or step.displacement_m <= limit:
         return step
-    reason = "bends the cable beyond the visited range, where its characteristic is not known"
-    return replace(step, status="refused", reason=reason)
+    return replace(step, status="refused", said=Message("prediction.unknown"))
 
 
 def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> PredictedStep:
@@ -345,14 +349,12 @@ def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
     """What a reader of the prediction must know about the model it was made with."""
     found = []
     if model.method == "balance":
-        message = "The fit did not converge; the prediction rests on the balance equations, whose bands are wider."
-        found.append(Finding("predict/balance", "warning", message))
+        found.append(doubtful("predict/balance"))
     diagnosis = result.diagnosis
     if diagnosis is not None and diagnosis.causes:
         found.extend(_about_causes(diagnosis.causes, model))
     if diagnosis is not None and diagnosis.verdict == "unexplained":
-        message = "The model leaves a misfit that no known cause removes; bands do not contain it."
-        found.append(Finding("predict/unexplained", "warning", message))
+        found.append(doubtful("predict/unexplained"))
     return found
 
 
@@ -363,16 +365,12 @@ def _about_causes(causes: list[CausePart], model: IdentifiedModel) -> list[Findi
     rest = [cause.name for cause in causes if cause.name not in held]
     found = []
     if inside:
-        names = ", ".join(spoken(cause.name) for cause in inside)
-        message = f"The prediction contains what the diagnosis found in the cable: {names}."
-        if model.remembers:
-            message += " The steps are one test in the order given, from the mounted cable on."
-        others = [name for cause in inside for name in cause.class_ if name != cause.name]
-        if others:
-            message += f" The data could not tell it from {', '.join(spoken(name) for name in others)}."
-        found.append(Finding("predict/cause", "warning" if others else "info", message))
+        names = [free_text(spoken(cause.name)) for cause in inside]
+        others = [free_text(spoken(name)) for cause in inside for name in cause.class_ if name != cause.name]
+        told = [Message("predict/cause.contains", names=names)]
+        told += [Message("predict/cause.order")] if model.remembers else []
+        told += [Message("predict/cause.class", others=others)] if others else []
+        found.append((doubtful if others else inferred)("predict/cause", sentences=told))
     if rest:
-        names = ", ".join(spoken(name) for name in rest)
-        message = f"The prediction is of an ideal test; the diagnosis found besides, and it leaves out: {names}."
-        found.append(Finding("predict/left-out", "info", message))
+        found.append(inferred("predict/left-out", names=[free_text(spoken(name)) for name in rest]))
     return found

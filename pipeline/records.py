@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message
 from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
@@ -23,11 +24,37 @@ Side = Literal["left", "right"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something a reader of the report must know: a stable code, a level and one sentence."""
+    """Something a reader of the report must know: a stable code, a level, and what is said.
+
+    ``said`` is a `Message`; a text stands for a sentence that is in no catalogue.
+    """
 
     code: str
     level: Level
-    message: str
+    said: Message | str
+
+    @property
+    def message(self) -> str:
+        """The sentence in English."""
+        return str(self.said)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The finding as plain values for JSON."""
+        data = self.said.stored() if isinstance(self.said, Message) else {"key": "", "values": {}}
+        return {"code": self.code, "level": self.level, "message": self.message, **data}
+
+
+def inferred(key: str, /, **values: object) -> Finding:
+    """Something that nobody said and that was concluded; ``key`` and values as of a `Message`."""
+    said = Message(key, **values)
+    return Finding(said.code, "info", said)
+
+
+def doubtful(key: str, /, **values: object) -> Finding:
+    """A contradiction or a loss: measured all the same, but a person should look."""
+    said = Message(key, **values)
+    return Finding(said.code, "warning", said)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ beside ``result.json``. A bad file of the user raises `InputError`; nature's ref
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from pipeline.assembly import assemble
 from pipeline.diagnosis import diagnose, with_corrected_forces
 from pipeline.identify import Identification, identify, identify_without
 from pipeline.intake.folder import read_specimen
+from pipeline.messages import Message
 from pipeline.records import Finding
 from pipeline.report.tables import write_result, write_tables
 from pipeline.result import DiagnosisPart, Result
@@ -21,7 +23,13 @@ from pipeline.settings import Settings
 from pipeline.vision.series import trace_series
 
 
-def measure(folder: Path | str, settings: Settings | None = None, *, command: str = "") -> Result:
+def measure(
+    folder: Path | str,
+    settings: Settings | None = None,
+    *,
+    command: str = "",
+    on_stage: Callable[[str], None] = lambda stage: None,
+) -> Result:
     """Measure one specimen folder.
 
     Parameters
@@ -31,6 +39,8 @@ def measure(folder: Path | str, settings: Settings | None = None, *, command: st
     settings : Settings, optional
     command : str
         The command that reproduces the result, kept in its provenance.
+    on_stage : callable
+        Told the name of each stage that begins: ``photos``, ``identification``, ``diagnosis``.
 
     Returns
     -------
@@ -43,8 +53,11 @@ def measure(folder: Path | str, settings: Settings | None = None, *, command: st
     """
     settings = settings or Settings()
     specimen = read_specimen(Path(folder), settings.intake)
+    on_stage("photos")
     traces = trace_series(specimen, settings.vision)
+    on_stage("identification")
     identification = identify(specimen, traces, settings.identify)
+    on_stage("diagnosis")
     diagnosis, findings = _diagnosed(identification, settings)
     if diagnosis is not None and _faulty(diagnosis):
         test = with_corrected_forces(identification.test, diagnosis.corrected_forces)
@@ -64,10 +77,8 @@ def _diagnosed(identification: Identification, settings: Settings) -> tuple[Diag
         return diagnose(identification.test, identification, settings.diagnosis)
     except (ArithmeticError, LookupError, MemoryError, ValueError) as error:
         told = " ".join(str(error).split())[:200]
-        message = (
-            f"the diagnosis failed ({type(error).__name__}: {told}); f_EI and K0 stand without it; please report it"
-        )
-        return None, (Finding(code="diagnosis/program-error", level="error", message=message),)
+        said = Message("diagnosis/program-error", error=type(error).__name__, told=told)
+        return None, (Finding(said.code, "error", said),)
 
 
 def write(result: Result, folder: Path, settings: Settings | None = None) -> None:

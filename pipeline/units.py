@@ -62,9 +62,9 @@ def suited(values: Iterable[float], symbol: str, *, decimal: str = ".") -> Unit:
     return Unit(10.0**-power, PREFIXES[power] + symbol, decimal)
 
 
-def quantity(value: float, symbol: str, std: float | None = None) -> str:
+def quantity(value: float, symbol: str, std: float | None = None, *, decimal: str = ".") -> str:
     """A number in SI units within a sentence, in the unit that suits it; with ± where its ``std`` is given."""
-    unit = suited((value,), symbol)
+    unit = suited((value,), symbol, decimal=decimal)
     return unit.plain(value) if std is None else unit.text(value, std)
 
 

@@ -126,10 +126,11 @@ INSIDE = {
     ],
 }
 PIPELINE = [
-    ("errors", "threads"),
+    ("threads",),
     ("rounding",),
     ("units",),
-    ("records",),
+    ("messages",),
+    ("errors", "records"),
     ("settings",),
     ("result",),
     ("intake",),

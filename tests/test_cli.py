@@ -206,7 +206,7 @@ def test_report_draws_again_without_measuring(cheap, monkeypatch):
     done = call("report", "out", "--language", "de")
     assert done.exit_code == 0
     assert drawn == [("a", "de"), ("c", "de")]
-    assert "b: result.json cannot be read" in done.stderr
+    assert "b: result.json kann nicht gelesen werden: Sie ist kein lesbares Ergebnis" in done.stderr
     assert (cheap / "out/a/result.json").read_bytes() == before
     assert "(3 kept" in call("run", "batch", "-o", "out", *IN_PROCESS).stdout
 

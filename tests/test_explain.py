@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.messages import catalogue
 from pipeline.report.words import Words, documented_codes
 from tests.test_cli import call
 
@@ -44,7 +45,7 @@ def test_explain_names_what_is_near_and_nothing_else():
 
 
 def test_every_code_of_a_message_is_documented():
-    told = set()
+    told = {key.partition(".")[0] for key in catalogue("en") if "/" in key}
     for path in (ROOT / "pipeline").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             text = node.value if isinstance(node, ast.Constant) else None
@@ -52,6 +53,7 @@ def test_every_code_of_a_message_is_documented():
                 told.add(text)
     # made of a name and what came of it: identify/{way}-{outcome}, {photo or force}/outlier
     made = {code for code in documented_codes() if code.endswith(("*", "/outlier"))}
-    assert told == set(documented_codes()) - made
+    families = tuple(code[:-1] for code in made if code.endswith("*"))
+    assert {code for code in told if not code.startswith(families)} == set(documented_codes()) - made
     for texts in documented_codes().values():
         assert len(set(texts)) == 4 and all(text.endswith(".") for text in texts)

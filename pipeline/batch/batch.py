@@ -1,4 +1,4 @@
-"""A whole batch: orders out, outcomes in, log and index written, interrupts survived."""
+"""A whole batch: specimens are handed out, results collected, log and index written; an interrupt loses nothing."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pipeline.batch.orders import make_orders
 from pipeline.batch.specimen import Outcome, Stages, draw_again, stored_result
 from pipeline.batch.store import Store
 from pipeline.errors import InputError
+from pipeline.messages import Message
 from pipeline.settings import Settings
 
 LOG_NAME = "cablebend.log"
@@ -22,7 +23,7 @@ LOG_NAME = "cablebend.log"
 class Tally:
     """Counts of a batch; what is not usable was measured all the same.
 
-    ``unstored`` holds the entries, by name, of failures that could not be written; ``trouble`` sentences for the user.
+    ``unstored`` holds the entries, by name, of failures that could not be written; ``trouble`` is what else to say.
     """
 
     total: int
@@ -33,7 +34,7 @@ class Tally:
     reused: int = 0
     interrupted: bool = False
     unstored: dict[str, dict[str, Any]] = field(default_factory=dict)
-    trouble: tuple[str, ...] = ()
+    trouble: tuple[Message | str, ...] = ()
 
     @property
     def done(self) -> int:
@@ -61,6 +62,7 @@ def run_batch(
     scheduler: str | None = None,
     options: str = "",
     on_outcome: Callable[[Outcome, Tally], None] = lambda outcome, tally: None,
+    on_stage: Callable[[str, str], None] = lambda name, stage: None,
     stages: Stages | None = None,
 ) -> Tally:
     """Measure many specimen folders into a folder of results.
@@ -80,6 +82,8 @@ def run_batch(
         Options for the command that reproduces a result.
     on_outcome : callable
         Called with each outcome and the tally so far.
+    on_stage : callable
+        Called with the name of a result and the stage its measurement begins, where this machine measures.
     stages : Stages, optional
         What is done with a specimen; the pipeline by default.
 
@@ -95,7 +99,7 @@ def run_batch(
         orders = make_orders(folders, out, settings, options=options)
         tally = Tally(len(orders), tuple(order.name for order in orders))
         log.info("begin: %d specimens", len(orders))
-        outcomes = measure_all(orders, settings.batch, scheduler=scheduler, stages=stages)
+        outcomes = measure_all(orders, settings.batch, scheduler=scheduler, stages=stages, doing=on_stage)
         try:
             for outcome in outcomes:
                 tally = tally.plus(outcome)
@@ -111,12 +115,12 @@ def run_batch(
     return tally
 
 
-def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
+def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]]:
     """Write tables, reports and index of stored results again, without measuring.
 
     Yields
     ------
-    str, str or None
+    str, Message or None
         Name of a result, and why it could not be drawn.
 
     Raises
@@ -131,23 +135,23 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, str | None]]:
                 result = stored_result(store, name)
             except InputError as error:
                 store.forget_row(name)
-                yield name, f"result.json cannot be read: it {error.message}; run the specimen again"
+                yield name, Message("cli.unreadable", why=error.said)
                 continue
             try:
                 draw_again(store, name, result, stages, settings)
             except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # values that no measurement gives
-                yield name, f"result.json cannot be drawn ({type(error).__name__}: {error}); run the specimen again"
+                yield name, Message("cli.undrawable", error=type(error).__name__, why=str(error))
                 continue
             yield name, None
         stages.write_index(store.out, settings)
 
 
 def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
-    """Write the index over everything stored; a folder that takes no more files is a trouble of the tally."""
+    """Write the index over everything stored; a folder that takes no more files is told."""
     try:
-        told = tuple(stages.write_index(store.out, settings) or ())
+        told: tuple[Message | str, ...] = tuple(stages.write_index(store.out, settings) or ())
     except OSError as error:
-        told = (store.unwritable(error).sentence,)
+        told = (store.unwritable(error).placed,)
     return replace(tally, trouble=(*tally.trouble, *told))
 
 
@@ -155,7 +159,7 @@ class _LogFile(logging.FileHandler):
     """A log on a disk that may be full."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Lose the line: the default prints a traceback for every one."""
+        """Leave the line out: the default prints a traceback for each."""
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from distributed import Client, Future, KilledWorker
 from pipeline.batch.orders import Order
 from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
 from pipeline.errors import InputError
+from pipeline.messages import Message
 from pipeline.settings.batch import BatchSettings
 
 LOOK_S = 0.2  # between two looks whether Ctrl-C was pressed while nothing ended
@@ -40,11 +41,7 @@ def measure_on_cluster(
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"no dask scheduler answers at {scheduler!r}",
-            code="batch/no-scheduler",
-            remedy="start one with `dask scheduler`, or leave --scheduler out to use this machine",
-        ) from error
+        raise InputError(Message("batch/no-scheduler", address=repr(scheduler))) from error
     with client:
         yield from _stream(client, orders, settings, stages, interrupted)
 

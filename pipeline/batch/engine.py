@@ -10,7 +10,8 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from functools import partial
 
 from pipeline.batch.orders import Order
 from pipeline.batch.specimen import Outcome, Stages, measure_order
@@ -18,7 +19,12 @@ from pipeline.settings.batch import BatchSettings
 
 
 def measure_all(
-    orders: Sequence[Order], settings: BatchSettings, *, scheduler: str | None = None, stages: Stages
+    orders: Sequence[Order],
+    settings: BatchSettings,
+    *,
+    scheduler: str | None = None,
+    stages: Stages,
+    doing: Callable[[str, str], None] = lambda name, stage: None,
 ) -> Generator[Outcome]:
     """Measure all orders; outcomes in the order in which they end.
 
@@ -28,6 +34,8 @@ def measure_all(
         Address of a running dask scheduler whose workers see the same files; else processes of this machine.
     stages : Stages
         What is done with a specimen, see `specimen`.
+    doing : callable
+        Told the name of a result and the stage that begins.
 
     Raises
     ------
@@ -37,13 +45,13 @@ def measure_all(
     alone = len(orders) == 1 and "timeout_s" not in settings.model_fields_set
     if scheduler is None and (alone or settings.in_process):
         for order in orders:
-            yield measure_order(order, stages, guarded=False)
+            yield measure_order(order, stages, guarded=False, doing=partial(doing, order.name))
         return
     with _interrupts() as interrupted:
         if scheduler is None:
             from pipeline.batch.processes import measure_in_processes
 
-            yield from measure_in_processes(orders, settings, stages, interrupted)
+            yield from measure_in_processes(orders, settings, stages, interrupted, doing)
         else:
             from pipeline.batch.cluster import measure_on_cluster  # dask takes half a second to load
 
@@ -52,7 +60,7 @@ def measure_all(
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Ctrl-C and SIGTERM as an event, a second one as ever.
+    """Note Ctrl-C and SIGTERM as an event; a second one ends the program as usual.
 
     Raised wherever this thread happens to be, KeyboardInterrupt is lost where that is a finalizer of a library, and the
     batch would run on; so it is noted, and raised between two outcomes.

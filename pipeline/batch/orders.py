@@ -100,7 +100,7 @@ def _key(name: tuple[str, ...]) -> str:
 
 
 def _digested(name: str, folder: Path) -> str:
-    """The begin of a name, and a digest of the path that it does not tell whole."""
+    """The beginning of a name, and a digest of the whole path."""
     digest = hashlib.sha256(os.fsencode(folder.absolute())).hexdigest()[:DIGITS]
     begin = name.encode()[: LONGEST_NAME - DIGITS - 2].decode(errors="ignore")
     return f"{begin}--{digest}"
@@ -127,7 +127,8 @@ def code_version() -> str:
     """Version of the program: that of the distribution, and a digest of its source, so that a changed copy counts."""
     digest = hashlib.sha256()
     root = Path(__file__).resolve().parents[2]
-    for path in sorted((*(root / "rod").rglob("*.py"), *(root / "pipeline").rglob("*.py"))):
+    messages = (root / "pipeline" / "messages").glob("*.toml")
+    for path in sorted((*(root / "rod").rglob("*.py"), *(root / "pipeline").rglob("*.py"), *messages)):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:12]}"

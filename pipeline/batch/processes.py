@@ -15,8 +15,9 @@ import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import connection, resource_tracker
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -61,7 +62,11 @@ class _Worker:
 
 
 def measure_in_processes(
-    orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+    orders: Sequence[Order],
+    settings: BatchSettings,
+    stages: Stages,
+    interrupted: threading.Event,
+    doing_now: Callable[[str, str], None],
 ) -> Iterator[Outcome]:
     """Measure orders in processes of this machine; outcomes in the order in which they end.
 
@@ -89,16 +94,21 @@ def measure_in_processes(
                 if worker.fatter_than(limit):
                     worker.process.kill()
             for pipe in [pipe for pipe in doing if pipe in ended]:
-                worker, order, started = doing.pop(pipe)
+                worker, order, started = doing[pipe]
                 try:
                     outcome = worker.pipe.recv()
+                    if isinstance(outcome, str):
+                        doing_now(order.name, outcome)
+                        continue
+                    del doing[pipe]
                 except (EOFError, OSError):
+                    del doing[pipe]
                     worker.end()
                     deaths[order.name] += 1
                     if deaths[order.name] <= settings.attempts:
                         waiting.appendleft(order)  # whether it is to blame it knows itself, by the notes of attempts
                     else:
-                        yield store_death(order, f"exit code: {worker.process.exitcode}", started)
+                        yield store_death(order, f"exit {worker.process.exitcode}", started)
                 else:
                     idle.append(worker)
                     yield outcome
@@ -165,7 +175,13 @@ def _work(pipe: Pipe, by_value: bytes) -> None:
     stages = pickle.loads(by_value)
     with contextlib.suppress(EOFError, OSError):  # the parent closed its end
         while True:
-            pipe.send(measure_order(pipe.recv(), stages))
+            pipe.send(measure_order(pipe.recv(), stages, doing=partial(_tell, pipe)))
+
+
+def _tell(pipe: Pipe, stage: str) -> None:
+    """Name the stage that begins; nobody listens where the parent closed its end, which ends this worker anyway."""
+    with contextlib.suppress(OSError):
+        pipe.send(stage)
 
 
 def _end_with_parent() -> None:

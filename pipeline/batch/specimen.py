@@ -22,13 +22,17 @@ from pipeline.batch.orders import Order, fingerprint
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
+from pipeline.messages import Message, as_message
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.settings import Settings
 from pipeline.threads import one_thread
 
 Measure = Callable[..., Result]
 Write = Callable[..., None]
-WriteIndex = Callable[[Path, Settings], Iterable[str] | None]  # sentences on specimens that contradict each other
+Doing = Callable[[str], None]
+WriteIndex = Callable[
+    [Path, Settings], Iterable[Message] | None
+]  # what is said on specimens that contradict each other
 ENTRY_SCHEMA = "cablebend/entry/1"
 
 
@@ -46,10 +50,10 @@ class Stages:
         return cls(_pipeline_measure, _pipeline_write, _pipeline_write_index)
 
 
-def _pipeline_measure(folder: Path, settings: Settings, *, command: str) -> Result:
+def _pipeline_measure(folder: Path, settings: Settings, *, command: str, on_stage: Doing) -> Result:
     from pipeline.run import measure
 
-    return measure(folder, settings, command=command)
+    return measure(folder, settings, command=command, on_stage=on_stage)
 
 
 def _pipeline_write(result: Result, folder: Path, settings: Settings) -> None:
@@ -58,21 +62,22 @@ def _pipeline_write(result: Result, folder: Path, settings: Settings) -> None:
     write(result, folder, settings)
 
 
-def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[str]:
+def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[Message]:
     from pipeline.report.files import write_atomic
     from pipeline.report.index import index_rows, write_rows
 
     rows = index_rows(out, out, settings.report)
     write_rows(rows, out, settings.report)
     write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
-    return [f"{row.id}: {row.fault}." for row in rows if row.outlying]
+    return [Message("cli.outlying", name=row.id, said=row.fault) for row in rows if row.outlying]
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What became of an order. ``entry`` is None if it is stored, else what could not be stored.
 
-    ``usable`` is false where a fault of the data makes what was measured none of the cable's.
+    ``usable`` is false where a fault of the data makes what was measured none of the cable's; ``said`` is why a
+    specimen failed, as data.
     """
 
     name: str
@@ -82,6 +87,7 @@ class Outcome:
     seconds: float
     entry: dict[str, Any] | None = None
     usable: bool = True
+    said: Message | None = None
 
     @property
     def failed(self) -> bool:
@@ -89,7 +95,7 @@ class Outcome:
         return self.status == "failed"
 
 
-def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outcome:
+def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: Doing = lambda stage: None) -> Outcome:
     """Measure a specimen and store it; never raises but for an interrupt.
 
     Parameters
@@ -98,6 +104,8 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
     stages : Stages
     guarded : bool
         Note attempts and end the process when the time is over: in a worker of its own only.
+    doing : callable
+        Told the name of each stage that begins.
     """
     started = time.monotonic()
     store = Store(order.out)
@@ -108,10 +116,10 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
             if refused is not None:
                 return store_failure(order, refused, started)
             with _deadline(limit.timeout_s, store.overdue(order.name)):
-                outcome = _measured(store, order, stages, started)
+                outcome = _measured(store, order, stages, started, doing)
             store.end(order.name)
             return outcome
-        return _measured(store, order, stages, started)
+        return _measured(store, order, stages, started, doing)
     except InputError as error:
         return store_failure(order, refusal(error), started)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
@@ -121,14 +129,13 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True) -> Outc
 def refusal(error: Exception) -> FindingPart:
     """What is told about an error that costs a specimen: a file of the user, or what nobody foresaw."""
     if isinstance(error, InputError):
-        return FindingPart(code=error.code, level="error", message=error.sentence)
-    told = " ".join(str(error).split())[:300]
-    code, message = "specimen/program-error", f"the program failed ({type(error).__name__}: {told}); please report it"
+        return FindingPart.of("error", error.placed, code=error.code)
     if isinstance(error, MemoryError):
-        code, message = "specimen/memory", "there was not enough memory for this specimen"
-    elif isinstance(error, OSError):
-        code, message = "specimen/file-system", f"a file could not be read or written: {error.strerror or error}"
-    return FindingPart(code=code, level="error", message=message)
+        return FindingPart.of("error", Message("specimen/memory"))
+    if isinstance(error, OSError):
+        return FindingPart.of("error", Message("specimen/file-system", why=error.strerror or str(error)))
+    told = " ".join(str(error).split())[:300]
+    return FindingPart.of("error", Message("specimen/program-error", error=type(error).__name__, told=told))
 
 
 def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
@@ -136,15 +143,13 @@ def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: floa
     if store.overdue(order.name).exists():
         return overdue(timeout_s)
     if store.begin(order.name) >= attempts:
-        message = f"its process died {attempts} times (out of memory, or a crash in a library); photos may be damaged"
-        return FindingPart(code="specimen/worker-died", level="error", message=message)
+        return FindingPart.of("error", Message("specimen/worker-died", attempts=attempts))
     return None
 
 
 def overdue(timeout_s: float) -> FindingPart:
     """What is told of a specimen that took longer than it may."""
-    message = f"not finished within {timeout_s:g} s; raise --timeout if that is too short"
-    return FindingPart(code="specimen/timeout", level="error", message=message)
+    return FindingPart.of("error", Message("specimen/timeout", seconds=timeout_s))
 
 
 @contextlib.contextmanager
@@ -165,7 +170,7 @@ def _deadline(seconds: float, note: Path) -> Iterator[None]:
         timer.cancel()
 
 
-def _measured(store: Store, order: Order, stages: Stages, started: float) -> Outcome:
+def _measured(store: Store, order: Order, stages: Stages, started: float, doing: Doing) -> Outcome:
     """Read, compare with what is stored, measure, store."""
     one_thread()  # for workers that were started by others
     store.place(order.name)  # refuses before the work, not after it
@@ -179,8 +184,10 @@ def _measured(store: Store, order: Order, stages: Stages, started: float) -> Out
             told = str(stored.get("headline", ""))
             usable = stored.get("state") != "unusable"
             return Outcome(order.name, stored["status"], told, True, time.monotonic() - started, usable=usable)
-    result = stages.measure(order.folder, order.settings, command=order.command)
+    own = {"on_stage": doing} if stages.measure is _pipeline_measure else {}  # of a notebook it takes no such thing
+    result = stages.measure(order.folder, order.settings, command=order.command, **own)
     entry = _entry(order, result, mark)
+    doing("reports")
     with store.staging() as staged:
         stages.write(result, staged, order.settings)
         write_entry(entry, staged)
@@ -220,11 +227,21 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "folder": result.specimen.folder,
         "status": result.status,
         "headline": result.headline or (reasons[0].message if reasons else ""),
+        "said": _said(result),
         "code": reasons[0].code if reasons else None,
         "reports": order.settings.batch.reports,
         **_in_index(result, order.settings),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
+
+
+def _said(result: Result) -> dict[str, Any]:
+    """The headline as data; of what was never measured, that of its finding."""
+    from pipeline.assembly import headline
+
+    if result.steps:
+        return headline(result).stored()
+    return as_message(result.findings[0].said if result.findings else result.headline).stored()
 
 
 def store_failure(order: Order, finding: FindingPart, started: float, *, trace: str | None = None) -> Outcome:
@@ -247,13 +264,13 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
         store.install(staged, order.name)
         store.end(order.name)
         unstored = None
-    return Outcome(order.name, "failed", finding.message, False, time.monotonic() - started, unstored)
+    took, said = time.monotonic() - started, as_message(finding.said)
+    return Outcome(order.name, "failed", finding.message, False, took, unstored, said=said)
 
 
 def store_death(order: Order, told: str, started: float) -> Outcome:
-    """Store a specimen whose worker ended without an outcome, and not by its fault as far as its notes tell."""
-    finding = FindingPart(code="specimen/worker-died", level="error", message=f"its worker failed ({told})")
-    return store_failure(order, finding, started)
+    """Store a specimen whose worker ended without an outcome, as far as its notes tell not by its own fault."""
+    return store_failure(order, FindingPart.of("error", Message("specimen/worker-died.told", told=told)), started)
 
 
 def failed_result(order: Order, finding: FindingPart, trace: str | None = None) -> Result:

@@ -25,6 +25,7 @@ import locket
 
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
+from pipeline.messages import Message
 from pipeline.report.files import synced, write_atomic
 
 ENTRY = "entry.json"
@@ -52,12 +53,7 @@ class Store:
             lock = locket.lock_file(str(self.out / WORK / "lock"), timeout=0)
             lock.acquire()
         except locket.LockError as error:
-            raise InputError(
-                "another run writes into this folder",
-                path=self.out,
-                code="out/busy",
-                remedy="wait or choose another -o",
-            ) from error
+            raise InputError(Message("out/busy"), path=self.out) from error
         except OSError as error:
             raise self.unwritable(error) from error
         try:
@@ -84,12 +80,8 @@ class Store:
 
     def unwritable(self, error: OSError) -> InputError:
         """The error for an output folder that refuses to be written."""
-        return InputError(
-            f"cannot be written ({(error.strerror or type(error).__name__).lower()})",
-            path=self.out,
-            code="out/unwritable",
-            remedy="choose another -o or make room",
-        )
+        why = (error.strerror or type(error).__name__).lower()
+        return InputError(Message("out/unwritable", why=why), path=self.out)
 
     def _work(self, name: str) -> Path:
         return self.out / WORK / name
@@ -118,12 +110,7 @@ class Store:
         """
         place = self.out / name
         if self._foreign(place):
-            raise InputError(
-                "is in the way of a result and none itself",
-                path=place,
-                code="out/foreign-folder",
-                remedy="move it or choose another -o",
-            )
+            raise InputError(Message("out/foreign-folder"), path=place)
         return place
 
     def install(self, staged: Path, name: str) -> None:
@@ -182,7 +169,7 @@ class Store:
         return self._work("attempts") / f"{name}.overdue"
 
     def end(self, name: str) -> None:
-        """Forget the attempts of a specimen that came to an end."""
+        """Remove the notes of attempts at a specimen that came to an end."""
         (self._work("attempts") / name).unlink(missing_ok=True)
         self.overdue(name).unlink(missing_ok=True)
 

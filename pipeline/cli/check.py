@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.run import found, nothing_found
+from pipeline.cli.speech import say, told
+from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
 @click.option("--timeout", type=POSITIVE, metavar="SECONDS", help="Limit per specimen.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
+@language_option
 @settings_options
 @click.pass_context
 def check(
@@ -29,14 +32,10 @@ def check(
     folders: tuple[Path, ...],
     timeout: float | None,
     as_json: bool,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
-    from pipeline.cli.configuration import read_settings
-
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
-    settings = read_settings(settings_file, (*assignments, *limit))
+    settings = chosen_settings(*limit)
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))
@@ -47,7 +46,7 @@ def check(
         click.echo(json.dumps({"specimens": rows, "runs": len(rows) - failed, "errors": wrong}, indent=1))
     else:
         echo_rows(rows)
-        click.echo(f"{len(rows) - failed} of {len(rows)} specimens would run")
+        say("cli.would-run", runs=len(rows) - failed, total=len(rows))
     ctx.exit(3 if failed == len(rows) else 1 if wrong or refused else 0)
 
 
@@ -77,17 +76,11 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
         told = (*specimen.findings, *look_at_photos(specimen, settings.vision))
     except Exception as error:  # one folder never costs the others
         return _failed(folder, refusal(error))
-    findings = [{"code": f.code, "level": f.level, "message": f.message} for f in dict.fromkeys(told)]
-    levels = {finding["level"] for finding in findings}
-    return {
-        "folder": str(folder),
-        "id": specimen.id,
-        "status": "error" if "error" in levels else "warning" if "warning" in levels else "ok",
-        "runs": True,
-        "steps": len(specimen.steps),
-        "photos": len(specimen.images),
-        "findings": findings,
-    }
+    levels = {finding.level for finding in told}
+    status = "error" if "error" in levels else "warning" if "warning" in levels else "ok"
+    findings = [finding.document for finding in dict.fromkeys(told)]
+    counts = {"steps": len(specimen.steps), "photos": len(specimen.images)}
+    return {"folder": str(folder), "id": specimen.id, "status": status, "runs": True, **counts, "findings": findings}
 
 
 def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any]:
@@ -95,34 +88,28 @@ def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any
     from pipeline.batch.specimen import overdue
     from pipeline.result import FindingPart
 
-    died = "its process died (out of memory, or a crash in a library)"
-    told = overdue(seconds) if over else FindingPart(code="specimen/worker-died", level="error", message=died)
-    return _failed(folder, told)
+    died = FindingPart.of("error", Message("specimen/worker-died.once"))
+    return _failed(folder, overdue(seconds) if over else died)
 
 
 def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
-    trouble = {"code": told.code, "level": "error", "message": told.message}
-    return {
-        "folder": str(folder),
-        "id": None,
-        "status": "error",
-        "runs": False,
-        "steps": 0,
-        "photos": 0,
-        "findings": [trouble],
-    }
+    row = {"folder": str(folder), "id": None, "status": "error", "runs": False, "steps": 0, "photos": 0}
+    return row | {"findings": [told.model_dump()]}
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:
-    """A line a specimen, below it a line for each thing that was inferred or is wrong, never broken into columns."""
+    """Print a line a specimen, and below it a line for each thing that was inferred or is wrong."""
+    from pipeline.result import FindingPart
+
     colours = {"ok": "green", "info": "cyan", "warning": "yellow", "error": "red"}
     for row in rows:
-        state = click.style(f"{row['status']:<8}", colours[row["status"]])
+        state = click.style(f"{told(Message('word.' + row['status'])):<8}", colours[row["status"]])
         counts = f": {_count(row, 'step')}, {_count(row, 'photo')}" if row["runs"] else ""
         click.echo(f"{state} {_name(row)}{counts}")
         for finding in row["findings"]:
-            level = click.style(finding["level"], colours[finding["level"]])
-            click.echo(f"{'':8} {level}: {finding['message']} [{finding['code']}]")
+            level = click.style(told(Message("word." + finding["level"])), colours[finding["level"]])
+            said = FindingPart(**finding).said
+            click.echo(f"{'':8} {level}: {told(said)} [{finding['code']}]")
 
 
 def _name(row: dict[str, Any]) -> str:
@@ -134,4 +121,4 @@ def _name(row: dict[str, Any]) -> str:
 
 def _count(row: dict[str, Any], noun: str) -> str:
     number = row[f"{noun}s"]
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return told(Message(f"cli.{noun}" if number == 1 else f"cli.{noun}s", count=number))

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pipeline.cli.options import settings_options
+from pipeline.cli.options import chosen_settings, language_option, settings_options
+from pipeline.cli.predict import echo_findings
+from pipeline.cli.speech import entry, say, told
 
 if TYPE_CHECKING:
     from pipeline.compare import Comparison
@@ -21,6 +23,7 @@ MISSING = 3
 @click.argument("b", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Everything as JSON on stdout.")
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV of the ratio with its band.")
+@language_option
 @settings_options
 @click.pass_context
 def compare(
@@ -29,8 +32,6 @@ def compare(
     b: Path,
     as_json: bool,
     out: Path | None,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Say whether the results A and B differ beyond their bands.
 
@@ -39,11 +40,10 @@ def compare(
 
     Exit codes: 0 compared, whatever came out; 3 not comparable.
     """
-    from pipeline.cli.configuration import read_settings
     from pipeline.compare import compare as compared
     from pipeline.result import read_result
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     comparison = compared(read_result(a), read_result(b), settings=settings.compare)
     if out is not None:
         from pipeline.report.frames import comparison_frame
@@ -62,27 +62,27 @@ def as_document(comparison: Comparison) -> dict[str, object]:
     from dataclasses import asdict
 
     arrays = ("kappa_per_m", "ratio", "ratio_std")
-    return {**asdict(comparison), **{name: getattr(comparison, name).tolist() for name in arrays}}
+    document: dict[str, object] = {
+        **asdict(comparison),
+        **{name: getattr(comparison, name).tolist() for name in arrays},
+    }
+    del document["said"]
+    findings = [finding.document for finding in comparison.findings]
+    return document | {"statement": comparison.statement, "findings": findings}
 
 
 def echo_comparison(comparison: Comparison) -> None:
     """The statement, the numbers behind it, and what makes it doubtful."""
-    from pipeline.rounding import p_value, plain, rounded
-
-    click.echo(comparison.statement)
+    click.echo(entry("", told(comparison.said)))
     if comparison.range_per_m is not None:
-        low, high = (plain(kappa, zeros=True) for kappa in comparison.range_per_m)
-        click.echo(f"compared: {' with '.join(comparison.methods)}, {low} to {high} 1/m")
+        low, high = comparison.range_per_m
+        say("comparison.compared", a=comparison.methods[0], b=comparison.methods[1], low_per_m=low, high_per_m=high)
     mean, rest = comparison.mean_stiffness, comparison.pre_curvature
     if mean is not None:
-        change = rounded(100 * mean.difference / mean.a, 100 * mean.std / mean.a)
-        click.echo(
-            f"mean stiffness: {plain(1e3 * mean.a, 4)} and {plain(1e3 * mean.b, 4)} mN m², difference {change} %"
-        )
+        change = (mean.difference / mean.a, mean.std / mean.a)
+        say("comparison.mean", a_mNm2=1e3 * mean.a, b_mNm2=1e3 * mean.b, change=change)
     if rest is not None:
-        click.echo(f"pre-curvature: difference {rounded(rest.difference, rest.std)} 1/m, {p_value(rest.p_value)}")
+        say("comparison.pre-curvature", difference_per_m=(rest.difference, rest.std), p=rest.p_value)
     if comparison.p_characteristic is not None:
-        text, level = p_value(comparison.p_characteristic), comparison.level
-        click.echo(f"characteristic: {text}; level of both tests together {level:g}")
-    for finding in comparison.findings:
-        click.echo(f"{finding.level}: {finding.message} [{finding.code}]", err=True)
+        say("comparison.level", p=comparison.p_characteristic, level=comparison.level)
+    echo_findings(comparison.findings)

@@ -1,4 +1,4 @@
-"""Settings from a TOML file and from ``--set section.key=value``; unknown names are answered with the nearest one."""
+"""Settings from a TOML file and from ``--set section.key=value``; an unknown name is told with a near one."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from pipeline.errors import InputError
 from pipeline.intake.tomltable import TomlFile, nearest, read_toml, shown
+from pipeline.messages import Message, free_text
 from pipeline.settings import Settings
 
 SETTINGS_MAX_BYTES = 10_000_000  # a settings file is written by its user; the limit only stops a wrong file early
@@ -42,17 +43,17 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
     except ValidationError as error:
         first = error.errors()[0]
         place = [str(part) for part in first["loc"]]
-        raise _wrong_value(place, first["input"], f"{first['msg'][:1].lower()}{first['msg'][1:]}", source) from error
+        why = free_text(f"{first['msg'][:1].lower()}{first['msg'][1:]}")
+        raise _wrong_value(place, first["input"], why, source) from error
 
 
-def _wrong_value(place: Sequence[str], value: Any, why: str, source: TomlFile | None) -> InputError:
+def _wrong_value(place: Sequence[str], value: Any, why: Message, source: TomlFile | None) -> InputError:
     """The error for a setting that cannot have this value."""
+    told = {"name": ".".join(place), "value": shown(value), "why": why, "default": _default(place)}
     return InputError(
-        f"{'.'.join(place)} = {shown(value)} cannot be used ({why})",
+        Message("settings/wrong-value", **told),
         path=None if source is None else source.path,
         line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
-        code="settings/wrong-value",
-        remedy=f"the default is {_default(place)}, and `cablebend init --settings` says what it means",
     )
 
 
@@ -71,18 +72,15 @@ def _check_tables(
     for name, value in values.items():
         if name not in model.model_fields:
             place, full = ".".join(above), ".".join((*above, name))
-            near = ".".join((*above, nearest(name, tuple(model.model_fields))))
+            near = nearest(name, tuple(model.model_fields))
+            key = "settings/unknown-key" if near else "settings/unknown-key.far"
             raise InputError(
-                f"setting {full} is not known",
+                Message(key, name=full, near=".".join((*above, near or ""))),
                 path=None if source is None else source.path,
-                line=None
-                if source is None
-                else source.line_of(place, name) or source.line_of(".".join((*above, name))),
-                code="settings/unknown-key",
-                remedy=f"the nearest one is {near}",
+                line=None if source is None else source.line_of(place, name) or source.line_of(full),
             )
         if isinstance(value, int) and abs(value) > LARGEST:
-            raise _wrong_value((*above, name), value, "it is larger than any count", source)
+            raise _wrong_value((*above, name), value, Message("settings/wrong-value.larger"), source)
         inner = model.model_fields[name].annotation
         if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, BaseModel):
             _check_tables(value, inner, (*above, name), source)
@@ -93,9 +91,7 @@ def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
     name, equals, text = assignment.partition("=")
     keys = [key.strip() for key in name.split(".")]
     if not equals or len(keys) < 2 or not all(keys):
-        raise InputError(
-            f"--set {assignment!r} is no assignment", code="settings/assignment", remedy="write --set section.key=value"
-        )
+        raise InputError(Message("settings/assignment", given=repr(assignment)))
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except ValueError:

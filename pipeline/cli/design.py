@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
+from pipeline.cli.speech import columns, entry, language, say, table, told
+from pipeline.messages import Message, free_text
 
 if TYPE_CHECKING:
     from pipeline.diagnosis.plans.design import Design
-
-
-LEGEND = """\
-plausible       a size that would surprise nobody on such a rig; visible: whether it would show
-survives        share of the cause's trace that f_EI, K0, scale and length cannot take up
-nearest twin    the cause with the most similar trace; 1.00: no test of this plan tells the two apart
-taken apart by  what is not in the plan yet and separates it from that twin"""
 
 
 @click.command(short_help="What a planned test could see.")
@@ -49,6 +43,7 @@ taken apart by  what is not in the plan yet and separates it from that twin"""
 )  # fmt: skip
 @click.option("--samples", default=8, show_default=True, type=click.IntRange(1), help="Force samples in a hold.")
 @click.option("--json", "as_json", is_flag=True, help="The outlook as JSON on stdout.")
+@language_option
 @settings_options
 def design(
     length_mm: float,
@@ -59,16 +54,13 @@ def design(
     steps: int,
     step_mm: float,
     as_json: bool,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
     **plan: Any,
 ) -> None:
     """Say what a planned test will know of f_EI, which causes it would show, and which stay invisible."""
-    from pipeline.cli.configuration import read_settings
     from pipeline.diagnosis.plans.design import Plan
     from pipeline.diagnosis.plans.design import design as outlook
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     try:
         planned = Plan(
             length=length_mm * 1e-3,
@@ -90,46 +82,29 @@ def design(
 
 
 def echo_outlook(found: Design) -> None:
-    """Print what will be known, then a line a cause, the most visible first."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
+    """Print what will be known, then each cause, the most visible first: in a terminal with its twin below it."""
     from pipeline.rounding import plain
     from pipeline.units import amount_unit
 
-    kappa = found.extent.kappa_per_m
-    click.echo(
-        f"f_EI from {plain(kappa[0])} to {plain(kappa[-1])} 1/m within {plain(100.0 * found.stiffness_std, 2)} % "
-        f"(1 std, rms), K0 within {plain(found.pre_curvature_std, 2)} 1/m; "
-        f"a cause shows beyond {plain(found.threshold, 2)} std"
-    )
-    table = Table(box=SIMPLE_HEAD)
-    headings = (
-        "cause",
-        "shows from",
-        "plausible",
-        "visible",
-        "survives",
-        "nearest twin",
-        "unseen, f_EI is off by",
-        "taken apart by",
-    )
-    for heading in headings:
-        table.add_column(heading)
+    low, high = found.extent.kappa_per_m[0], found.extent.kappa_per_m[-1]
+    stds = {"stiffness": found.stiffness_std, "K0_per_m": found.pre_curvature_std, "threshold": found.threshold}
+    click.echo(entry("", told(Message("plan.known", low_per_m=low, high_per_m=high, **stds))))
+    heads = [told(Message(f"plan.{name}")) for name in ("cause", "from", "plausible", "visible", "off")]
+    never, yes, no = (told(Message(f"word.{word}")) for word in ("never", "yes", "no"))
+    decimal = "," if language() == "de" else "."
+    rows, twins = [], []
     for cause in found.causes:
         least, likely = cause.minimal_detectable, cause.plausible
-        cells = (
-            cause.name,
-            "never" if least is None else amount_unit(cause.unit, least).plain(least, 2),
-            amount_unit(cause.unit, likely).plain(likely, 2),
-            "yes" if cause.visible else "no",
-            f"{cause.surviving_fraction:.2f}",
-            f"{cause.nearest_twin} {cause.twin_cosine:.2f}" if cause.nearest_twin else "–",
-            f"{plain(100.0 * cause.stiffness_bias_at_plausible_size, 2)} %",
-            cause.separated_by,
-        )
-        table.add_row(*map(Text, cells))
-    Console(width=None if Console().is_terminal else 180).print(table)
-    click.echo(LEGEND)
+        off = plain(100.0 * cause.stiffness_bias_at_plausible_size, 2, decimal=decimal)
+        seen = never if least is None else amount_unit(cause.unit, least, decimal=decimal).plain(least, 2)
+        size = amount_unit(cause.unit, likely, decimal=decimal).plain(likely, 2)
+        rows.append((cause.name, seen, size, yes if cause.visible else no, f"{off} %"))
+        key = "plan.apart" if cause.separated_by else "plan.like" if cause.nearest_twin else "plan.alone"
+        like = {"twin": cause.nearest_twin, "cosine": cause.twin_cosine, "by": free_text(cause.separated_by)}
+        twins.append(told(Message(key, survives=cause.surviving_fraction, **like)))
+    wide = columns() is None
+    for line, twin in zip(table([heads, *rows]), ("", "", *twins), strict=True):
+        click.echo(f"{line:<78}  {twin}".rstrip() if wide else line)
+        if twin and not wide:
+            click.echo(entry("    ", twin))
+    say("plan.legend")

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import click
 
 from pipeline.cli.options import language_option
+from pipeline.cli.speech import entry, language
 
 if TYPE_CHECKING:
     from pipeline.report.words import Words
 
 
+LABEL = re.compile(r"\w[\w ]{,16}: +")
+
+
 @click.command(short_help="What a cause or a message is and what to do.")
 @click.argument("name", required=False)
 @language_option
-def explain(name: str | None, language: str | None) -> None:
+def explain(name: str | None) -> None:
     """Explain a cause of deviations, or the code of a message.
 
     NAME is a cause such as bearing_friction, or the code that stands beside a message, such as photo/blur. Without NAME
@@ -25,7 +30,7 @@ def explain(name: str | None, language: str | None) -> None:
     from pipeline.diagnosis.causes import CATALOGUE
     from pipeline.report.words import Words, documented_codes
 
-    words = Words(language or "en")
+    words = Words(language())
     causes, codes = ("pre_curvature", *(cause.name for cause in CATALOGUE)), tuple(documented_codes())
     if name is None:
         for cause in causes:
@@ -35,14 +40,20 @@ def explain(name: str | None, language: str | None) -> None:
         for code in codes:
             click.echo(f"{code}\n  {(words.code(code) or ('',))[0]}")
     elif name in causes:
-        click.echo(_cause(name, words))
+        click.echo("\n".join(map(_line, _cause(name, words).splitlines())))
     else:
         meant = words.code(name)
         if meant is None:
             near = get_close_matches(name, (*causes, *codes), n=1)
             hint = f"; did you mean {near[0]}?" if near else ": `explain` lists all causes, `explain codes` all codes."
             raise click.BadParameter(f"no cause and no code is called {name!r}{hint}")
-        click.echo("\n".join((name, *meant)))
+        click.echo("\n".join((name, *map(_line, meant))))
+
+
+def _line(text: str) -> str:
+    """A line of a page; in a terminal what follows its label is wrapped beside it."""
+    label = LABEL.match(text)
+    return entry(label[0], text.removeprefix(label[0])) if label else entry("", text)
 
 
 def _cause(cause: str, words: Words) -> str:

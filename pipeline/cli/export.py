@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+from pipeline.cli.options import language_option
+from pipeline.cli.speech import note
+
 MISSING = 3
 NAMES = ("table", "abaqus", "calculix", "mujoco", "pyelastica")
 
@@ -22,6 +25,7 @@ NAMES = ("table", "abaqus", "calculix", "mujoco", "pyelastica")
     help="Curvatures, 1/m, over which one EI stands for the characteristic; by default all that were visited.",
 )  # fmt: skip
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="File; stdout by default.")
+@language_option
 @click.pass_context
 def export(ctx: click.Context, result: Path, form: str, bounds: tuple[float, float] | None, out: Path | None) -> None:
     """Write the answer of RESULT for a simulation program.
@@ -38,7 +42,7 @@ def export(ctx: click.Context, result: Path, form: str, bounds: tuple[float, flo
     try:
         text = exported(read_result(result), form, bounds=bounds)
     except ValueError as error:
-        click.echo(f"cablebend: {error}.", err=True)
+        note(f"{error}.")
         ctx.exit(MISSING)
     if out is None:
         click.echo(text, nl=False)

@@ -11,7 +11,9 @@ from typing import Any
 import click
 
 from pipeline import __version__
+from pipeline.cli.speech import note, refuse
 from pipeline.errors import InputError
+from pipeline.messages import Message
 from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
@@ -52,16 +54,16 @@ class Commands(click.Group):
             with _ended_alike():
                 return super().invoke(ctx)
         except InputError as error:
-            click.echo(f"cablebend: {error.sentence}", err=True)
+            refuse(error)
             ctx.exit(2)
         except KeyboardInterrupt:
-            click.echo("cablebend: interrupted", err=True)
+            note(Message("cli.interrupted"))
             ctx.exit(INTERRUPTED)
         except OSError as error:
             if error.filename is None:  # a closed pipe, not a place the user named
                 raise
-            reason = (error.strerror or type(error).__name__).lower()
-            click.echo(f"cablebend: {error.filename}: {reason}; check that the place exists and can be used.", err=True)
+            why = (error.strerror or type(error).__name__).lower()
+            note(Message("cli.no-place", path=error.filename, why=why))
             ctx.exit(2)
 
 

@@ -6,10 +6,14 @@ from pathlib import Path
 
 import click
 
+from pipeline.cli.options import language_option
+from pipeline.cli.speech import say
+
 
 @click.command(short_help="Write a specimen.toml to fill in.")
 @click.argument("folders", nargs=-1, type=click.Path(path_type=Path), metavar="[FOLDER]...")
 @click.option("--settings", "as_settings", is_flag=True, help="Print all settings, with default, unit and reason.")
+@language_option
 def init(folders: tuple[Path, ...], as_settings: bool) -> None:
     """Write a commented specimen.toml to fill in into each FOLDER of photos.
 
@@ -28,4 +32,4 @@ def init(folders: tuple[Path, ...], as_settings: bool) -> None:
         raise click.UsageError("give a FOLDER of photos, or --settings")
     for folder in folders:
         path = write_template(folder, Settings().intake)
-        click.echo(f"{path}: fill in length_mm and diameter_mm, then `cablebend check {quoted(folder)}`")
+        say("cli.fill-in", path=path, quoted=quoted(folder))

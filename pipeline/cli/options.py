@@ -4,38 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from pipeline.cli.speech import LANGUAGE
+
+if TYPE_CHECKING:
+    from pipeline.settings import Settings
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
+SETTINGS_FILE, ASSIGNMENTS = "cablebend.settings_file", "cablebend.assignments"
+"""Names under which the context of a command keeps what was chosen."""
 
 
 def settings_options(command: Command) -> Command:
-    """Add ``--settings FILE`` and ``--set section.key=value``, as ``settings_file`` and ``assignments``."""
-    command = click.option(
-        "--set", "assignments", multiple=True, metavar="SECTION.KEY=VALUE", help="Change one setting; repeatable."
-    )(command)
-    return click.option(
-        "--settings",
-        "settings_file",
-        type=click.Path(path_type=Path, dir_okay=False, exists=True),
-        metavar="FILE",
-        help="Settings in TOML; `cablebend init --settings` prints all with default, unit and reason.",
-    )(command)
+    """Add ``--settings FILE`` and ``--set section.key=value``, for `chosen_settings`."""
+    told = "Settings in TOML; `cablebend init --settings` prints all with default, unit and reason."
+    file = click.Path(path_type=Path, dir_okay=False, exists=True)
+    one = {"metavar": "SECTION.KEY=VALUE", "help": "Change one setting; repeatable."}
+    command = _kept("--set", "assignments", multiple=True, **one)(command)
+    return _kept("--settings", "settings_file", type=file, metavar="FILE", help=told)(command)
 
 
 def language_option(command: Command) -> Command:
-    """Add ``--language``, as ``language``; it is the setting ``report.language`` under a name one remembers."""
-    return click.option(
-        "--language",
-        type=click.Choice(["de", "en"]),
-        help="Language of reports, index and explanations; all else in the terminal is English. English by default.",
-    )(command)
+    """Add ``--language``: the language of what the command says, for `speech` and `chosen_settings`."""
+    told = "Language of reports and messages; English by default. This help is English."
+    return _kept("--language", type=click.Choice(["de", "en"]), help=told)(command)
 
 
-def chosen_language(language: str | None) -> tuple[str, ...]:
-    """The option as an assignment of a setting. It changes no result, so it is no part of the command in one."""
-    return () if language is None else (f"report.language={language}",)
+def _kept(*names: str, **look: Any) -> Callable[[Command], Command]:
+    """An option whose value the context of the command keeps, under its name."""
+    return click.option(*names, expose_value=False, callback=_keep, **look)
+
+
+def _keep(context: click.Context, parameter: click.Parameter, value: object) -> None:
+    if value is not None:
+        context.meta[f"cablebend.{parameter.name}"] = value
+
+
+def chosen_settings(*more: str) -> Settings:
+    """Settings as the options of the command say, changed by more assignments."""
+    from pipeline.cli.configuration import read_settings
+
+    meta = click.get_current_context().meta
+    # it changes no result, so it is no part of the command in one
+    spoken = [f"report.language={meta[LANGUAGE]}"] if LANGUAGE in meta else []
+    return read_settings(meta.get(SETTINGS_FILE), (*meta.get(ASSIGNMENTS, ()), *more, *spoken))
+
+
+def chosen_options() -> str:
+    """The options on settings, for the command that reproduces a result."""
+    from pipeline.cli.configuration import as_options
+
+    meta = click.get_current_context().meta
+    return as_options(meta.get(SETTINGS_FILE), meta.get(ASSIGNMENTS, ()))

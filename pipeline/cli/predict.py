@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
+from pipeline.cli.speech import entry, note, say, told
+from pipeline.messages import Message, as_message
 
 if TYPE_CHECKING:
     from pipeline.predict import Prediction
+    from pipeline.records import Finding
 
 MISSING = 3
 
@@ -40,6 +44,7 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV of forces and shapes with bands."
 )
+@language_option
 @settings_options
 @click.pass_context
 def predict(
@@ -51,8 +56,6 @@ def predict(
     extrapolate: bool,
     as_json: bool,
     out: Path | None,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Predict forces and shapes of a new experiment by the model identified in RESULT.
 
@@ -62,15 +65,15 @@ def predict(
 
     Exit codes: 0 all steps predicted; 1 some were refused; 3 nothing could be predicted.
     """
-    from pipeline.cli.configuration import read_settings
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
 
-    settings = read_settings(settings_file, assignments)
+    settings = chosen_settings()
     measured = read_result(result)
-    told = measured.answer
-    if told.method is not None and not told.usable:
-        click.echo(f"cablebend: {measured.specimen.id} is not usable: {told.reason.rstrip('.')}.", err=True)
+    name, answer = measured.specimen.id, measured.answer
+    if answer.method is not None and not answer.usable:
+        unusable = Message("comparison.unusable", name=name, reason=as_message(answer.said))
+        note(Message("headline.sentences", sentences=[unusable]))
         ctx.exit(MISSING)
     if length_mm is None and measured.specimen.length_m is None:
         raise click.UsageError("the result tells no length: give --length-mm")
@@ -88,7 +91,7 @@ def predict(
     except ArithmeticError as error:
         raise click.UsageError(f"the numbers of {result} are none of a cable ({error}).") from error
     if prediction is None:
-        click.echo(f"cablebend: {measured.specimen.id} holds no characteristic to predict with", err=True)
+        note(Message("prediction.no-curve", name=name))
         ctx.exit(MISSING)
     if out is not None:
         from pipeline.report.frames import prediction_frame
@@ -96,36 +99,50 @@ def predict(
 
         write_csv(prediction_frame(prediction), out)
     if as_json:
-        from dataclasses import asdict
-
-        click.echo(json.dumps(asdict(prediction), indent=1))
+        click.echo(json.dumps(as_document(prediction), indent=1))
     else:
         echo_prediction(prediction)
     done = sum(step.force_N is not None for step in prediction.steps)
     ctx.exit(0 if done == len(prediction.steps) else 1 if done else MISSING)
 
 
+def as_document(prediction: Prediction) -> dict[str, object]:
+    """The prediction as plain values."""
+    from dataclasses import asdict
+
+    steps = [asdict(step) | {"reason": step.reason} for step in prediction.steps]
+    for step in steps:
+        del step["said"]
+    return asdict(prediction) | {"steps": steps, "findings": [finding.document for finding in prediction.findings]}
+
+
 def echo_prediction(prediction: Prediction) -> None:
     """One line a step, below it what limits the prediction."""
-    from pipeline.rounding import plain, rounded
-
     low, high = prediction.visited_per_m
-    start = rounded(prediction.pre_curvature_per_m, prediction.pre_curvature_std_per_m)
-    click.echo(
-        f"{prediction.specimen} ({prediction.method}), {plain(1e3 * prediction.length_m, 4)} mm long, "
-        f"K0 {start} 1/m, f_EI known from {plain(low, zeros=True)} to {plain(high, zeros=True)} 1/m"
-    )
+    known = {"length_mm": 1e3 * prediction.length_m, "low_per_m": low, "high_per_m": high}
+    rest = (prediction.pre_curvature_per_m, prediction.pre_curvature_std_per_m)
+    say("prediction.model", name=prediction.specimen, method=prediction.method, K0_per_m=rest, **known)
     for step in prediction.steps:
-        shown = f"{plain(1e3 * step.displacement_m, 4):>8} mm  "
-        if step.force_N is None:
-            click.echo(f"{shown}{step.status}: {step.reason}")
-            continue
-        top = max(range(len(step.y_m)), key=lambda i: step.y_m[i])
-        rise = rounded(1e3 * step.y_m[top], 1e3 * step.y_std_m[top])
-        bend = rounded(step.kappa_max_per_m, max(step.kappa_std_per_m))
-        note = f"  {step.status}: {step.reason}" if step.reason else ""
-        click.echo(f"{shown}P {rounded(step.force_N, step.force_std_N)} N, rise {rise} mm, kappa to {bend} 1/m{note}")
+        values: dict[str, object] = {}
+        if step.force_N is not None and step.force_std_N is not None:
+            top = max(range(len(step.y_m)), key=lambda i: step.y_m[i])
+            values["force_N"] = (step.force_N, step.force_std_N)
+            values["rise_m"] = (step.y_m[top], step.y_std_m[top])
+            values["bend_per_m"] = (step.kappa_max_per_m, max(step.kappa_std_per_m))
+        shown = told(Message("prediction.step", **values)) if values else ""
+        why = (
+            told(Message("prediction.status", status=step.status.replace(" ", "-"), said=step.said))
+            if step.said
+            else ""
+        )
+        at = told(Message("prediction.at", displacement_mm=1e3 * step.displacement_m))
+        click.echo(entry(f"{at:>12}  ", "  ".join(filter(None, (shown, why)))))
     if prediction.reachable_m is not None:
-        click.echo(f"within the visited range up to {plain(1e3 * prediction.reachable_m, 4)} mm", err=True)
-    for finding in prediction.findings:
-        click.echo(f"{finding.level}: {finding.message} [{finding.code}]", err=True)
+        click.echo(told(Message("prediction.reachable", reach_mm=1e3 * prediction.reachable_m)), err=True)
+    echo_findings(prediction.findings)
+
+
+def echo_findings(findings: Iterable[Finding]) -> None:
+    """What a reader must know besides, on stderr."""
+    for finding in findings:
+        click.echo(f"{told(Message('word.' + finding.level))}: {told(finding.said)} [{finding.code}]", err=True)

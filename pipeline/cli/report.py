@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
-from pipeline.cli.options import chosen_language, language_option, settings_options
+from pipeline.cli.options import chosen_settings, language_option, settings_options
+from pipeline.cli.speech import refuse, told
 from pipeline.errors import InputError
+from pipeline.messages import Message
 
 
 @click.command(short_help="Draw reports again without measuring.")
@@ -15,20 +17,16 @@ from pipeline.errors import InputError
 @language_option
 @settings_options
 @click.pass_context
-def report(
-    ctx: click.Context, out: Path, language: str | None, settings_file: Path | None, assignments: tuple[str, ...]
-) -> None:
+def report(ctx: click.Context, out: Path) -> None:
     """Draw everything in the results folder OUT again without measuring, for instance with `--language de`."""
     from pipeline.batch import redraw
-    from pipeline.cli.configuration import read_settings
 
-    settings = read_settings(settings_file, (*assignments, *chosen_language(language)))
+    settings = chosen_settings()
     drawn = 0
     for name, trouble in redraw(out, settings):
         drawn += trouble is None
-        click.echo(f"{name}: {'drawn' if trouble is None else trouble}", err=True)
+        click.echo(f"{name}: {told(trouble or Message('cli.drawn'))}", err=True)
     if drawn == 0:
-        error = InputError("holds no results", path=out, code="out/no-results", remedy="give the -o of an earlier run")
-        click.echo(f"cablebend: {error.sentence}", err=True)
+        refuse(InputError(Message("out/no-results"), path=out))
         ctx.exit(3)
     click.echo(out / "index.html")

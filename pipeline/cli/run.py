@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_language, language_option, settings_options
-from pipeline.errors import InputError, printable
+from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, language_option, settings_options
+from pipeline.cli.speech import entry, note, refuse, say, told
+from pipeline.errors import InputError
+from pipeline.messages import UNREADABLE, Message
 
 if TYPE_CHECKING:
     from pipeline.batch import Store, Tally
@@ -41,9 +43,6 @@ def run(
     timeout: float | None,
     no_reports: bool,
     as_json: bool,
-    language: str | None,
-    settings_file: Path | None,
-    assignments: tuple[str, ...],
 ) -> None:
     """Measure specimens and write their reports.
 
@@ -51,20 +50,21 @@ def run(
     program is kept, so the same command resumes an interrupted run.
     """
     from pipeline.batch import Store, run_batch
-    from pipeline.cli.configuration import as_options, read_settings
     from pipeline.cli.progress import progress
 
     given = {"batch.workers": workers, "batch.timeout_s": timeout, "batch.reports": "false" if no_reports else None}
     limits = [f"{name}={value}" for name, value in given.items() if value is not None]
-    options = as_options(settings_file, assignments)
-    settings = read_settings(settings_file, (*assignments, *limits, *chosen_language(language)))
+    options = chosen_options()
+    settings = chosen_settings(*limits)
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))
     with progress(len(specimens)) as show:
-        tally = run_batch(specimens, out, settings, scheduler=scheduler, options=options, on_outcome=show)
+        tally = run_batch(
+            specimens, out, settings, scheduler=scheduler, options=options, on_outcome=show.ended, on_stage=show.doing
+        )
     for sentence in tally.trouble:
-        click.echo(f"cablebend: {sentence}", err=True)
+        note(sentence)
     entries = stored_entries(Store(out), tally)
     if as_json:
         echo_json(entries, tally, out)
@@ -86,22 +86,16 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
             specimens.update(dict.fromkeys(find_specimens([folder], settings)))
         except InputError as error:
             refused.append(error)
-            click.echo(f"cablebend: {error.sentence}", err=True)
+            refuse(error)
     there = [folder for folder in folders if is_folder(folder)]
     if deep := find_too_deep(there, settings):
-        told = (
-            f"folders more than {settings.search_depth} levels below the one given were not searched ({len(deep)}, "
-            f"first {deep[0]}); give a folder nearer to them, or raise intake.search_depth."
-        )
-        click.echo(f"cablebend: {printable(told)}", err=True)
+        note(Message("cli.too-deep", levels=settings.search_depth, count=len(deep), first=deep[0]))
     for folder in find_undescribed(there, settings):
         other = misnamed(folder)
         if other is not None and folder in folders:
             continue  # said above
-        told = (
-            f"{folder}: has photos and a table but no specimen.toml; write one with `cablebend init {quoted(folder)}`."
-        )
-        click.echo(f"cablebend: {printable(told) if other is None else other.sentence}", err=True)
+        undescribed = Message("cli.undescribed", folder=folder, quoted=quoted(folder))
+        note(undescribed if other is None else other.placed)
     return list(specimens), refused
 
 
@@ -131,8 +125,8 @@ def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> Non
     """One JSON document, written piece by piece so that memory does not grow with the batch."""
     keys = ("name", "id", "folder", "status", "headline", "code")
     click.echo('{"specimens": [', nl=False)
-    for number, entry in enumerate(entries):
-        shown = {key: entry.get(key) for key in keys} | {"usable": entry.get("state") in ("measured", "partial")}
+    for number, stored in enumerate(entries):
+        shown = {key: stored.get(key) for key in keys} | {"usable": stored.get("state") in ("measured", "partial")}
         click.echo(("" if number == 0 else ",") + "\n " + json.dumps(shown), nl=False)
     counts = {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused}
     rest = {
@@ -146,14 +140,23 @@ def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> Non
 
 
 def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:
-    """One line a specimen, then the counts and where to look."""
+    """One entry a specimen, then the counts and where to look."""
     width = min(30, max((len(name) for name in tally.names), default=0))
-    for entry in entries:
-        state = {"unusable": "not usable"}.get(entry.get("state", ""), entry["status"])
-        click.echo(f"{entry['name']:<{width}}  {state:<8}  {entry['headline']}")
-    kept = f" ({tally.reused} kept from an earlier run)" if tally.reused else ""
-    unusable = f", {tally.unusable} of them not usable" if tally.unusable else ""
-    counts = f"{tally.measured} of {tally.total} measured{kept}{unusable}, {tally.failed} failed"
-    click.echo(f"{counts}: {out / 'index.html'}")
+    states = {state: told(Message(f"word.{state}")) for state in ("measured", "partial", "failed", "unusable")}
+    for stored in entries:
+        state = states["unusable" if stored.get("state") == "unusable" else stored["status"]]
+        click.echo(entry(f"{stored['name']:<{width}}  {state:<8}  ", told(headline_of(stored))))
+    kept = Message("cli.kept", count=tally.reused) if tally.reused else ""
+    unusable = Message("cli.unusable", count=tally.unusable) if tally.unusable else ""
+    counts = {"measured": tally.measured, "total": tally.total, "failed": tally.failed}
+    say("cli.counts", kept=kept, unusable=unusable, index=out / "index.html", **counts)
     if tally.interrupted:
-        click.echo("interrupted; the same command resumes", err=True)
+        click.echo(told(Message("cli.resume")), err=True)
+
+
+def headline_of(stored: dict[str, Any]) -> Message | str:
+    """What an entry says of its specimen; an entry of an earlier version holds English alone."""
+    try:
+        return Message.read(stored["said"])
+    except UNREADABLE:
+        return str(stored["headline"])

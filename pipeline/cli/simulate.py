@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from pipeline.cli.options import POSITIVE
+from pipeline.cli.options import POSITIVE, language_option
+from pipeline.cli.speech import say
 
 
 def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Any]:
@@ -53,6 +54,7 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
 @click.option("--steps", default=6, show_default=True, type=click.IntRange(1, 200), help="Loading steps.")
 @click.option("--step-mm", default=2.3, show_default=True, type=POSITIVE, help="Displacement of a step.")
 @click.option("--seed", default=0, show_default=True, help="Chooses the noise.")
+@language_option
 def simulate(
     folder: Path,
     effects: dict[str, Any],
@@ -86,4 +88,4 @@ def simulate(
         written = simulate_specimen(folder, experiment)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from error
-    click.echo(f"{written.folder} (truth: {written.truth_file})")
+    say("cli.simulated", folder=written.folder, truth=written.truth_file)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
+from pipeline.messages import Message
 from pipeline.records import Array
 from rod.balance import BalanceGraph
 from rod.inverse import Estimate
@@ -48,7 +49,7 @@ class Agreement:
     compatible : bool
         p_value at least the level.
     level : float
-    hints : tuple of str
+    hints : tuple of Message
         What could make them differ, with the size each would have; empty if compatible.
     """
 
@@ -58,7 +59,7 @@ class Agreement:
     p_value: float
     compatible: bool
     level: float
-    hints: tuple[str, ...] = ()
+    hints: tuple[Message, ...] = ()
 
 
 def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
@@ -140,7 +141,7 @@ def rest_curvature(test: MeasuredTest) -> tuple[float, float] | None:
 
 def difference_hints(
     test: MeasuredTest, inverse: MeasuredLaw, balance: MeasuredLaw, halves_z: float
-) -> tuple[str, ...]:
+) -> tuple[Message, ...]:
     """First candidates for a difference of the two ways, each with the size it would have.
 
     `halves_z` is the difference of the cable's halves in the balance equations, in standard deviations.
@@ -152,12 +153,11 @@ def difference_hints(
     reading = np.interp(grid, inverse.kappa, inverse.secant / inverse.tangent) - 1.0
     stretch = first.onto(grid) @ inverse.gains["scale", -1] - second.onto(grid) @ balance.gains["scale", -1]
     hints = [
-        f"reading one curve as a secant and the other as a tangent would make {100.0 * np.abs(reading).max():.0f} %",
-        f"a scale wrong by 1 % would make {1.0 / test.scale_std * np.abs(stretch).max():.1f} %",
-        f"a pre-curvature that varies along the cable: the halves differ by {abs(halves_z):.1f} standard deviations",
+        Message("hint.reading", change=np.abs(reading).max()),
+        Message("hint.scale", change=0.01 / test.scale_std * np.abs(stretch).max()),
+        Message("hint.varying", z=abs(halves_z)),
     ]
     zeros = [s.chord + s.displacement for s in test.steps if s.chord is not None and s.displacement is not None]
     if len(zeros) > 1:
-        spread = max(zeros) - min(zeros)
-        hints.append(f"displacement against the photos' chords: they differ by {1e3 * spread:.2f} mm over the steps")
+        hints.append(Message("hint.displacement", spread_m=max(zeros) - min(zeros)))
     return tuple(hints)

@@ -1,4 +1,4 @@
-"""What identification noticed: contradictions between photos, log and model, each as one sentence with its figures."""
+"""What identification noticed: contradictions between photos, log and model, each with its figures."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from pipeline.identify.identification import Identification
-from pipeline.records import Finding, Level
-from pipeline.rounding import p_value
+from pipeline.messages import Message, free_text
+from pipeline.records import Finding, Level, doubtful
 from pipeline.settings.identify import IdentifySettings
-from pipeline.units import quantity
 from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
@@ -34,35 +33,24 @@ def _outcomes(found: Identification) -> Iterator[Finding]:
     inverse, graph = found.inverse.outcome, found.balance.outcome
     if inverse is not InverseOutcome.CONVERGED:
         level: Level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
-        named = f"; open: {'; '.join(found.inverse.invisible)}" if found.inverse.invisible else ""
-        yield Finding(f"identify/inverse-{_code(inverse.name)}", level, f"inverse problem: {inverse.value}{named}")
+        open_ = [free_text(text) for text in found.inverse.invisible]
+        key = "way.inverse-open" if open_ else "way.inverse"
+        said = Message(key, outcome=free_text(inverse.value), open=open_)
+        yield Finding(f"identify/inverse-{inverse.name.lower().replace('_', '-')}", level, said)
     if graph is not BalanceOutcome.MEASURED:
-        yield Finding(f"identify/balance-{_code(graph.name)}", "warning", f"balance equations: {graph.value}")
-
-
-def _code(name: str) -> str:
-    return name.lower().replace("_", "-")
+        said = Message("way.balance", outcome=free_text(graph.value))
+        yield Finding(f"identify/balance-{graph.name.lower().replace('_', '-')}", "warning", said)
 
 
 def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
     """Sign of the forces, and the load cell's zero in the force-free step."""
     loaded = [step.force for step in test.steps if step.branch != "mounted"]
     if loaded and np.median(loaded) < 0.0:
-        yield Finding(
-            "identify/force-sign",
-            "warning",
-            f"the forces of the loaded steps are tension (median {quantity(float(np.median(loaded)), 'N')}), but a "
-            "cable pushed together is compressed; if the log counts compression as negative, set "
-            'rig.force_sign = "tension"',
-        )
+        yield doubtful("identify/force-sign", median_N=np.median(loaded))
     for step in test.steps:
         if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
-            yield Finding(
-                "identify/force-zero",
-                "warning",
-                f"the load cell reads {quantity(step.force, 'N', step.force_std)} in the force-free step {step.step}, "
-                f"{abs(step.force) / step.force_std:.1f} standard deviations from zero",
-            )
+            z = abs(step.force) / step.force_std
+            yield doubtful("identify/force-zero", force_N=(step.force, step.force_std), step=step.step, z=z)
 
 
 def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
@@ -81,24 +69,16 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
     allowed = settings.chord_sigma * np.hypot(std[worst], test.scale_std * np.ptp(moved))
     if abs(off[worst]) > allowed:
         if np.ptp(moved) == 0.0:
-            yield Finding(
-                "identify/chord-displacement",
-                "warning",
-                f"the chords on the photos differ by {1e3 * np.ptp(chord):.3f} mm, but the log has one displacement "
-                "for all steps",
-            )
+            yield doubtful("identify/chord-displacement.one", spread_m=np.ptp(chord))
             return
         slope = -np.polyfit(moved, chord, 1)[0]
-        approach = f"on the photos the bearings approach by {100.0 * slope:.1f} % of what the log says"
-        if slope < 0.0:
-            approach = (
-                "on the photos the bearings move apart where the log pushes them together: is their order reversed?"
-            )
-        yield Finding(
+        way = "apart" if slope < 0.0 else "approach"
+        yield doubtful(
             "identify/chord-displacement",
-            "warning",
-            f"chord on the photos and displacement in the log disagree by up to {1e3 * abs(off[worst]):.3f} mm (step "
-            f"{both[worst].step}, {abs(off[worst]) / std[worst]:.0f} standard deviations); {approach}",
+            off_m=abs(off[worst]),
+            step=both[worst].step,
+            z=abs(off[worst]) / std[worst],
+            approach=Message(f"identify/chord-displacement.{way}", share=slope),
         )
 
 
@@ -107,18 +87,11 @@ def _pre_curvature(found: Identification, settings: IdentifySettings) -> Iterato
     if "photo" not in sources:
         return
     photo, photo_std = sources["photo"]
-    for name, what in (("inverse", "the fit"), ("balance", "the zero of the moment")):
-        if name not in sources:
-            continue
-        value, std = sources[name]
-        z = (value - photo) / np.hypot(std, photo_std)
-        if abs(z) > settings.pre_curvature_sigma:
-            yield Finding(
-                f"identify/pre-curvature-{name}",
-                "warning",
-                f"the force-free photo shows a pre-curvature of {photo:.3f} +- {photo_std:.3f} 1/m, {what} of the "
-                f"loaded photos says {value:.3f} +- {std:.3f} 1/m ({abs(z):.1f} standard deviations apart)",
-            )
+    for name, (value, std) in sources.items():
+        z = abs(value - photo) / np.hypot(std, photo_std)
+        if name != "photo" and z > settings.pre_curvature_sigma:
+            seen = {"photo_per_m": photo, "photo_std_per_m": photo_std, "value_per_m": value, "std_per_m": std}
+            yield doubtful(f"identify/pre-curvature-{name}", **seen, z=z)
 
 
 def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float]]:
@@ -134,50 +107,33 @@ def _nuisances(found: Identification, settings: IdentifySettings) -> Iterator[Fi
     model, u = found.inverse.model, found.inverse.unknowns
     if model is None:
         return
-    pulls = {name: float(u[model.index(name)]) for name in ("length", "scale")}
-    texts = {
-        "length": f"the fitted length is {1e3 * model.cable_length(u):.2f} mm, {1e3 * model.length:.2f} mm were given",
-        "scale": f"the photos fit better at a scale changed by {100 * model.nuisance(u, 'scale'):.2f} %",
+    figures = {
+        "length": {"fitted_m": model.cable_length(u), "given_m": model.length},
+        "scale": {"change": model.nuisance(u, "scale")},
     }
-    for name, pull in pulls.items():
-        if abs(pull) > settings.nuisance_sigma:
-            yield Finding(
-                f"identify/{name}", "warning", f"{texts[name]} ({abs(pull):.1f} of its standard deviations away)"
-            )
+    for name, values in figures.items():
+        pull = abs(float(u[model.index(name)]))
+        if pull > settings.nuisance_sigma:
+            yield doubtful(f"identify/{name}", **values, z=pull)
 
 
 def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
     evaluation = found.inverse.evaluation
     if evaluation is None:
         return
-    for kind, what in (("shape", "shapes"), ("force", "forces")):
+    for kind in ("shape", "force"):
         chi2, count = evaluation.chi2(kind)
         if count and chdtrc(count, chi2) < settings.misfit_level:
-            yield Finding(
-                f"identify/misfit-{kind}",
-                "warning",
-                f"the simulation leaves residuals in the {what} beyond their noise, "
-                f"{np.sqrt(chi2 / count):.1f} standard deviations rms; the diagnosis looks for the cause",
-            )
+            yield doubtful(f"identify/misfit-{kind}", rms=np.sqrt(chi2 / count))
 
 
 def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
     laws = [branch.law for branch in found.branches.values() if branch.law is not None]
     if found.branches_p is not None and found.branches_p < settings.branch_level:
-        one, two = laws  # loading, unloading
-        yield Finding(
-            "identify/branches",
-            "warning",
-            "loading and unloading show different characteristics: pre-curvature "
-            f"{one.pre_curvature:.3f} +- {one.pre_curvature_std:.3f} against "
-            f"{two.pre_curvature:.3f} +- {two.pre_curvature_std:.3f} 1/m ({p_value(found.branches_p)}); "
-            "the common fit is a mean of both",
-        )
+        one, two = ((law.pre_curvature, law.pre_curvature_std) for law in laws)  # loading, unloading
+        told = {"one_per_m": one[0], "one_std_per_m": one[1], "two_per_m": two[0], "two_std_per_m": two[1]}
+        yield doubtful("identify/branches", **told, p=found.branches_p)
     agreement = found.agreement
     if agreement is not None and not agreement.compatible:
-        yield Finding(
-            "identify/agreement",
-            "warning",
-            f"inverse and balance differ by {100.0 * agreement.rms_relative:.1f} % rms, more than their joint "
-            f"uncertainty ({p_value(agreement.p_value)}); " + "; ".join(agreement.hints),
-        )
+        figures = {"rms": agreement.rms_relative, "p": agreement.p_value}
+        yield doubtful("identify/agreement", **figures, hints=agreement.hints)

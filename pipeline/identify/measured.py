@@ -1,4 +1,4 @@
-"""From the records of the folder and of the photos to the one record that the mechanics reads.
+"""Records of folder and photos -> the one record that the mechanics reads.
 
 Steps of the force log and centerlines of the photos meet by the photo's name. SI units; axes of `rod.measurement`.
 """

@@ -119,7 +119,7 @@ def inverse_part(found: Identification) -> InversePart:
 
 
 def _readings(law: MeasuredLaw, fitted: ComplianceLaw) -> list[KnotPart]:
-    """The law where its form needs the most points: evenly along its own abscissa (`rod.compliance_law`)."""
+    """Points of the law, dense where it bends most: evenly along its own abscissa (`rod.compliance_law`)."""
     place = fitted.basis.place(law.moment)
     even = np.linspace(place[0], place[-1], READINGS)
     return [
@@ -192,7 +192,7 @@ def agreement_part(found: Identification) -> AgreementPart:
         level=agreement.level,
         range_per_m=agreement.range_per_m,
         pre_curvature=sources,
-        hints=list(agreement.hints),
+        hints=list(map(str, agreement.hints)),
     )
 
 

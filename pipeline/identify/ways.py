@@ -67,7 +67,7 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
 def identify_without(
     found: Identification, photos: Collection[int], forces: Collection[int], settings: IdentifySettings
 ) -> Identification:
-    """Both ways again without what contradicts all else: a wrong force or photo is no property of the cable.
+    """Both ways again without forces and photos that contradict all others.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.messages import Message
 
 CHUNK_BYTES = 1 << 20
 LONGEST_PATH = 1000
@@ -64,7 +65,7 @@ def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:
     except OSError as error:
         raise unreadable(path, error) from error
     if len(data) > limit:
-        raise _too_large(path, len(data), limit, setting)
+        raise InputError(Message("file/too-large", bytes=len(data), limit=limit, setting=setting), path=path)
     return data
 
 
@@ -75,9 +76,9 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
     except OSError as error:
         raise unreadable(path, error) from error
     if not stat.S_ISREG(status.st_mode):
-        raise InputError("is no ordinary file", path=path, code="file/not-a-file", remedy="put a file in its place")
+        raise InputError(Message("file/not-a-file"), path=path)
     if status.st_size > limit:
-        raise _too_large(path, status.st_size, limit, setting)
+        raise InputError(Message("file/too-large", bytes=status.st_size, limit=limit, setting=setting), path=path)
 
 
 def read_begin(path: Path, count: int) -> bytes:
@@ -115,29 +116,9 @@ def sha256(path: Path) -> str:
 
 def outside(path: Path, name: str, line_of: Callable[[], int | None] | None = None) -> InputError:
     """The error for a name that leads out of the specimen folder."""
-    return InputError(
-        f"{name!r} leads out of the specimen folder",
-        path=path,
-        line=None if line_of is None else line_of(),
-        code="file/outside",
-        remedy="copy the file into the folder, or set intake.allow_outside = true if you trust it",
-    )
+    return InputError(Message("file/outside", name=repr(name)), path=path, line=None if line_of is None else line_of())
 
 
 def unreadable(path: Path, error: OSError) -> InputError:
     """The error for a file the operating system does not hand over."""
-    return InputError(
-        f"cannot be read ({(error.strerror or type(error).__name__).lower()})",
-        path=path,
-        code="file/unreadable",
-        remedy="check that it exists, its permissions and its links",
-    )
-
-
-def _too_large(path: Path, size: int, limit: int, setting: str) -> InputError:
-    return InputError(
-        f"has {size} bytes, the limit is {limit}",
-        path=path,
-        code="file/too-large",
-        remedy=f"reduce it or raise intake.{setting}",
-    )
+    return InputError(Message("file/unreadable", why=(error.strerror or type(error).__name__).lower()), path=path)

@@ -14,6 +14,7 @@ from pipeline.errors import InputError
 from pipeline.intake.columns import Columns, factor_of
 from pipeline.intake.dialect import is_missing
 from pipeline.intake.specimenfile import MEASURED
+from pipeline.messages import Message
 
 WITH_UNIT = re.compile(r"(?P<number>[-+−]?[\d.,\s'’]*\d(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]+)")
 
@@ -55,13 +56,7 @@ def without_units(
                 continue
             raise
         if role not in columns.assumed and factor != columns.factor[role]:
-            raise InputError(
-                f"the header says {columns.units[role]}, the cells below it say {unit}",
-                path=path,
-                line=line,
-                code="log/unit",
-                remedy="correct one of them",
-            )
+            raise InputError(Message("log/unit.cells", header=columns.units[role], cells=unit), path=path, line=line)
         table = {**table, role: cells}
         columns = replace(
             columns,

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.intake.dialect import SEPARATORS, Row, Rows, column_names, head_rows, looks_like_number
+from pipeline.intake.dialect import SEPARATORS, Rows, column_names, head_rows, looks_like_number
 from pipeline.intake.specimenfile import MEASURED, ROLES, LogSpec
+from pipeline.messages import Message
 from pipeline.settings.intake import IntakeSettings
 
 UNITS: dict[str, dict[str, float]] = {
@@ -103,30 +104,20 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
     best: tuple[int, int, str] | None = None
     for separator, head in heads.items():
         if not head:
-            raise InputError("is empty", path=path, code="log/empty", remedy="export the forces again")
+            raise InputError(Message("log/empty"), path=path)
         for row, (_, names) in enumerate(head):
             found = len(_roles(names, spec))
             if found > (best[0] if best else 1):
                 best = found, row, separator
     if best is None:
         rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
-        raise _no_header(rows, path)
+        # the columns may stand apart by what is no separator here
+        apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
+        told = Message("log/no-header.apart" if apart else "log/no-header", first=column_names(rows))
+        raise InputError(told, path=path, line=rows[0][0])
     _, row, separator = best
     whole = Rows.of(text, separator)
     return _columns(whole, row, spec, path), whole
-
-
-def _no_header(rows: list[Row], path: Path) -> InputError:
-    """The error for a log without known names; its columns may stand apart by what is no separator here."""
-    apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
-    named = 'name the columns in [force_log] of specimen.toml: columns = {force = "...", displacement = "..."}'
-    return InputError(
-        f"no line names a force column and a displacement column (first line: {column_names(rows)})",
-        path=path,
-        line=rows[0][0],
-        code="log/no-header",
-        remedy="export the table with semicolons, commas or tabs between its columns" if apart else named,
-    )
 
 
 def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
@@ -179,24 +170,12 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
     places = _roles(header, spec)
     for role in ("force", "displacement"):
         if role not in places:
-            raise InputError(
-                f"no column of {role} among {column_names([rows[row]])}",
-                path=path,
-                line=line,
-                code="log/no-column",
-                remedy=f'name it in [force_log] of specimen.toml: columns = {{{role} = "..."}}',
-            )
+            raise InputError(Message("log/no-column", role=role, names=column_names([rows[row]])), path=path, line=line)
     for role, where in places.items():
         if len(where) > 1:
             names = [header[place] for place in where]
-            choose = f'choose in [force_log] of specimen.toml: columns = {{{role} = "..."}}'
-            raise InputError(
-                f"{' and '.join(map(repr, names))} may both be the {role}",
-                path=path,
-                line=line,
-                code="log/ambiguous-column",
-                remedy=choose if len(set(names)) > 1 else "give the columns different names",
-            )
+            key = "log/ambiguous-column" if len(set(names)) > 1 else "log/ambiguous-column.same-name"
+            raise InputError(Message(key, names=map(repr, names), role=role), path=path, line=line)
     index = {role: where[0] for role, where in places.items()}
     headless = isinstance(spec.columns.get("force"), int)
     below = rows[row + 1][1] if len(rows) > row + 1 else []
@@ -239,14 +218,8 @@ def factor_of(role: str, unit: str, path: Path, line: int | None) -> float:
     alike = {factor for name, factor in known.items() if name.casefold() == unit.casefold()}
     if len(alike) == 1:
         return alike.pop()
-    raise InputError(
-        f"{unit!r} is no known unit of {role}",
-        path=path,
-        line=line,
-        code="log/unit",
-        remedy=f'set units = {{{role} = "{ASSUMED[role]}"}} in [force_log] of specimen.toml, or another of '
-        + ", ".join(known),
-    )
+    told = Message("log/unit", unit=repr(unit), role=role, usual=ASSUMED[role], known=known)
+    raise InputError(told, path=path, line=line)
 
 
 def _split_unit(cell: str) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from typing import Literal
 
 from pipeline.errors import InputError
 from pipeline.intake.tomltable import shown
+from pipeline.messages import Message
 
 Decimal = Literal[".", ","]
 Row = tuple[int, list[str]]  # line number from 1, cells
@@ -29,9 +30,9 @@ HEAD_CHARACTERS = 1_000_000
 SEPARATORS = ("\t", ";", ",")
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 OTHER_FILES = {
-    b"PK\x03\x04": "an Excel workbook",
-    b"\xd0\xcf\x11\xe0": "an Excel workbook",
-    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "excel",
+    b"\xd0\xcf\x11\xe0": "excel",
+    b"%PDF": "pdf",
 }
 """First bytes of what is renamed to a table most often."""
 
@@ -61,21 +62,16 @@ def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str
     """
     for begin, kind in OTHER_FILES.items():
         if data.startswith(begin):
-            raise InputError(
-                f"is {kind}, whatever its name says",
-                path=path,
-                code="log/encoding",
-                remedy="open it and save the table as CSV text",
-            )
+            raise InputError(Message("log/encoding.other-kind", kind=kind), path=path)
     name = encoding or _guess(data)
     try:
         text = data.decode(name)
     except UnicodeDecodeError as error:
-        raise _no_text(path) from error
+        raise InputError(Message("log/encoding"), path=path) from error
     # some programs fill their last block up, or end a text as CP/M did
     text = text.removeprefix("\ufeff").rstrip("\0\x1a")
     if "\0" in text:
-        raise _no_text(path)
+        raise InputError(Message("log/encoding"), path=path)
     return text.replace("\r\n", "\n").replace("\r", "\n"), name
 
 
@@ -95,15 +91,6 @@ def _guess(data: bytes) -> str:
     except UnicodeDecodeError:
         return "cp1252"
     return "utf-8"
-
-
-def _no_text(path: Path) -> InputError:
-    return InputError(
-        "is no text in UTF-8, UTF-16 or cp1252",
-        path=path,
-        code="log/encoding",
-        remedy="export it as CSV text, or set encoding in [force_log] of specimen.toml",
-    )
 
 
 @dataclass(frozen=True)
@@ -225,12 +212,7 @@ def decimal_sign(
     told = {_decisive(cell) for cell in others()} - {None}
     if len(told) == 1:
         return "," if "," in told else "."
-    raise InputError(
-        f"{smooth(marked[0])!r} may be a fraction or a thousand, and no other number of the file decides",
-        path=path,
-        code="log/ambiguous-decimal",
-        remedy='set decimal = "," or decimal = "." in [force_log] of specimen.toml',
-    )
+    raise InputError(Message("log/ambiguous-decimal", number=repr(smooth(marked[0]))), path=path)
 
 
 def _decisive(cell: str) -> Decimal | None:
@@ -287,4 +269,4 @@ def decimals(cell: str, decimal: Decimal) -> int:
 def column_names(rows: Sequence[Row]) -> str:
     """The cells of a row for a message: at most ten, in quotes."""
     names = [shown(cell) for cell in rows[0][1] if cell][:10] if rows else []
-    return ", ".join(names) or "nothing"
+    return ", ".join(names) or "–"

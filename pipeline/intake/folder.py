@@ -16,11 +16,11 @@ from typing import Literal
 from pipeline.errors import InputError
 from pipeline.intake.access import inside, is_folder, outside, sha256, unreadable
 from pipeline.intake.forcelog import read_force_log
-from pipeline.intake.noted import inferred
 from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key
 from pipeline.intake.plausibility import size_findings
 from pipeline.intake.specimenfile import NAME, SpecimenFile, read_specimen_file
-from pipeline.records import Finding, Specimen
+from pipeline.messages import Message
+from pipeline.records import Finding, Specimen, inferred
 from pipeline.settings.intake import IntakeSettings
 
 LOG_NAME = "force.csv"
@@ -49,12 +49,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
             other = misnamed(path)
             if other is not None:
                 raise other
-            raise InputError(
-                f"holds no {NAME}, neither itself nor in its folders",
-                path=path,
-                code="folder/no-specimen",
-                remedy="write one with `cablebend init`",
-            )
+            raise InputError(Message("folder/no-specimen"), path=path)
         found.update(dict.fromkeys(here))
     return list(found)
 
@@ -68,7 +63,7 @@ def _check_folder(path: Path) -> None:
     except OSError as error:
         raise unreadable(path, error) from error
     if not there:
-        raise InputError("is no folder", path=path, code="folder/missing", remedy="give a specimen folder or one above")
+        raise InputError(Message("folder/missing"), path=path)
 
 
 def misnamed(folder: Path) -> InputError | None:
@@ -77,14 +72,7 @@ def misnamed(folder: Path) -> InputError | None:
         other = next((e.name for e in folder.iterdir() if e.name != NAME and e.name.casefold() == NAME), None)
     except OSError:
         return None
-    if other is None:
-        return None
-    return InputError(
-        f"holds {other}, but no {NAME}",
-        path=folder,
-        code="folder/no-specimen",
-        remedy=f"write its name in small letters: {NAME}",
-    )
+    return None if other is None else InputError(Message("folder/no-specimen.capitals", other=other), path=folder)
 
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
@@ -212,13 +200,8 @@ def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tup
         if path is None:
             raise outside(file.source.path, file.log.file, lambda: file.source.line_of("force_log", "file"))
         if not os.path.lexists(path):
-            raise file.source.error(
-                f"the force log {file.log.file!r} does not exist",
-                table="force_log",
-                key="file",
-                code="folder/no-force-log",
-                remedy="correct the name",
-            )
+            told = Message("folder/no-force-log.named", name=repr(file.log.file))
+            raise file.source.error(told, table="force_log", key="file")
         return path, []
     if os.path.lexists(folder / LOG_NAME):
         path = inside(folder, LOG_NAME, allow_outside=settings.allow_outside)
@@ -228,30 +211,14 @@ def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tup
     names = candidate_logs(folder)
     if not names:
         sheets = sorted(entry.name for entry in folder.iterdir() if entry.suffix.casefold() in SPREADSHEETS)
-        if sheets:
-            raise InputError(
-                f"has no force log but the spreadsheet {sheets[0]}",
-                path=folder,
-                code="folder/no-force-log",
-                remedy=f"open it and save the table of forces as {LOG_NAME} (CSV text)",
-            )
-        raise InputError(
-            "has no force log",
-            path=folder,
-            code="folder/no-force-log",
-            remedy=f"export the forces to {LOG_NAME}, or name the file in [force_log] of {NAME}",
-        )
+        key = "folder/no-force-log.sheet" if sheets else "folder/no-force-log"
+        raise InputError(Message(key, log=LOG_NAME, sheet=next(iter(sheets), "")), path=folder)
     if len(names) > 1:
-        raise InputError(
-            f"holds several files that may be the force log: {', '.join(names[:5])}",
-            path=folder,
-            code="folder/several-logs",
-            remedy=f'choose in {NAME}: [force_log] file = "{names[0]}"',
-        )
+        raise InputError(Message("folder/several-logs", names=names[:5], first=names[0]), path=folder)
     path = inside(folder, names[0], allow_outside=settings.allow_outside)
     if path is None:
         raise outside(folder / names[0], names[0])
-    return path, [inferred("log/file-inferred", f"{names[0]} was taken as the force log: it is the only table")]
+    return path, [inferred("log/file-inferred", file=names[0])]
 
 
 def candidate_logs(folder: Path) -> list[str]:
@@ -275,13 +242,7 @@ def _calibration_photos(
         return {}, []
     names = list_photos(place, without=None, settings=settings)
     if not names:
-        raise file.source.error(
-            "the calibration folder holds no photos",
-            table="camera",
-            key="calibration",
-            code="camera/no-calibration-photos",
-            remedy="put photos of the board into it, or give scale_px_per_mm instead",
-        )
+        raise file.source.error(Message("camera/no-calibration-photos"), table="camera", key="calibration")
     hashes: dict[str, str] = {}
     findings: list[Finding] = []
     for name in names:

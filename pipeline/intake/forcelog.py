@@ -14,11 +14,11 @@ from pipeline.intake.access import read_bytes
 from pipeline.intake.columns import Columns, find_columns
 from pipeline.intake.dialect import decode
 from pipeline.intake.holds import load_steps
-from pipeline.intake.noted import inferred
 from pipeline.intake.response import check_response
 from pipeline.intake.samples import read_samples
 from pipeline.intake.specimenfile import LogSpec
-from pipeline.records import Finding, LoadStep
+from pipeline.messages import Message
+from pipeline.records import Finding, LoadStep, inferred
 from pipeline.settings.intake import IntakeSettings
 
 
@@ -66,11 +66,10 @@ def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:
     """What was inferred about the notation."""
     findings = []
     if encoding == "cp1252":
-        findings.append(inferred("log/encoding-inferred", f"{path.name}: read as cp1252, because it is not UTF-8"))
+        findings.append(inferred("log/encoding-inferred", file=path.name))
     if columns.skipped_lines:
-        message = f"the header is line {columns.header_line}; what stands above it was skipped"
-        findings.append(inferred("log/metadata", f"{path.name}: {message}"))
+        findings.append(inferred("log/metadata", file=path.name, line=columns.header_line))
     if columns.assumed:
-        taken = ", ".join(f"{role} in {columns.units[role]}" for role in columns.assumed)
-        findings.append(inferred("log/unit-assumed", f"{path.name}: no unit given; taken as {taken}"))
+        taken = [Message("log/unit-assumed.role", role=role, unit=columns.units[role]) for role in columns.assumed]
+        findings.append(inferred("log/unit-assumed", file=path.name, taken=taken))
     return findings

@@ -22,7 +22,7 @@ from scipy import special
 from pipeline.records import Array
 from pipeline.settings.intake import IntakeSettings
 
-FROM_SAMPLES = "samples of the holds"
+FROM_SAMPLES = "samples"
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,7 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
     freedom = sum(fit.freedom for fit in fits)
     if freedom == 0:
         sigma = max(settings.force_std_relative * largest, floor)
-        return HoldForces(
-            tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, "share of the largest force"
-        )
+        return HoldForces(tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, "share")
     inflation = math.sqrt(_inflation(fits))
     sigmas = [sigma * inflation for sigma in _sigmas(fits, floor)]
     bend = _left_over(holds, fits, sigmas, degree)

@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
 from pipeline.intake.holdplace import HoldPlaces, hold_places
-from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
 from pipeline.intake.signs import force_sign, from_mounted, inferred_branches, signed_displacements
 from pipeline.intake.specimenfile import LogSpec
-from pipeline.records import Array, Branch, Finding, LoadStep
+from pipeline.messages import Message
+from pipeline.records import Array, Branch, Finding, LoadStep, doubtful, inferred
 from pipeline.settings.intake import IntakeSettings
-from pipeline.units import quantity
 
 SPREAD = 8.0
 """Standard deviations of the scatter that the samples of a hold may lie apart: 1,000 of them do so by 6.5."""
@@ -66,9 +65,8 @@ def load_steps(
     displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
     left_out: list[Finding] = []
     while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs, settings)):
-        line, force = samples.lines[wild[0]], quantity(float(samples.forces[wild[0]]), "N")
-        message = f"{len(wild)} forces are off by more than the largest of all holds and were left out"
-        left_out.append(doubtful("log/wild-force", f"{name}: {message} (first: line {line}, {force})"))
+        line, force = samples.lines[wild[0]], float(samples.forces[wild[0]])
+        left_out.append(doubtful("log/wild-force", file=name, count=len(wild), line=line, force_N=force))
         samples = samples.without(wild)
         displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
     places = hold_places(
@@ -175,10 +173,9 @@ def _runs(
     long = _held(stretches, displacements, tolerance, settings)
     named = [any(samples.images[slice(*pair)]) for pair in stretches]
     held = [pair for pair, keep in zip(stretches, long | named, strict=True) if keep] if long.any() else stretches
-    way = f", {len(stretches) - len(held)} shorter ones are the way between them" if len(held) < len(stretches) else ""
-    message = f"{name}: no step numbers; {len(held)} stretches of constant displacement are the steps{way}"
+    key = "log/steps-inferred.way" if len(held) < len(stretches) else "log/steps-inferred"
     runs = [Run(first, last, number) for number, (first, last) in enumerate(held)]
-    return runs, [inferred("log/steps-inferred", message)]
+    return runs, [inferred(key, file=name, steps=len(held), others=len(stretches) - len(held))]
 
 
 def _held(
@@ -209,17 +206,16 @@ def _numbered(
     known = [number for number in numbers if number is not None]
     if len(set(known)) == len(numbers):
         return [Run(*pair, number) for pair, number in zip(pairs, known, strict=True)], []
-    message = f"{name}: the step numbers are not unique numbers; the steps were numbered in their order"
-    noted = [inferred("log/steps-renumbered", message)]
+    noted = [inferred("log/steps-renumbered", file=name)]
     begun: dict[int, int] = {}
     for again, number in zip(starts, numbers, strict=True):
         if number is None or begun.setdefault(number, again) == again:
             continue
         first = begun[number]
         if abs(displacements[again] - displacements[first]) > tolerance:
-            lines = f"lines {samples.lines[first]} and {samples.lines[again]}"
-            places = f"{displacements[first] * 1e3:.4g} and {displacements[again] * 1e3:.4g} mm"
-            noted.append(doubtful("steps/doubled", f"{name}, {lines}: step {number} stands for {places}"))
+            place = {"file": name, "line": samples.lines[first], "again": samples.lines[again], "step": number}
+            at = {"one_m": displacements[first], "other_m": displacements[again]}
+            noted.append(doubtful("steps/doubled", **place, **at))
     return [Run(*pair, number) for number, pair in enumerate(pairs)], noted
 
 
@@ -256,14 +252,9 @@ def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
 
 
 def _check_count(runs: Sequence[Run], path: Path, settings: IntakeSettings) -> None:
-    """Refuse a log of more steps than anybody holds: a ramp without holds, or a step column that counts the rows."""
+    """Refuse a log of too many steps: a ramp without holds, or a step column that counts the rows."""
     if len(runs) > settings.steps_max:
-        raise InputError(
-            f"holds {len(runs)} steps, the limit is {settings.steps_max}",
-            path=path,
-            code="log/too-many-steps",
-            remedy="give all rows of one hold the same number in the column step, or raise intake.steps_max",
-        )
+        raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
 
 
 def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
@@ -273,17 +264,11 @@ def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
         return
     scatter = [float(np.ptp(samples.displacements[hold])) for hold in holds]
     if min(scatter) > 0.0 and np.ptp(samples.forces) > 0.0:
-        raise InputError(
-            f"the force is constant in each of {len(holds)} holds while the displacement scatters by "
-            f"{max(scatter) * 1e3:.3g} mm: the two columns seem to be swapped",
-            path=path,
-            code="log/swapped-columns",
-            remedy="correct the header, or name the columns in [force_log] of specimen.toml",
-        )
+        raise InputError(Message("log/swapped-columns", holds=len(holds), scatter_m=max(scatter)), path=path)
 
 
 def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[int]:
-    """Rows whose force no cable could have: a slipped digit, a word of the transmission lost.
+    """Rows whose force no cable could have: a slipped digit, a damaged transmission.
 
     Only where the other samples of the hold agree that it is wrong, which takes four of them.
     """
@@ -300,24 +285,17 @@ def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[
 def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> Iterator[Finding]:
     """How the forces and their standard deviations were found, where that is not the plain mean of a hold."""
     if fitted.degree:
-        message = f"{name}: the force changes while a step is held; it was taken at the moment of the photo"
-        yield inferred("log/trend", f"{message}, from a trend of degree {fitted.degree} in time")
+        yield inferred("log/trend", file=name, degree=fitted.degree)
     if fitted.source != FROM_SAMPLES:
-        share = (
-            f"{100.0 * settings.force_std_relative:.1f} % of the largest force, {quantity(float(fitted.std[0]), 'N')}"
-        )
-        yield inferred("log/force-std", f"{name}: no repeated samples; standard deviation of a force taken as {share}")
+        share = settings.force_std_relative
+        yield inferred("log/force-std", file=name, share=share, std_N=float(fitted.std[0]))
 
 
 def _place_findings(places: HoldPlaces, tolerance: float, name: str) -> Iterator[Finding]:
-    """A displacement that scatters by more than holds are told apart by."""
+    """A displacement that scatters by more than the difference that makes a new hold."""
     if places.sigma > tolerance:
         largest = max(std for std in places.std if std is not None)
-        message = (
-            f"the displacement scatters by {places.sigma * 1e3:.2g} mm from sample to sample; that of a step "
-            f"is known to {largest * 1e3:.2g} mm"
-        )
-        yield inferred("log/displacement-noise", f"{name}: {message}")
+        yield inferred("log/displacement-noise", file=name, scatter_m=places.sigma, std_m=largest)
 
 
 def _hold_findings(
@@ -325,14 +303,11 @@ def _hold_findings(
 ) -> Iterator[Finding]:
     """Contradictions within a hold: a displacement that moves by more than ``most`` (m), more than one photo."""
     for run in runs:
-        place = f"{name}, line {samples.lines[run.first]}"
+        place = {"file": name, "line": samples.lines[run.first], "step": run.step}
         spread = float(np.ptp(displacements[run.rows]))
         if spread > most:
-            message = (
-                f"the displacement moves by {spread * 1e3:.3g} mm within step {run.step}; that at the photo was taken"
-            )
-            yield doubtful("steps/displacement-spread", f"{place}: {message}")
+            yield doubtful("steps/displacement-spread", spread_m=spread, **place)
         images = list(dict.fromkeys(image for image in samples.images[run.rows] if image))
         if len(images) > 1:
-            message = f"step {run.step} names {len(images)} photos; {images[0]!r} was taken, {images[1]!r} not"
-            yield doubtful("photo/several", f"{place}: {message}")
+            taken, other = map(repr, images[:2])
+            yield doubtful("photo/several", count=len(images), taken=taken, other=other, **place)

@@ -15,9 +15,9 @@ from pathlib import Path, PurePosixPath
 
 from pipeline.errors import InputError
 from pipeline.intake.access import check_file, inside, read_begin, sha256
-from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.tomltable import shown
-from pipeline.records import Finding, LoadStep
+from pipeline.messages import Message
+from pipeline.records import Finding, LoadStep, doubtful, inferred
 from pipeline.settings.intake import IntakeSettings
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -63,29 +63,22 @@ def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings)
         if _is_photo(entry)
     ]
     if len(names) > settings.photos_max:
-        raise InputError(
-            f"holds {len(names)} photos, the limit is {settings.photos_max}",
-            path=folder,
-            code="folder/too-many-photos",
-            remedy="split it or raise intake.photos_max",
-        )
+        raise InputError(Message("folder/too-many-photos", photos=len(names), limit=settings.photos_max), path=folder)
     return tuple(sorted(names, key=natural_key))
 
 
-def no_photos(
-    folder: Path, told: str, settings: IntakeSettings, *, remedy: str = "put the photos into its folder images"
-) -> InputError:
-    """The error for a folder without a photo; pictures that only need to be converted are named."""
+def no_photos(folder: Path, settings: IntakeSettings, *, why: Message | None = None) -> InputError:
+    """The error for a folder without a photo, or of none that can be used; pictures of other kinds are named."""
     other = [PurePosixPath(name).name for name in _of_other_kinds(folder, None, settings)]
-    if other:
-        told = f"{told}, only pictures of other kinds: {_some(other)}"
-        remedy = "convert them to png or jpg at full size"
     below = [f"{place}/{entry}" for place in _named(folder, settings) for entry in _entries(folder / place)]
     aside = [entry for entry in _entries(folder) if entry.casefold() not in FOLDERS]
     aside = [entry for entry in (*aside, *below) if any(map(_is_photo, _entries(folder / entry)))]
-    if aside:
-        remedy = f"move the photos from {_some(aside)} into its folder images"
-    return InputError(told, path=folder, code="folder/no-photos", remedy=remedy)
+    told = Message("folder/no-photos.none") if why is None else why
+    if other:
+        told = Message("folder/no-photos.other-kinds", told=told, names=_some(other))
+    remedy = "aside" if aside else "convert" if other else "put" if why is None else "as-named"
+    remedies = Message(f"folder/no-photos.{remedy}", names=_some(aside))
+    return InputError(Message("folder/no-photos", told=told, remedy=remedies), path=folder)
 
 
 def _named(folder: Path, settings: IntakeSettings) -> list[str]:
@@ -157,7 +150,7 @@ def match_photos(
     """
     present = list_photos(folder, without=calibration, settings=settings)
     other = _of_other_kinds(folder, calibration, settings)
-    findings = [_other_kinds(other)] if other and present else []
+    findings = [doubtful("photo/other-kind", names=_some(other))] if other and present else []
     if not any(step.image for step in steps):
         steps, noted = _by_order(folder, steps, present, log_name, settings)
         findings += noted
@@ -172,9 +165,7 @@ def match_photos(
         name, noted = _present_name(folder, step, present, log_name, settings)
         findings += noted
         if name is not None and name in used:
-            findings.append(
-                doubtful("photo/doubled", f"steps {used[name]} and {step.step} name the same photo {name!r}")
-            )
+            findings.append(doubtful("photo/doubled", step=used[name], other=step.step, image=repr(name)))
         if name is not None:
             used[name] = step.step
             path, digest, trouble = checked_photo(folder, name, settings)
@@ -183,24 +174,12 @@ def match_photos(
                 paths[name], hashes[name] = path, digest
         matched.append(step if name is None else replace(step, image=name))
     if not paths:
-        told = "has no photo that can be used" + (f" ({findings[-1].message})" if findings else "")
-        raise no_photos(
-            folder, told, settings, remedy="put the photos into its folder images, as named in the force log"
-        )
+        key = "folder/no-photos.unusable" if findings else "folder/no-photos.unusable-all"
+        raise no_photos(folder, settings, why=Message(key, last=findings[-1].said if findings else ""))
     unused = [name for name in present if name not in used]
     if unused:
-        findings.append(
-            inferred("photo/unused", f"{len(unused)} photos belong to no step and were not measured: {_some(unused)}")
-        )
+        findings.append(inferred("photo/unused", count=len(unused), names=_some(unused)))
     return FoundPhotos(paths, hashes, tuple(matched), (*findings, *_same_contents(hashes)))
-
-
-def _other_kinds(names: Sequence[str]) -> Finding:
-    message = (
-        f"pictures of a kind that is not read were not measured: {_some(names)}; "
-        "convert them to png or jpg at full size"
-    )
-    return doubtful("photo/other-kind", message)
 
 
 def _some(names: Sequence[str]) -> str:
@@ -212,26 +191,21 @@ def _by_order(
 ) -> tuple[list[LoadStep], list[Finding]]:
     """Photos for steps of a log that names none: by the step numbers in their names, or one for each in order."""
     if not present:
-        raise no_photos(folder, "has no photos", settings)
+        raise no_photos(folder, settings)
     numbers = [_last_number(name) for name in present]
     at = {step.step: place for place, step in enumerate(steps)}
     if None not in numbers and len(set(numbers)) == len(numbers) and set(numbers) <= at.keys():
         chosen = {at[number]: name for number, name in zip(numbers, present, strict=True) if number is not None}
-        how = "by the step numbers in their names"
+        key = "photo/inferred.numbers"
     elif len(present) == len(steps):
-        chosen, how = dict(enumerate(present)), "in the natural order of their names"
+        chosen, key = dict(enumerate(present)), "photo/inferred"
     else:
-        raise InputError(
-            f"names no photos, and {len(present)} photos cannot be told to {len(steps)} steps",
-            path=folder / log_name,
-            code="log/photos-ambiguous",
-            remedy="add a column image with the name of the photo in one row of each step",
-        )
+        told = Message("log/photos-ambiguous", photos=len(present), steps=len(steps))
+        raise InputError(told, path=folder / log_name)
     assigned = [replace(step, image=chosen.get(place)) for place, step in enumerate(steps)]
-    pairs = ", ".join(f"{step.step}: {step.image}" for step in assigned[:3])
-    message = f"{log_name} names no photos; {len(chosen)} photos were given to the steps {how} ({pairs}, ...)"
-    whole = len(chosen) == len(steps)
-    return assigned, [(inferred if whole else doubtful)("photo/inferred", message), *_misnumbered(assigned)]
+    pairs = [f"{step.step}: {step.image}" for step in assigned[:3]]
+    level = inferred if len(chosen) == len(steps) else doubtful
+    return assigned, [level(key, file=log_name, count=len(chosen), pairs=pairs), *_misnumbered(assigned)]
 
 
 def _misnumbered(steps: Sequence[LoadStep]) -> Iterator[Finding]:
@@ -240,11 +214,7 @@ def _misnumbered(steps: Sequence[LoadStep]) -> Iterator[Finding]:
     apart = {None if number is None else number - step for step, number in numbers.items()}
     wrong = [step for step in steps if numbers[step.step] in numbers.keys() - {step.step}]
     if len(apart) > 1 and wrong and wrong[0].image is not None:
-        message = (
-            f"{wrong[0].image} was given to step {wrong[0].step}, but its name has the number of another step; "
-            "add a column image with the name of the photo of each step"
-        )
-        yield doubtful("photo/number", message)
+        yield doubtful("photo/number", image=wrong[0].image, step=wrong[0].step)
 
 
 def _last_number(name: str) -> int | None:
@@ -258,11 +228,10 @@ def _present_name(
     """Name of the existing file meant by a step; None, with a finding, if there is none."""
     written = step.image or ""
     name = str(PurePosixPath(written.replace("\\", "/")))
-    place = f"{log_name}, line {step.line}"
+    place = {"file": log_name, "line": step.line, "image": shown(written)}
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
-        told = f"{place}: photo {shown(written)} leads out of the folder and was not read"
-        return None, [doubtful("photo/outside", told)]
+        return None, [doubtful("photo/outside.named", **place)]
     beside = [other for other in present if PurePosixPath(other).name == name]
     if not _exists(path) and len(beside) == 1:
         return beside[0], []  # the name alone, as people write it: there is nothing else that it could mean
@@ -271,13 +240,8 @@ def _present_name(
     alike = [other for other in present if _loose(other) == _loose(name)]
     alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]
     if len(alike) == 1:
-        return alike[0], [inferred("photo/name", f"{place}: photo {shown(written)} was taken to be {alike[0]}")]
-    return None, [
-        doubtful(
-            "photo/missing",
-            f"{place}: photo {shown(written)} of step {step.step} does not exist; the step keeps its force only",
-        )
-    ]
+        return alike[0], [inferred("photo/name", taken=alike[0], **place)]
+    return None, [doubtful("photo/missing", step=step.step, **place)]
 
 
 def _exists(path: Path) -> bool:
@@ -297,7 +261,7 @@ def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Pa
     """Path and hash of a photo; a file that cannot be read is a finding, and the rest of the specimen is measured."""
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
-        return None, "", [doubtful("photo/outside", f"{name} leads out of the folder and was not read")]
+        return None, "", [doubtful("photo/outside", image=name)]
     try:
         check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
         begin = read_begin(path, 8)
@@ -305,14 +269,13 @@ def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Pa
         told = [] if begin.startswith(SIGNATURES) else [_no_picture(name, begin)]
         return path, sha256(path), told
     except InputError as error:
-        return None, "", [doubtful(f"photo/{error.code.partition('/')[2]}", f"{name}: {error.message}; {error.remedy}")]
+        said = Message("photos.one", image=name, said=error.said)
+        return None, "", [Finding(f"photo/{error.code.partition('/')[2]}", "warning", said)]
 
 
 def _no_picture(name: str, begin: bytes) -> Finding:
-    if not begin:
-        return doubtful("photo/no-picture", f"{name}: the file is empty; copy it again from the camera")
-    again = "convert it to png or jpg at full size" if begin[4:8] == b"ftyp" else "copy it again from the camera"
-    return doubtful("photo/no-picture", f"{name}: the file is no png, jpg, bmp or tif; {again}")
+    kind = ".empty" if not begin else ".convert" if begin[4:8] == b"ftyp" else ""
+    return doubtful(f"photo/no-picture{kind}", image=name)
 
 
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
@@ -320,8 +283,4 @@ def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
     names: dict[str, list[str]] = {}
     for name, digest in hashes.items():
         names.setdefault(digest, []).append(name)
-    return [
-        doubtful("photo/doubled", f"{_some(more)} and {first} are the same picture")
-        for first, *more in names.values()
-        if more
-    ]
+    return [doubtful("photo/doubled.same", names=_some(more), first=first) for first, *more in names.values() if more]

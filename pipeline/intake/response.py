@@ -1,4 +1,4 @@
-"""Does the load cell answer to the bending? A force that is the same at every step is none of the cable's.
+"""Whether the load cell responds to the bending: a force that is the same at every step is not that of a cable.
 
 A mounted cable is free of force and a bent one pushes with about its buckling load. Without a mounted step the force
 still changes: by half the travel over the length where the law is straight (elastica, for small bows), more where it is
@@ -14,9 +14,9 @@ import numpy as np
 
 from pipeline.errors import InputError
 from pipeline.intake.holdplace import MEDIAN_OF_NORMAL
+from pipeline.messages import Message
 from pipeline.records import LoadStep
 from pipeline.settings.intake import IntakeSettings
-from pipeline.units import quantity
 
 
 def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSettings) -> None:
@@ -32,15 +32,9 @@ def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSet
     places = [step.displacement_m for step in still]
     if still is loaded and not _too_flat(loaded, places, settings):
         return
-    way = f"{min(places) * 1e3:.4g} and {max(places) * 1e3:.4g} mm"
-    read = quantity(float(np.mean([step.force_N for step in still])), "N")
-    raise InputError(
-        f"the force stands still: {len(still)} steps between {way} read {read}",
-        path=path,
-        code="log/force-stands-still",
-        remedy="check that the load cell is connected and within its range and that this column is its force, then "
-        "repeat the test",
-    )
+    force = float(np.mean([step.force_N for step in still]))
+    way = {"from_mm": 1e3 * min(places), "to_mm": 1e3 * max(places)}
+    raise InputError(Message("log/force-stands-still", steps=len(still), force_N=force, **way), path=path)
 
 
 def _one_force(steps: Sequence[LoadStep], settings: IntakeSettings) -> bool:

@@ -20,10 +20,10 @@ from pipeline.intake.cellunits import without_units
 from pipeline.intake.clock import clock_s, through_midnight
 from pipeline.intake.columns import Columns
 from pipeline.intake.dialect import Decimal, Rows, decimal_sign, decimals, is_missing, to_number
-from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.intake.table import read_table
-from pipeline.records import Array, Branch, Finding
+from pipeline.messages import Message
+from pipeline.records import Array, Branch, Finding, doubtful, inferred
 from pipeline.settings.intake import IntakeSettings
 
 BRANCHES: dict[Branch, str] = {
@@ -104,12 +104,7 @@ def read_samples(
     displacement, carried = _carry_down(table["displacement"])
     kept = array("q", (row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]))
     if not kept:
-        raise InputError(
-            "holds no row with a force and a displacement",
-            path=path,
-            code="log/empty",
-            remedy="export the log again, one row per sample",
-        )
+        raise InputError(Message("log/empty.no-row"), path=path)
     decimal = decimal_sign(
         chain(force, displacement),
         path=path,
@@ -142,20 +137,18 @@ def _losses(
     """Rows that are no samples, rows without a force, and displacements carried down."""
     findings = []
     if summary:
-        message = f"the last {len(summary)} rows are a summary or a remark, no samples, and were left out"
-        findings.append(doubtful("log/summary", f"{name}, line {summary[0]}: {message}"))
+        findings.append(doubtful("log/summary", file=name, line=summary[0], count=len(summary)))
     empty = [row for row, cell in enumerate(force) if is_missing(cell)]
     if empty:
-        message = f"{name}: {len(empty)} of {len(force)} rows have no force and were left out"
-        findings.append(doubtful("log/missing-force", f"{message} (first: line {lines[empty[0]]})"))
+        first = lines[empty[0]]
+        findings.append(doubtful("log/missing-force", file=name, count=len(empty), rows=len(force), line=first))
     if carried:
-        message = f"{name}: {carried} rows have no displacement; that of the row above was taken"
-        findings.append(inferred("log/carried-down", message))
+        findings.append(inferred("log/carried-down", file=name, count=carried))
     return findings
 
 
 def _last_digit(places: int) -> float:
-    """Value of the last of so many decimals; a zero may be written with any power of ten."""
+    """Value of one unit in the last of so many decimals."""
     return float(10.0 ** -min(max(places, -300), 300))
 
 
@@ -181,15 +174,10 @@ class _Numbers:
     def value(self, role: str, cell: str, row: int) -> float:
         number = to_number(cell, self.decimal)
         if number is None or abs(number) > self.limit:
-            trouble = "is no number" if number is None else "is beyond any bending test"
+            key = "log/not-a-number" if number is None else "log/not-a-number.too-large"
             sign = "point" if self.decimal == "." else "comma"
-            raise InputError(
-                f"{role} {cell[:40]!r} {trouble} (numbers of this file have a decimal {sign})",
-                path=self.path,
-                line=self.lines[row],
-                code="log/not-a-number",
-                remedy="correct the cell or remove the row",
-            )
+            told = Message(key, role=role, cell=repr(cell[:40]), sign=sign)
+            raise InputError(told, path=self.path, line=self.lines[row])
         return number
 
     def column(self, role: str, cells: Sequence[str], kept: Sequence[int]) -> Array:
@@ -230,13 +218,7 @@ def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Br
     for line, cell in zip(lines, filled, strict=True):
         branch = BRANCH_OF.get((cell or first).casefold())
         if branch is None:
-            raise InputError(
-                f"branch {cell[:40]!r} is not known",
-                path=path,
-                line=line,
-                code="log/branch",
-                remedy="write mounted, loading or unloading, or leave the column out",
-            )
+            raise InputError(Message("log/branch", cell=repr(cell[:40])), path=path, line=line)
         branches.append(branch)
     return branches
 
@@ -248,22 +230,21 @@ def _times(
     name, lines = numbers.path.name, numbers.lines
     empty = [row for row in kept if is_missing(cells[row])]
     if empty:
-        message = f"{name}: {len(empty)} rows have no time (first: line {lines[empty[0]]}); times are not used"
-        return None, [(inferred if len(empty) == len(kept) else doubtful)("log/missing-time", message)]
+        level = inferred if len(empty) == len(kept) else doubtful
+        return None, [level("log/missing-time", file=name, count=len(empty), line=lines[empty[0]])]
     clock = [time for row in kept if (time := clock_s(cells[row])) is not None]
     if len(clock) == len(kept):
         times = through_midnight(np.array(clock))
     elif not clock and not any(to_number(cells[row], numbers.decimal) is not None for row in kept):
-        message = f"{name}: no time can be read in its column (first: {cells[kept[0]][:40]!r}); times are not used"
-        return None, [doubtful("log/time-format", message)]
+        return None, [doubtful("log/time-format", file=name, cell=repr(cells[kept[0]][:40]))]
     else:
         wide = replace(numbers, limit=1e15)  # epochs in milliseconds have 13 digits
         times = wide.column("time", cells, kept)
     noted = []
     if clock or float(np.max(np.abs(times))) > settings.epoch_s:
-        noted.append(inferred("log/clock-time", f"{name}: times count from the first row"))
+        noted.append(inferred("log/clock-time", file=name))
         times = times - times[0]
     if np.any(np.diff(times) < 0.0):
         line = lines[kept[int(np.argmax(np.diff(times) < 0.0)) + 1]]
-        return None, [doubtful("log/time-order", f"{name}, line {line}: time runs backwards; times are not used")]
+        return None, [doubtful("log/time-order", file=name, line=line)]
     return times, noted

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.intake.noted import doubtful, inferred
 from pipeline.intake.specimenfile import LogSpec
-from pipeline.records import Array, Branch, Finding
+from pipeline.messages import Message
+from pipeline.records import Array, Branch, Finding, doubtful, inferred
 from pipeline.settings.intake import IntakeSettings
-from pipeline.units import quantity
 
 BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most of its buckling load whatever its law
 
@@ -23,7 +22,7 @@ BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most o
 def from_mounted(
     displacements: Array, mounted: NDArray[np.bool_], name: str, *, travel: float
 ) -> tuple[Array, list[Finding]]:
-    """Displacements counted from the mounted cable where the log counts from the end of a machine's own way.
+    """Displacements counted from the mounted cable where the log counts from the end stop of the machine.
 
     Parameters
     ----------
@@ -38,8 +37,7 @@ def from_mounted(
     zero = float(np.median(displacements[mounted]))
     if abs(zero) <= travel:
         return displacements, []
-    message = f"{name}: the mounted cable stands at {zero * 1e3:.4g} mm; displacements count from there"
-    return displacements - zero, [inferred("log/displacement-zero", message)]
+    return displacements - zero, [inferred("log/displacement-zero", file=name, zero_m=zero)]
 
 
 def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[Finding]]:
@@ -47,8 +45,7 @@ def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[F
     reach = float(displacements[np.argmax(np.abs(displacements))])
     if reach >= 0.0:
         return displacements, []
-    message = f"{name}: displacements run to {reach * 1e3:.4g} mm; taken as positive toward the other bearing"
-    return -displacements, [doubtful("log/displacement-sign", message)]
+    return -displacements, [doubtful("log/displacement-sign", file=name, reach_m=reach)]
 
 
 def force_sign(
@@ -71,21 +68,15 @@ def force_sign(
     pulling = said * forces[loud] < 0.0
     if np.mean(pulling) < settings.sign_share:
         return said, []
-    median = f"median {quantity(float(np.median(forces[loud])), 'N')}"
-    right = "tension" if said > 0.0 else "compression"
-    if spec.force_sign is None:
-        message = (
-            f"{name}: {np.count_nonzero(pulling)} of {pulling.size} bent steps have a negative force ({median}); the "
-            "sign was reversed, because a cable that is pushed together pushes back: confirm with "
-            f'force_sign = "{right}" in [rig]'
-        )
-    else:
-        message = (
-            f'{name}: by force_sign = "{spec.force_sign}" in [rig] the bent steps would pull (logged {median}); the '
-            "sign was reversed, because a cable that is pushed together pushes back: set "
-            f'force_sign = "{right}"'
-        )
-    return -said, [doubtful("log/force-sign", message)]
+    told = {
+        "file": name,
+        "pulling": np.count_nonzero(pulling),
+        "bent": pulling.size,
+        "median_N": float(np.median(forces[loud])),
+        "given": spec.force_sign,
+        "right": "tension" if said > 0.0 else "compression",
+    }
+    return -said, [doubtful("log/force-sign" if spec.force_sign is None else "log/force-sign.given", **told)]
 
 
 def inferred_branches(
@@ -111,5 +102,6 @@ def inferred_branches(
             branches.append("loading" if branches[-1] == "mounted" else branches[-1])
         else:
             branches.append("loading" if change > 0.0 else "unloading")
-    counts = ", ".join(f"{branches.count(branch)} {branch}" for branch in dict.fromkeys(branches))
-    return branches, [inferred("log/branch-inferred", f"{name}: branches by the order of the displacements: {counts}")]
+    each = dict.fromkeys(branches)
+    counts = [Message("log/branch-inferred.count", count=branches.count(branch), branch=branch) for branch in each]
+    return branches, [inferred("log/branch-inferred", file=name, counts=counts)]

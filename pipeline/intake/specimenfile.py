@@ -26,6 +26,7 @@ from pipeline.intake.tomltable import (
     text,
     whole,
 )
+from pipeline.messages import Message
 from pipeline.records import Board, CameraSpec, RigSpec
 from pipeline.settings.intake import IntakeSettings
 
@@ -82,8 +83,11 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
     check_names(source, source.tables, tuple(tables))
     values = {table: checked_table(source, table, checks) for table, checks in tables.items()}
     cable = values["specimen"]
-    lengths = {"length_mm": "the cable length between the bearing axes", "diameter_mm": "the diameter of the cable"}
-    _require(source, cable, lengths)
+    missing = [key for key in ("length_mm", "diameter_mm") if key not in cable]
+    if missing:
+        add = [Message(f"toml/missing-key.{key}") for key in missing]
+        key = "toml/missing-key" if len(missing) == 1 else "toml/missing-key.several"
+        raise source.error(Message(key, names=missing, add=add), table="specimen")
     return SpecimenFile(
         id=cable.get("id", folder_name(folder)),
         length_m=cable["length_mm"] * 1e-3,
@@ -131,19 +135,6 @@ def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
     }
 
 
-def _require(source: TomlFile, cable: dict[str, Any], needed: dict[str, str]) -> None:
-    """Refuse a table that lacks keys; all of them are named at once."""
-    missing = [key for key in needed if key not in cable]
-    if missing:
-        names = " and ".join(missing)
-        raise source.error(
-            f"{names} is missing in [specimen]" if len(missing) == 1 else f"{names} are missing in [specimen]",
-            table="specimen",
-            code="toml/missing-key",
-            remedy=f"add {' and '.join(f'{key} = ..., {needed[key]}' for key in missing)}",
-        )
-
-
 def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: IntakeSettings) -> CameraSpec:
     calibration: Path | None = None
     if "calibration" in values:
@@ -152,22 +143,10 @@ def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: In
         if calibration is None:
             raise outside(source.path, name, lambda: source.line_of("camera", "calibration"))
         if not is_folder(calibration):
-            raise source.error(
-                f"the calibration folder {name!r} does not exist",
-                table="camera",
-                key="calibration",
-                code="camera/no-calibration-folder",
-                remedy="correct the name, or give scale_px_per_mm instead",
-            )
+            told = Message("camera/no-calibration-folder", name=repr(name))
+            raise source.error(told, table="camera", key="calibration")
         if "board" not in values:
-            raise source.error(
-                "calibration needs the size of the board",
-                table="camera",
-                key="calibration",
-                code="camera/no-board",
-                remedy="add board = {columns = .., rows = .., square_mm = ..} with the inner corners and the "
-                "measured side of a square",
-            )
+            raise source.error(Message("camera/no-board"), table="camera", key="calibration")
     scale, distance = values.get("scale_px_per_mm"), values.get("distance_mm")
     return CameraSpec(
         scale_px_per_m=None if scale is None else scale * 1e3,
@@ -205,7 +184,7 @@ def _identifier(value: Any) -> str:
     """An id becomes a folder name on any system."""
     name = text(value)
     if len(name.encode()) > 120 or name[0] == "." or name[-1] == "." or any(_forbidden(char) for char in name):
-        raise ValueError('a short name without / \\ : * ? " < > | and without a dot at either end')
+        raise ValueError(Message("wanted.name"))
     return name
 
 
@@ -214,11 +193,10 @@ def _forbidden(char: str) -> bool:
 
 
 def _board(value: Any) -> Board:
-    wanted = "{columns = 9, rows = 6, square_mm = 10.0}, counting inner corners"
     if not isinstance(value, dict) or not {"columns", "rows", "square_mm"} <= value.keys():
-        raise ValueError(wanted)
+        raise ValueError(Message("wanted.board"))
     if not value.keys() <= {"columns", "rows", "square_mm", "charuco", "marker_mm"}:
-        raise ValueError(f"{wanted}; besides these only charuco and marker_mm are known")
+        raise ValueError(Message("wanted.board.keys"))
     side, count = number_in(0.1, 1000.0, "(mm)"), whole(2, 1000)
     return Board(
         columns=count(value["columns"]),
@@ -230,27 +208,25 @@ def _board(value: Any) -> Board:
 
 
 def _bearings(value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    wanted = "[[x, y], [x, y]], left and right axis in pixels of the first photo"
     if not isinstance(value, list) or len(value) != 2 or any(not isinstance(p, list) or len(p) != 2 for p in value):
-        raise ValueError(wanted)
+        raise ValueError(Message("wanted.bearings"))
     (x0, y0), (x1, y1) = ((number(p[0]), number(p[1])) for p in value)
     if (x0, y0) == (x1, y1) or max(map(abs, (x0, y0, x1, y1))) > 1e6:
-        raise ValueError(f"two different points, {wanted}")
+        raise ValueError(Message("wanted.bearings.different"))
     return (x0, y0), (x1, y1)
 
 
 def _columns(value: Any) -> dict[str, str | int]:
-    wanted = '{force = "Kraft [N]", displacement = "Weg [mm]"}, roles ' + ", ".join(ROLES)
     if not isinstance(value, dict) or not value.keys() <= set(ROLES):
-        raise ValueError(wanted)
+        raise ValueError(Message("wanted.columns", roles=ROLES))
     position = whole(1, 1000)
     names = {role: position(name) if isinstance(name, int) else text(name) for role, name in value.items()}
     if len(set(names.values())) < len(names):
-        raise ValueError(f"a different column for each role, {wanted}")
+        raise ValueError(Message("wanted.columns.different", roles=ROLES))
     return names
 
 
 def _units(value: Any) -> dict[str, str]:
     if not isinstance(value, dict) or not value.keys() <= set(MEASURED):
-        raise ValueError('{force = "mN", displacement = "mm", time = "s"}')
+        raise ValueError(Message("wanted.units"))
     return {role: text(unit) for role, unit in value.items()}

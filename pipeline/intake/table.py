@@ -15,6 +15,7 @@ from pathlib import Path
 from pipeline.errors import InputError
 from pipeline.intake.columns import Columns
 from pipeline.intake.dialect import Rows, is_missing
+from pipeline.messages import Message
 
 SUMMARY = re.compile(
     r"(mean|mittel(wert)?|average|avg|median|min(imum)?|max(imum)?|sum(me)?|total|gesamt|std|st\.?\s?dev|stddev|"
@@ -76,7 +77,7 @@ def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
 
 
 def _split(rows: Rows, columns: Columns) -> tuple[Table, int]:
-    """All rows that do not repeat one above the table, and the first that has more cells than the header."""
+    """All rows but repeated headers, and the first row that has more cells than the header."""
     head = [cells for _, cells in map(rows.__getitem__, range(columns.first_row))]
     again = {tuple(cells) for cells in head if len(cells) >= columns.width}
     places, surplus = array("q"), len(rows)
@@ -118,13 +119,5 @@ def _is_summary(cells: list[str], columns: Columns) -> bool:
 
 
 def _too_wide(line: int, count: int, columns: Columns, path: Path) -> InputError:
-    remedy = "remove the surplus cells"
-    if columns.separator == ",":
-        remedy = "if the comma is the decimal sign too, export with semicolons or with decimal points"
-    return InputError(
-        f"{count} cells under a header of {columns.width}",
-        path=path,
-        line=line,
-        code="log/row-length",
-        remedy=remedy,
-    )
+    key = "log/row-length.comma" if columns.separator == "," else "log/row-length"
+    return InputError(Message(key, cells=count, width=columns.width), path=path, line=line)

@@ -8,6 +8,7 @@ from pipeline.errors import InputError
 from pipeline.intake.folder import candidate_logs
 from pipeline.intake.photos import list_photos, no_photos
 from pipeline.intake.specimenfile import NAME, folder_name
+from pipeline.messages import Message
 from pipeline.settings.intake import IntakeSettings
 
 TEMPLATE = """\
@@ -60,10 +61,10 @@ def write_template(folder: Path, settings: IntakeSettings) -> Path:
     """
     path = folder / NAME
     if not folder.is_dir():
-        raise InputError("is no folder", path=folder, code="folder/missing", remedy="give a folder of photos")
+        raise InputError(Message("folder/missing.photos"), path=folder)
     photos = list_photos(folder, without=None, settings=settings)
     if not photos:
-        raise no_photos(folder, "has no photos", settings)
+        raise no_photos(folder, settings)
     logs = candidate_logs(folder)
     text = TEMPLATE.format(
         id=folder_name(folder),
@@ -75,9 +76,7 @@ def write_template(folder: Path, settings: IntakeSettings) -> Path:
         with path.open("x", encoding="utf-8") as stream:
             stream.write(text)
     except FileExistsError as error:
-        raise InputError(
-            "exists already", path=path, code="init/exists", remedy="edit it, or remove it first"
-        ) from error
+        raise InputError(Message("init/exists"), path=path) from error
     return path
 
 

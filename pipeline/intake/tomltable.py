@@ -18,6 +18,7 @@ from typing import Any
 from pipeline.errors import InputError
 from pipeline.intake.access import LONGEST_PATH, read_bytes
 from pipeline.intake.tomldepth import too_deep
+from pipeline.messages import Message
 
 Check = Callable[[Any], Any]
 TWICE = re.compile("overwrite|twice|duplicate", re.IGNORECASE)  # in the words of the parser
@@ -25,6 +26,8 @@ HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
 
 DEEPEST = 8
 """Parts of a key, or brackets inside each other; specimens and settings have three."""
+NEAR = 0.6
+"""Share of letters that a misspelt name and the one proposed for it have in common, in their order, at least."""
 LONGEST_SHOWN = 60
 """Characters of a value or name in a message."""
 
@@ -50,9 +53,9 @@ class TomlFile:
                 return number
         return None
 
-    def error(self, message: str, *, table: str, key: str | None = None, code: str, remedy: str) -> InputError:
+    def error(self, said: Message, *, table: str, key: str | None = None) -> InputError:
         """An `InputError` at the line of a key."""
-        return InputError(message, path=self.path, line=self.line_of(table, key), code=code, remedy=remedy)
+        return InputError(said, path=self.path, line=self.line_of(table, key))
 
 
 def read_toml(path: Path, *, limit: int) -> TomlFile:
@@ -69,30 +72,19 @@ def read_toml(path: Path, *, limit: int) -> TomlFile:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            "is not UTF-8 text", path=path, line=line, code="toml/encoding", remedy="save it as UTF-8"
-        ) from error
+        raise InputError(Message("toml/encoding"), path=path, line=line) from error
     text = text.replace("\r\n", "\n")
     lines = tuple(text.split("\n"))
     if (deep := too_deep(text, DEEPEST)) is not None:
-        raise InputError(
-            f"nests keys or brackets deeper than {DEEPEST} levels",
-            path=path,
-            line=deep,
-            code="toml/syntax",
-            remedy="remove what is too much, three levels are all that is ever needed",
-        )
+        raise InputError(Message("toml/syntax.deep", levels=DEEPEST), path=path, line=deep)
     try:
         tables = tomllib.loads(text)
     except ValueError as error:  # besides TOMLDecodeError: integers of 5000 digits
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else None
         shown = "" if number is None else f" ({lines[min(number, len(lines)) - 1].strip()[:60]!r})"
-        message = f"is not valid TOML{shown}"
-        remedy = 'write key = value, texts in "double quotes", numbers with a decimal point'
-        if TWICE.search(str(error)):
-            message, remedy = f"gives a key or table a second time{shown}", "keep one of the two"
-        raise InputError(message, path=path, line=number, code="toml/syntax", remedy=remedy) from error
+        key = "toml/syntax.twice" if TWICE.search(str(error)) else "toml/syntax"
+        raise InputError(Message(key, shown=shown), path=path, line=number) from error
     return TomlFile(path, tables, lines)
 
 
@@ -102,20 +94,17 @@ def check_names(file: TomlFile, names: Collection[str], known: Collection[str], 
         if name in known:
             continue
         near = nearest(name, known)
-        place = f"[{table}]" if table else "this file"
-        raise InputError(
-            f"{'key' if table else 'table'} {shown(name)} is not known in {place}",
-            path=file.path,
-            line=file.line_of(table, name) or file.line_of(name),
-            code="toml/unknown-key" if table else "toml/unknown-table",
-            remedy=f"rename it to {near} or remove it",
-        )
+        key = f"toml/unknown-{'key' if table else 'table'}{'' if near else '.far'}"
+        told = Message(key, name=shown(name), table=table, near=near, known=known)
+        raise InputError(told, path=file.path, line=file.line_of(table, name) or file.line_of(name))
 
 
-def nearest(name: str, known: Collection[str]) -> str:
-    """The known name most like a misspelt one; the order of ``known`` decides ties."""
+def nearest(name: str, known: Collection[str]) -> str | None:
+    """The known name that a misspelt one is near to, if any is; the order of ``known`` decides ties."""
     plain = name[:LONGEST_SHOWN].casefold()  # comparing takes the product of both lengths
-    return max(known, key=lambda candidate: difflib.SequenceMatcher(None, plain, candidate.casefold()).ratio())
+    alike = {other: difflib.SequenceMatcher(None, plain, other.casefold()).ratio() for other in known}
+    best = max(alike, key=alike.__getitem__)
+    return best if alike[best] >= NEAR else None
 
 
 def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> dict[str, Any]:
@@ -128,29 +117,18 @@ def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> di
     """
     values = file.tables.get(table, {})
     if not isinstance(values, dict):
-        raise file.error(
-            f"{table} must be a table",
-            table="",
-            key=table,
-            code="toml/wrong-value",
-            remedy=f"write [{table}] on a line of its own and its keys below",
-        )
+        raise file.error(Message("toml/wrong-value.table", table=table), table="", key=table)
     check_names(file, values, tuple(checks), table=table)
     result, refused = {}, {}
     for key, value in values.items():
         try:
             result[key] = checks[key](value)
         except ValueError as error:
-            refused[key] = str(error)
+            refused[key] = error.args[0]
     if refused:  # all of them at once: a template that was filled in halfway has several
-        given = " and ".join(f"{key} = {shown(values[key])}" for key in refused)
-        raise file.error(
-            f"{given} cannot be used",
-            table=table,
-            key=next(iter(refused)),
-            code="toml/wrong-value",
-            remedy=f"give {' and '.join(dict.fromkeys(refused.values()))}",
-        )
+        given = [f"{key} = {shown(values[key])}" for key in refused]
+        told = Message("toml/wrong-value", given=given, wanted=dict.fromkeys(refused.values()))
+        raise file.error(told, table=table, key=next(iter(refused)))
     return result
 
 
@@ -163,16 +141,15 @@ def shown(value: Any) -> str:
     return told if len(told) <= LONGEST_SHOWN else f"{told[: LONGEST_SHOWN - 3]}..."
 
 
-# Checks: value -> value; a ValueError says what is wanted, as the object of "give ...".
+# Checks: value -> value; a ValueError holds the message of what is wanted, as the object of "give ...".
 
 
 def number(value: Any) -> float:
     """A finite number."""
-    wanted = "a number"
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(wanted)
+        raise ValueError(Message("wanted.number"))
     if abs(value) > 1e300 or not math.isfinite(value):  # compares integers too large for a float as well
-        raise ValueError("a finite number")
+        raise ValueError(Message("wanted.finite"))
     return float(value)
 
 
@@ -182,7 +159,7 @@ def number_in(low: float, high: float, unit: str) -> Check:
     def check(value: Any) -> float:
         given = number(value)
         if not low <= given <= high:
-            raise ValueError(f"a number from {low:g} to {high:g} {unit}")
+            raise ValueError(Message("wanted.range", low=low, high=high, unit=unit))
         return given
 
     return check
@@ -193,7 +170,7 @@ def whole(low: int, high: int) -> Check:
 
     def check(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ValueError(f"a whole number from {low} to {high}")
+            raise ValueError(Message("wanted.whole", low=low, high=high))
         return value
 
     return check
@@ -202,14 +179,14 @@ def whole(low: int, high: int) -> Check:
 def flag(value: Any) -> bool:
     """True or false."""
     if not isinstance(value, bool):
-        raise ValueError("true or false")
+        raise ValueError(Message("wanted.flag"))
     return value
 
 
 def text(value: Any) -> str:
     """A text that is not empty."""
     if not isinstance(value, str) or not value.strip():
-        raise ValueError('a text in "double quotes"')
+        raise ValueError(Message("wanted.text"))
     return value.strip()
 
 
@@ -217,14 +194,14 @@ def path_text(value: Any) -> str:
     """A text that can name a file."""
     name = text(value)
     if len(name) > LONGEST_PATH:
-        raise ValueError(f"a path of at most {LONGEST_PATH} characters")
+        raise ValueError(Message("wanted.path", most=LONGEST_PATH))
     return name
 
 
 def free_text(value: Any) -> str:
     """Anything a person may write as a note: texts, numbers, dates."""
     if isinstance(value, dict | list) or (isinstance(value, int) and abs(value) > 1e300):
-        raise ValueError('a text in "double quotes"')
+        raise ValueError(Message("wanted.text"))
     return str(value)
 
 
@@ -233,7 +210,7 @@ def one_of(*choices: str) -> Check:
 
     def check(value: Any) -> str:
         if value not in choices:
-            raise ValueError(" or ".join(f'"{choice}"' for choice in choices))
+            raise ValueError(Message("wanted.one-of", choices=[f'"{choice}"' for choice in choices]))
         return str(value)
 
     return check

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
@@ -127,14 +128,14 @@ def _sentence(result: Result, words: Words) -> str:
         refused = _refused(result)
         if refused:
             return words("answer_refused", id=name, count=len(result.photos), reason=words.said(refused))
-        reason = next((f.message for f in result.findings if f.level == "error"), "")
+        reason = next((f.said for f in result.findings if f.level == "error"), "")
         if result.status == "failed" and reason:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
     fault = leading(result.findings)
-    lead = f"{words.said(fault.message.rstrip('.')).sentence}. " if fault is not None else ""
+    lead = f"{words.said(_brief(fault.said)).sentence.rstrip('.')}. " if fault is not None else ""
     if not told.usable:
-        lead = f"{words('answer_unusable', id=name, reason=words.said(told.reason.rstrip('.')))} "
+        lead = f"{words('answer_unusable', id=name, reason=str(words.said(_brief(told.said))).rstrip('.'))} "
     unit = stiffness_unit(result, words)
     (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
     beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
@@ -148,6 +149,12 @@ def _sentence(result: Result, words: Words) -> str:
     )
     rest = _together(words.measured(curve.pre_curvature, curve.pre_curvature_std))
     return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
+
+
+def _brief(said: Message | str) -> Message | str:
+    """What is wrong without the figures that show it: they stand with the finding."""
+    reading = said.values.get("reading") if isinstance(said, Message) else None
+    return reading if isinstance(reading, Message) else said
 
 
 def _together(quantity: str) -> str:
@@ -199,7 +206,7 @@ def _advice(result: Result, words: Words) -> str:
     fault = leading(result.findings)
     remedy = words.code(fault.code) if fault is not None else None
     if fault is not None:
-        return remedy[1] if remedy else words.said(fault.message).sentence
+        return remedy[1] if remedy else words.said(fault.said).sentence
     if not result.answer.usable:
         return words("next_unusable")
     experiment = result.diagnosis.next_experiment if result.diagnosis else None

@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
-from pipeline.report.evidence import map_rms
+from pipeline.report.evidence import residual_map, titled
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
@@ -175,35 +175,21 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     """Ranking, cosines, maps before and after."""
     drawn: dict[str, Drawing] = {}
     if part.table:
-        drawn["ranking"] = drawing(
-            "ranking",
-            lambda f: ranking.draw_ranking(f, part, words, settings),
-            size=(400.0, ranking.ranking_height(part)),
-            title=words("fig_ranking"),
-            description=words("fig_ranking_alt"),
-        )
+        draw = partial(ranking.draw_ranking, diagnosis=part, words=words, settings=settings)
+        drawn["ranking"] = titled("ranking", draw, words, size=(400.0, ranking.ranking_height(part)))
     if part.twins:
-        drawn["cosines"] = drawing(
-            "cosines",
-            lambda f: maps.draw_cosines(f, part.twins, words),
-            size=(400.0, 380.0),
-            title=words("fig_cosines"),
-            description=words("fig_cosines_alt", pair=_closest(part.twins, words)),
-        )
+        cosines = partial(maps.draw_cosines, cosines=part.twins, words=words)
+        drawn["cosines"] = titled("cosines", cosines, words, size=(400.0, 380.0), pair=_closest(part.twins, words))
     before, after = part.residuals_before, part.residuals_after
     # where the extended model does not answer, the map among the mechanics is the one before
     if before is not None and after is not None and result.answer.method == "extended":
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover or {}
-    told = part.verdict != "adequate" and not _is_noise(pattern)
-    if told and pattern.get("shape_m") and pattern.get("s_m"):
-        drawn["leftover"] = drawing(
-            "leftover",
-            lambda f: maps.draw_leftover(f, pattern["s_m"], pattern["shape_m"], words),
-            size=(400.0, 180.0),
-            title=words("leftover"),
-            description=words("fig_leftover_alt"),
-        )
+    meant = part.verdict != "adequate" and not _is_noise(pattern)
+    if meant and pattern.get("shape_m") and pattern.get("s_m"):
+        left = partial(maps.draw_leftover, s_m=pattern["s_m"], shape_m=pattern["shape_m"], words=words)
+        told = {"title": words("leftover"), "description": words("fig_leftover_alt")}
+        drawn["leftover"] = drawing("leftover", left, size=(400.0, 180.0), **told)
     return drawn
 
 
@@ -211,22 +197,11 @@ def _before_and_after(
     before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
 ) -> dict[str, Drawing]:
     """What was left of shapes before the extension, and of forces before and after."""
-    drawn: dict[str, Drawing] = {}
-    drawn["before"] = drawing(
-        "map-before",
-        partial(maps.draw_map, residuals=before, words=words, settings=settings),
-        size=(400.0, maps.map_height(before)),
-        title=words("fig_map_before"),
-        description=words("fig_map_alt", rms=map_rms(before, words)),
-    )
+    drawn = {"before": residual_map("map-before", before, words, settings, title="fig_map_before")}
     if any(value is not None for value in before.force_sigma):
-        drawn["force_rest"] = drawing(
-            "force-rest",
-            lambda f: maps.draw_force_rest(f, before, after, words, settings),
-            size=(400.0, 240.0),
-            title=words("fig_force_rest"),
-            description=words("fig_force_rest_alt", values=_force_texts(before, after, words)),
-        )
+        draw = partial(maps.draw_force_rest, before=before, after=after, words=words, settings=settings)
+        texts = _force_texts(before, after, words)
+        drawn["force_rest"] = titled("force-rest", draw, words, key="force_rest", size=(400.0, 240.0), values=texts)
     return drawn
 
 

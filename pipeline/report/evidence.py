@@ -5,12 +5,17 @@ Everything comes from `pipeline.result.Result`; a figure whose data are missing 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from pipeline.messages import Message
 from pipeline.report import figures, maps, photos
-from pipeline.report.canvas import Drawing, drawing
+from pipeline.report.canvas import Area, Drawing, drawing
 from pipeline.report.curves import seen_range
 from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
@@ -18,6 +23,7 @@ from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves,
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit, suited
 
+Size = tuple[float, float]
 TALL = (400.0, 350.0)
 POINTS = 5
 
@@ -39,7 +45,7 @@ class PhotoView:
 
 
 def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawing | None:
-    """f_EI by every way."""
+    """The figure of f_EI by every way; None where no way gave any."""
     parts = trusted(result)
     if not parts:
         return None
@@ -55,13 +61,9 @@ def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawi
     ]
     read = " ".join(Said(line, words.language).sentence for line in lines)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
-    return drawing(
-        "characteristic",
-        lambda figure: figures.draw_characteristic(figure, result, words, settings),
-        size=(420.0, 310.0),
-        title=words("fig_characteristic"),
-        description=words("fig_characteristic_alt", low=words.curvature(low), high=words.curvature(high), lines=read),
-    )
+    draw = partial(figures.draw_characteristic, result=result, words=words, settings=settings)
+    ends = {"low": words.curvature(low), "high": words.curvature(high)}
+    return titled("characteristic", draw, words, size=(420.0, 310.0), lines=read, **ends)
 
 
 def pointer_data(result: Result, main: Drawing | None, words: Words, settings: ReportSettings) -> dict[str, object]:
@@ -94,60 +96,51 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
 
 
 def _short(values: np.ndarray) -> list[float]:
-    """Five digits: more than any band here supports, and a third of the bytes."""
+    """Numbers cut to five digits: more than any band here supports, and a third of the bytes."""
     return [float(f"{v:.5g}") for v in values]
+
+
+def titled(
+    name: str, draw: Callable[[Area], Axes], words: Words, *, key: str = "", size: Size = (400.0, 300.0), **alt: str
+) -> Drawing:
+    """A figure; title and description are the words ``fig_KEY`` and ``fig_KEY_alt``, by default with its name."""
+    said = f"fig_{key or name}"
+    return drawing(name, draw, size=size, title=words(said), description=words(f"{said}_alt", **alt))
 
 
 def mechanics_figures(result: Result, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
     """Forces, moment curve, curvatures of all photos, pointwise graph and residual map, as far as there are data."""
     drawn: dict[str, Drawing] = {}
+    how: dict[str, Any] = {"result": result, "words": words, "settings": settings}
     if result.steps:
-        drawn["forces"] = drawing(
-            "forces",
-            lambda f: figures.draw_forces(f, result, words, settings),
-            size=TALL,
-            title=words("fig_forces"),
-            description=words("fig_forces_alt"),
-        )
+        drawn["forces"] = titled("forces", partial(figures.draw_forces, **how), words, size=TALL)
     if curves(result):
-        drawn["moment"] = drawing(
-            "moment",
-            lambda f: figures.draw_moment(f, result, words, settings),
-            title=words("fig_moment"),
-            description=words("fig_moment_alt"),
-        )
+        drawn["moment"] = titled("moment", partial(figures.draw_moment, **how), words)
     tops = [r[1] for r in map(seen_range, result.photos) if r]
     if tops:
-        drawn["curvatures"] = drawing(
-            "curvatures",
-            lambda f: figures.draw_curvatures(f, result, words),
-            title=words("fig_curvatures"),
-            description=words("fig_curvatures_alt", top=words.curvature(max(tops))),
-        )
+        draw, top = partial(figures.draw_curvatures, result=result, words=words), words.curvature(max(tops))
+        drawn["curvatures"] = titled("curvatures", draw, words, top=top)
     if len(figures.fitted_branches(result)) > 1:
-        drawn["branches"] = drawing(
-            "branches",
-            lambda f: figures.draw_branches(f, result, words, settings),
-            title=words("fig_branches"),
-            description=words("fig_branches_alt"),
-        )
+        drawn["branches"] = titled("branches", partial(figures.draw_branches, **how), words)
     if result.balance and result.balance.pointwise and result.balance.curve:
-        drawn["pointwise"] = drawing(
-            "pointwise",
-            lambda f: figures.draw_pointwise(f, result, words, settings),
-            title=words("fig_pointwise"),
-            description=words("fig_pointwise_alt"),
-        )
+        drawn["pointwise"] = titled("pointwise", partial(figures.draw_pointwise, **how), words)
     residuals = maps.answer_map(result)
     if residuals is not None:
-        drawn["map"] = drawing(
-            "residual-map",
-            lambda f: maps.draw_map(f, residuals, words, settings),
-            size=(400.0, maps.map_height(residuals)),
-            title=words("fig_map"),
-            description=words("fig_map_alt", rms=map_rms(residuals, words)),
-        )
+        drawn["map"] = residual_map("residual-map", residuals, words, settings)
     return drawn
+
+
+def residual_map(
+    name: str, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "fig_map"
+) -> Drawing:
+    """The figure of a residual map, high enough for its steps."""
+    return drawing(
+        name,
+        partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
+        size=(400.0, maps.map_height(residuals)),
+        title=words(title),
+        description=words("fig_map_alt", rms=map_rms(residuals, words)),
+    )
 
 
 def map_note(result: Result, words: Words) -> str:
@@ -172,12 +165,13 @@ def map_rms(residuals: ResidualMap, words: Words) -> str:
 
 def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[PhotoView]:
     """All photos in the order of the test."""
-    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(result.photos)]
+    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(maps.photos_of_answer(result))]
 
 
 def _reason(photo: PhotoPart, words: Words) -> str:
     """Why a photo was not used, without its name, which stands beside it."""
-    return words.said((photo.reason or "").removeprefix(f"{photo.image}: ")).text
+    reason, missing = (photo.reason or "").removeprefix(f"{photo.image}: "), Message("photo/missing.part")
+    return words.said(missing if reason == str(missing) else reason).text
 
 
 def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
@@ -185,25 +179,11 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
     kappa, seen_kappa = None, seen_range(photo)
     if len(photo.s_m) > 1:
         low, high = seen_kappa or (min(photo.kappa_per_m), max(photo.kappa_per_m))
-        kappa = drawing(
-            f"kappa-{index}",
-            lambda f: photos.draw_photo_curvature(f, photo, words, settings),
-            size=TALL,
-            title=words("fig_kappa"),
-            description=words("fig_kappa_alt", low=words.curvature(low), high=words.curvature(high)),
-        )
-    return PhotoView(
-        index,
-        photo.step,
-        photo.image,
-        photo.status,
-        _reason(photo, words),
-        photo.preview,
-        seen,
-        hidden,
-        photos.bearing_marks(photo),
-        kappa,
-    )
+        draw = partial(photos.draw_photo_curvature, photo=photo, words=words, settings=settings)
+        ends = {"low": words.curvature(low), "high": words.curvature(high)}
+        kappa = titled(f"kappa-{index}", draw, words, key="kappa", size=TALL, **ends)
+    told, marks = _reason(photo, words), photos.bearing_marks(photo)
+    return PhotoView(index, photo.step, photo.image, photo.status, told, photo.preview, seen, hidden, marks, kappa)
 
 
 def force_rows(result: Result, words: Words) -> list[list[str]]:

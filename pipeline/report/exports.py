@@ -34,7 +34,7 @@ STRAIGHT = 2.0
 
 @dataclass(frozen=True, eq=False)
 class BeamTable:
-    """Moment over the bend away from rest, K - K0, starting at nothing.
+    """Moment over the bend away from rest, K - K0, starting at zero.
 
     Attributes
     ----------

@@ -112,7 +112,9 @@ def _banded(
     unit: Unit,
     words: Words,
     settings: ReportSettings,
+    *,
     front: float = 0.0,
+    label: str = "",
 ) -> None:
     """A curve of one way with its band, in its colour and dash; one with a larger ``front`` covers others."""
     half = band_width(settings) * std
@@ -120,7 +122,7 @@ def _banded(
     axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0, zorder=1.0 + front)
     look: dict[str, Any] = {"color": LIGHT[method], "ls": DASHES[method], "zorder": 2.0 + front}
     look |= {"lw": 3.0} if method == "extended" else {}
-    axes.plot(kappa, unit.factor * value, label=words(f"way_{method}"), **look)
+    axes.plot(kappa, unit.factor * value, label=label or words(f"way_{method}"), **look)
 
 
 def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
@@ -176,10 +178,8 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
     axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
     parts = fitted_branches(result)
     for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
-        low, high = (unit.factor * (curve.tangent + sign * half * curve.tangent_std) for sign in (-1.0, 1.0))
-        axes.fill_between(curve.kappa, low, high, color=LIGHT[colour], alpha=0.2, lw=0.0)
-        label = words.branch(name)
-        axes.plot(curve.kappa, unit.factor * curve.tangent, color=LIGHT[colour], ls=DASHES[colour], label=label)
+        told = (curve.kappa, curve.tangent, curve.tangent_std)
+        _banded(axes, *told, colour, unit, words, settings, label=words.branch(name))
     bottom, top = _limits(parts.values(), half)
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
     return finish(

@@ -109,7 +109,7 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
 
 
 def beam_frame(result: Result) -> pd.DataFrame:
-    """Moment over the bend away from rest, from nothing on: the table a nonlinear beam element asks for.
+    """Moment over the bend away from rest, from zero on: the table a nonlinear beam element asks for.
 
     ``measured`` is 0 for the side to which a straight cable was not bent, and which is taken to be alike.
     """

@@ -1,10 +1,10 @@
-"""Sentences of other rooms in German: findings, headline of the diagnosis, outcomes with their advice, causes.
+"""Sentences of rooms that have not moved to `pipeline.messages`, in German: vision, diagnosis, causes, outcomes of rod.
 
-The rooms write English and know no language; ``result.json`` holds what they wrote. The catalogue in
-``templates/german`` has the German twin of every such sentence, under the sentence as it stands in the code with
-``{}`` where a value goes. A stored sentence is recognised by its fixed parts, what stands in the gaps is turned the
-same way (it may be a sentence, a cause or a number), and sentences that were put together are taken apart again at
-their punctuation. What is not recognised stays English, and is said to be so.
+Those rooms write English and know no language. The catalogue in ``templates/german`` has the German twin of every such
+sentence, under the sentence as it stands in the code with ``{}`` where a value goes. A sentence is recognised by its
+fixed parts, what stands in the gaps is turned the same way (it may be a sentence, a cause or a number), and sentences
+that were put together are taken apart again at their punctuation. What is not recognised stays English, and is said to
+be so. Each room that moves takes its part of this away.
 
 The test of this module walks the code: a new sentence without its German twin, or a twin nobody writes any more,
 fails.
@@ -24,7 +24,6 @@ from pathlib import Path
 CATALOGUE = Path(__file__).parent / "templates" / "german"
 # Sentences end or begin so where others are joined to them; the same signs are stripped from the catalogue's.
 EDGES = " ,;.:\n"
-SENTENCES = re.compile(r"(; |\. |\n)")
 SEPARATORS = re.compile(r"(\n|; |: |, | and | or |\. | in | from | \(|\)|(?<=\d) (?=[a-z]))")
 JOINED = {" and ": " und ", " or ": " oder ", " from ": " ab "}
 # A decimal point between digits, but not in file names and versions.
@@ -163,20 +162,12 @@ def _exact(body: str, causes: tuple[tuple[str, str], ...]) -> str | None:
         return whole[body]
     for twin in gapped:
         values = twin.values(body)
-        if values is not None and all(_is_value(value, causes) for value in values):
+        if values is not None:
             told = (
                 value if word else _turned(value, causes)[0] for value, word in zip(values, twin.quoted, strict=True)
             )
             return twin.german.format(*told)
     return None
-
-
-def _is_value(text: str, causes: tuple[tuple[str, str], ...]) -> bool:
-    """Whether a text can stand in a gap: several sentences only if each is known, else the gap took in too much."""
-    tokens = SENTENCES.split(text)
-    return len(tokens) == 1 or all(
-        german is not None or not piece.strip(EDGES) for piece, german, _ in _runs(tokens, causes)
-    )
 
 
 def _comma(text: str) -> str:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from pipeline.intake.photos import natural_key
+from pipeline.messages import Message
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css
 from pipeline.report.repeats import Repeats, repeats, without_outlying
@@ -62,7 +63,7 @@ def write_index(
 
 
 def index_rows(results: Iterable[Result] | Path, out: Path, settings: ReportSettings) -> list[IndexRow]:
-    """Rows of all results, those that cannot be specimens of their type as not usable; parameters as `write_index`."""
+    """Rows of all results; those whose stiffness cannot be that of their type are not usable; see `write_index`."""
     if isinstance(results, str | Path):
         rows = (_row_of(Path(results), name, out, settings) for name in result_folders(Path(results)))
     else:
@@ -109,12 +110,12 @@ def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> Ind
     try:
         result = read_result(place)
     except InputError as error:
-        result = unreadable(name, error.message)
+        result = unreadable(name, error.said)
     return replace(index_row(result, settings), report=_report(result, name, out, settings))
 
 
 def _as_entered(path: Path, entered: float) -> bool:
-    """Whether a ``result.json`` is, by its time, its beginning and its end, the one an entry tells of."""
+    """Whether a ``result.json`` is still the one of ``entry.json``, by its time, its beginning and its end."""
     with path.open("rb") as file:
         status = os.fstat(file.fileno())
         head = file.read(HEAD)
@@ -124,15 +125,14 @@ def _as_entered(path: Path, entered: float) -> bool:
     return whole and status.st_mtime <= entered + COPIED_S
 
 
-def unreadable(name: str, trouble: str) -> Result:
+def unreadable(name: str, why: Message) -> Result:
     """A failed result in the place of a ``result.json`` that cannot be read."""
     from pipeline.result import FindingPart, Result, SpecimenPart
 
-    reason = f"result.json of {name} cannot be read: it {trouble}; run the specimen again."
     return Result(
         status="failed",
         specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),
-        findings=[FindingPart(code="result/unreadable", level="error", message=reason)],
+        findings=[FindingPart.of("error", Message("result/unreadable.index", name=name, why=why))],
     )
 
 
@@ -196,7 +196,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
     """
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
     rms = None if row.rms_relative is None else 100.0 * row.rms_relative
-    said = words.said(row.fault or row.reason)
+    said = words.said(row.fault or row.reason or "")
     state, verdict = row.state, _verdict(row)
     numbers: list[tuple[float | None, str]] = [(value, unit.number(value, std)) for value, std in ends]
     numbers.append((row.pre_curvature[0], words.measured(*row.pre_curvature)) if row.pre_curvature else (None, "–"))

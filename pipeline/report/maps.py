@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, plot_area
 from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
-from pipeline.result import ResidualMap, Result
+from pipeline.result import PhotoPart, ResidualMap, Result
 from pipeline.settings import ReportSettings
 from pipeline.units import suited
 
@@ -54,6 +54,25 @@ def answer_map(result: Result) -> ResidualMap | None:
     """Residual map of the model that answers: the extended one, else the fitted simulation as the photos hold it."""
     extended = None if result.diagnosis is None else result.diagnosis.residuals_after
     return extended if extended is not None and result.answer.method == "extended" else measured_map(result)
+
+
+def photos_of_answer(result: Result) -> list[PhotoPart]:
+    """The photos with what the model of the answer leaves of their shapes.
+
+    Of an extended model the result holds no curvatures; those of the simulation without the cause are none of its own.
+    """
+    residuals = answer_map(result)
+    if residuals is None or result.answer.method != "extended":
+        return result.photos
+    rows = dict(zip(residuals.steps, residuals.shape_sigma, strict=True))
+    return [_left_by(photo, residuals.s_m, rows.get(photo.step, [])) for photo in result.photos]
+
+
+def _left_by(photo: PhotoPart, s_m: list[float], sigma: list[float | None]) -> PhotoPart:
+    std = photo.shape_residual_std_m
+    known = len(std) == len(photo.s_m) and any(value is not None for value in sigma)
+    left = np.nan_to_num(np.interp(photo.s_m, s_m, _numbers(sigma)) * std).tolist() if known else []
+    return photo.model_copy(update={"kappa_fit_per_m": [], "shape_residual_m": left})
 
 
 def map_height(residuals: ResidualMap) -> float:

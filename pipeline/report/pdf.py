@@ -165,7 +165,7 @@ def list_troubles(sheet: Sheet, findings: list[FindingPart], words: Words) -> No
         sheet.text(words("nav_findings"), bold=True)
     size = 9.0
     for number, finding in enumerate(findings):
-        told = f"{words(f'level_{finding.level}')}: {words.said(finding.message).sentence}"
+        told = f"{words(f'level_{finding.level}')}: {words.said(finding.said).sentence}"
         if sheet.room() < LEADING * size * (len(_lines(told, size)) + 1) + size:
             sheet.text(words("more_findings", count=len(findings) - number), size=size)
             return

@@ -2,8 +2,8 @@
 
 Random effects by DerSimonian and Laird (1986): each specimen has its own error sigma_i and a true value that scatters
 by tau around the mean. Q = sum (f_i - f)^2 / sigma_i^2 follows chi-square with n - 1 degrees of freedom if tau = 0.
-The test is made once, on the mean stiffness over the range all specimens visited; the curves are pooled point by
-point.
+The tests are made on two numbers of each specimen: the mean stiffness over the range all of them visited, and K0; the
+curves are pooled point by point.
 """
 
 from __future__ import annotations
@@ -22,6 +22,32 @@ POINTS = 41
 
 
 @dataclass(frozen=True)
+class Scatter:
+    """How a number scatters over repeat specimens, against what their own errors allow.
+
+    Attributes
+    ----------
+    mean, mean_std : float
+    seen, seen_std : float
+        Standard deviation between the specimens, and how well so many of them tell it if they are normally distributed.
+    own : float
+        Root mean square of their own standard deviations.
+    p_value : float
+        Of a scatter this large from their own errors alone.
+    farthest : int
+        Which specimen is most of its own standard deviations from the mean.
+    """
+
+    mean: float
+    mean_std: float
+    seen: float
+    seen_std: float
+    own: float
+    p_value: float
+    farthest: int
+
+
+@dataclass(frozen=True)
 class Pooled:
     """Pooled characteristic of repeat specimens.
 
@@ -31,23 +57,15 @@ class Pooled:
         The range all specimens visited.
     mean, std, scatter : (m,) N m^2
         Mean tangent, its standard deviation, and the standard deviation between specimens (tau).
-    stiffness, stiffness_std : N m^2
-        Mean stiffness over the range and its standard deviation.
-    scatter_relative, error_relative : float
-        Scatter between specimens and their own root mean square error, relative to the mean stiffness.
-    p_value : float
-        Of a scatter this large from the specimens' errors alone.
+    stiffness : Scatter
+        Of the mean stiffness over the range, N m^2.
     """
 
     kappa: Array
     mean: Array
     std: Array
     scatter: Array
-    stiffness: float
-    stiffness_std: float
-    scatter_relative: float
-    error_relative: float
-    p_value: float
+    stiffness: Scatter
 
 
 def pool(specimens: Sequence[TangentCurve]) -> Pooled | None:
@@ -67,21 +85,26 @@ def pool(specimens: Sequence[TangentCurve]) -> Pooled | None:
     errors = np.array([np.interp(kappa, c.kappa, c.tangent_std) for c in specimens])
     if len(known) < len(specimens) or not np.all(errors > 0.0):
         return None
-    own = np.array([c.std for c in known])
-    mean, std, tau, q = random_effects(np.array([c.stiffness for c in known])[:, None], own[:, None])
     curve, curve_std, scatter, _ = random_effects(
         np.array([np.interp(kappa, c.kappa, c.tangent) for c in specimens]), errors
     )
-    return Pooled(
-        kappa=kappa,
-        mean=curve,
-        std=curve_std,
-        scatter=scatter,
-        stiffness=float(mean[0]),
-        stiffness_std=float(std[0]),
-        scatter_relative=float(tau[0] / abs(mean[0])),
-        error_relative=float(np.sqrt(np.mean(own**2)) / abs(mean[0])),
-        p_value=float(chdtrc(len(known) - 1, q[0])),
+    return Pooled(kappa, curve, curve_std, scatter, scattered([(c.stiffness, c.std) for c in known]))
+
+
+def scattered(numbers: Sequence[tuple[float, float]]) -> Scatter:
+    """Scatter of two or more numbers, each given with its standard deviation, which is positive."""
+    values, stds = np.array(numbers).T
+    (mean,), (std,), _, (q,) = random_effects(values[:, None], stds[:, None])
+    freedom = len(values) - 1
+    seen = float(np.std(values, ddof=1))
+    return Scatter(
+        mean=float(mean),
+        mean_std=float(std),
+        seen=seen,
+        seen_std=seen / float(np.sqrt(2.0 * freedom)),
+        own=float(np.sqrt(np.mean(stds**2))),
+        p_value=float(chdtrc(freedom, q)),
+        farthest=int(np.argmax(np.abs(values - mean) / stds)),
     )
 
 
@@ -114,7 +137,7 @@ THIRTYFOLD = 30.0
 
 
 def outlying(stiffness: Array) -> NDArray[np.bool_]:
-    """Which of repeat specimens (n,) have a stiffness that most of the others leave a factor of thirty away.
+    """Which of repeat specimens (n,) are a factor of thirty or more away in stiffness from most of the others.
 
     A specimen is believed if more than half of all, itself included, lie within that factor: of two that are further
     apart neither is.

@@ -19,7 +19,7 @@ ROW_PX = 21.0
 
 
 def ranked(diagnosis: DiagnosisPart) -> list[CauseRow]:
-    """Causes by how little chance explains them, then by pull: one of a sign it cannot have (p = 1) is no suspect."""
+    """Causes by p value, then by pull; one whose estimate has a sign that it cannot have (p = 1) comes last."""
     return sorted(diagnosis.table, key=lambda row: (row.p_adjusted, -abs(row.z)))
 
 

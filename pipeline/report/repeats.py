@@ -1,4 +1,4 @@
-"""Repeat specimens of one cable type on the index: which of them cannot be, and a sentence and a figure a type.
+"""Repeat specimens of one cable type on the index: which must be wrong, and whether the others may be the same cable.
 
 Only specimens that are usable are pooled. A specimen whose stiffness is a thirtieth or thirty times that of most others
 of its type is not: that is a wrong unit of the force, which no specimen shows on its own if its cable is soft.
@@ -12,7 +12,7 @@ from itertools import groupby
 
 import numpy as np
 
-from pipeline.report.pooling import Pooled, outlying, pool
+from pipeline.report.pooling import Pooled, Scatter, outlying, pool, scattered
 from pipeline.report.row import IndexRow, RowCurve
 from pipeline.report.words import Words
 from pipeline.settings.report import ReportSettings
@@ -28,7 +28,9 @@ class Repeats:
     Attributes
     ----------
     type, text : str
-        Of the cable; mean, scatter and whether they differ.
+        Of the cable; whether the specimens may be the same cable.
+    table : tuple of columns
+        Of mean f_EI and K0: name, mean, scatter between the specimens, what their bands allow, p value.
     pooled : Pooled
     members : tuple of int
         Numbers of the rows, the first of them.
@@ -38,6 +40,7 @@ class Repeats:
 
     type: str
     text: str
+    table: tuple[tuple[str, ...], ...]
     pooled: Pooled
     members: tuple[int, ...]
     alt: str
@@ -52,7 +55,7 @@ def by_type(rows: list[IndexRow]) -> list[tuple[str, list[tuple[int, RowCurve]]]
 
 
 def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
-    """The rows, those that cannot be specimens of their type as not usable."""
+    """The rows; a specimen whose stiffness cannot be that of its type is marked as not usable."""
     judged = list(rows)
     for name, group in by_type(rows):
         means = np.array([float(np.mean(curve.tangent)) for _, curve in group])
@@ -76,25 +79,42 @@ def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSett
             continue
         drawn += 1
         shown = drawn <= settings.pooled_types_drawn
+        rests = [rows[number].pre_curvature for number, _ in group]
+        known = [rest for rest in rests if rest is not None and rest[1] > 0.0]
+        scatters = {"f_EI": together.stiffness} | ({"K0": scattered(known)} if len(known) == len(rests) else {})
         yield Repeats(
             type=name,
-            text=_text(together, len(group), unit, words, settings),
+            text=_text(together, scatters, [rows[number].id for number, _ in group], words, settings),
+            table=tuple(_cells(name, s, unit if name == "f_EI" else PER_M, words) for name, s in scatters.items()),
             pooled=together,
             members=tuple(number for number, _ in group[:LINES]),
             alt=words("pooled_alt", count=len(group), type=name) if shown else "",
         )
 
 
-def _text(pooled: Pooled, count: int, unit: Unit, words: Words, settings: ReportSettings) -> str:
-    """Mean, scatter against own errors, and whether the specimens differ."""
-    differ = pooled.p_value < settings.pooled_p_value
-    return words(
+PER_M = Unit(1.0, "1/m")
+
+
+def _text(
+    pooled: Pooled, scatters: dict[str, Scatter], names: list[str], words: Words, settings: ReportSettings
+) -> str:
+    """Whether the specimens may be the same cable, and which of them is farthest off."""
+    level = settings.pooled_p_value / len(scatters)  # Bonferroni: all tests together have the level
+    wide = [name for name, scatter in scatters.items() if scatter.p_value < level]
+    text = words(
         "index_pooled_text",
-        count=count,
+        count=len(names),
         low=words.curvature(pooled.kappa[0]),
         high=words.curvature(pooled.kappa[-1]),
-        mean=unit.text(pooled.stiffness, pooled.stiffness_std),
-        scatter=words.number(100.0 * pooled.scatter_relative, 2),
-        own=words.number(100.0 * pooled.error_relative, 2),
-        verdict=words("pooled_differ" if differ else "pooled_same", p=words.probability(pooled.p_value, name="p")),
+        verdict=words("pooled_differ" if wide else "pooled_same", what=f" {words('and')} ".join(wide or scatters)),
     )
+    return f"{text} {words('pooled_farthest', name=names[scatters[wide[0]].farthest])}" if wide else text
+
+
+def _cells(name: str, scatter: Scatter, unit: Unit, words: Words) -> tuple[str, ...]:
+    """Column of the table."""
+    unit = replace(unit, decimal=words.decimal)
+    p_value = words.probability(scatter.p_value)
+    seen = unit.text(scatter.seen, scatter.seen_std) if scatter.seen > 0.0 else unit.plain(0.0)
+    numbers = (unit.text(scatter.mean, scatter.mean_std), seen)
+    return (name, *numbers, unit.plain(scatter.own, 2), p_value)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message, as_message
+
 if TYPE_CHECKING:
     from pipeline.result import FindingPart, Result, Visited
     from pipeline.settings.report import ReportSettings
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 End = tuple[float, float, float]
 
-ROW = 2
+ROW = 3
 """Version of what stands in an entry; another one is made anew from the result."""
 
 SHAPES, SHAPE_POINTS = 5, 11
@@ -57,8 +59,8 @@ class IndexRow:
     causes, twins : tuple of str
         Named ones, and other names that the data cannot tell from them.
     usable : bool
-    fault : str
-        Why it is not usable; empty if it is.
+    fault : Message or None
+        Why it is not usable.
     method : str
         Which curve answers; empty without any.
     low, high : (kappa, f_EI, std) or None
@@ -68,8 +70,8 @@ class IndexRow:
     rms_relative, compatible : float, bool or None
         How far the two ways differ, and whether their bands allow it.
     photos_used, photos_given, warnings, errors : int
-    worst, reason : str
-        Code and sentence of the worst finding; empty without warning or error.
+    worst, reason : str, Message or None
+        Code of the worst finding and what it says; nothing without warning or error.
     shapes : str
         SVG path of measured shapes in the chord frame, to one scale, bow downwards.
     curve : RowCurve or None
@@ -86,7 +88,7 @@ class IndexRow:
     causes: tuple[str, ...]
     twins: tuple[str, ...]
     usable: bool
-    fault: str
+    fault: Message | None
     method: str
     low: End | None
     high: End | None
@@ -98,7 +100,7 @@ class IndexRow:
     warnings: int
     errors: int
     worst: str
-    reason: str
+    reason: Message | None
     shapes: str
     curve: RowCurve | None
     report: str = ""
@@ -110,7 +112,7 @@ class IndexRow:
         return "unusable" if self.status != "failed" and self.method and not self.usable else self.status
 
 
-TEXTS = ("id", "type", "status", "verdict", "fault", "method", "worst", "reason", "shapes")
+TEXTS = ("id", "type", "status", "verdict", "method", "worst", "shapes")
 COUNTS = ("photos_used", "photos_given", "warnings", "errors")
 STATUSES = ("measured", "partial", "failed")
 VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "underpowered")
@@ -129,7 +131,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         causes=tuple(cause.name for cause in found),
         twins=tuple(dict.fromkeys(name for cause in found for name in cause.class_ if name != cause.name)),
         usable=told.usable,
-        fault="" if told.usable else told.reason,
+        fault=None if told.usable else as_message(told.said),
         method=told.method or "",
         low=low,
         high=high,
@@ -141,7 +143,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         warnings=sum(f.level == "warning" for f in result.findings),
         errors=sum(f.level == "error" for f in result.findings),
         worst="" if worst is None else worst.code,
-        reason="" if worst is None else worst.message,
+        reason=None if worst is None else as_message(worst.said),
         shapes=_shapes(result),
         curve=None if curve is None else _thinned(curve, settings.index_curve_points),
     )
@@ -154,7 +156,7 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
 
 
 def _thinned(curve: Visited, points: int) -> RowCurve:
-    """The curve on so many points."""
+    """The curve interpolated to so many points."""
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
     columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
     return RowCurve(
@@ -217,6 +219,8 @@ def from_entry(data: object) -> IndexRow:
             causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
             twins=tuple(_typed(name, str) for name in _typed(data["twins"], list)),
             usable=_typed(data["usable"], bool),
+            fault=_message(data["fault"]),
+            reason=_message(data["reason"]),
             low=_end_of(data["low"]),
             high=_end_of(data["high"]),
             pre_curvature=None if data["pre_curvature"] is None else _numbers(data["pre_curvature"], 2),
@@ -224,7 +228,7 @@ def from_entry(data: object) -> IndexRow:
             compatible=None if data["compatible"] is None else _typed(data["compatible"], bool),
             curve=None if data["curve"] is None else _curve(data["curve"]),
         )
-    except (KeyError, TypeError, OverflowError) as error:
+    except (AttributeError, KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"no row: {error}") from error
     if row.status not in STATUSES or row.verdict not in VERDICTS:
         raise ValueError("no row: unknown status or verdict")
@@ -236,6 +240,10 @@ def _typed(value: Any, kind: type) -> Any:
     if type(value) is not kind:
         raise TypeError(f"{type(value).__name__} in place of {kind.__name__}")
     return value.encode("utf-8", "replace").decode("utf-8") if isinstance(value, str) else value
+
+
+def _message(stored: Any) -> Message | None:
+    return None if stored is None else Message.read(stored)
 
 
 def _numbers(values: Any, count: int | None = None) -> tuple[Any, ...]:

@@ -183,6 +183,6 @@ def _letters() -> frozenset[int]:
 
 
 def printable(text: str) -> str:
-    """Text with every letter the font of the figures has not replaced by a box."""
+    """Text in which letters that the font of the figures lacks are replaced by a box."""
     letters = _letters()
     return "".join(letter if ord(letter) in letters or letter.isspace() else "□" for letter in text)

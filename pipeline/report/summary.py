@@ -27,7 +27,7 @@ def summary_lines(rows: Iterable[IndexRow]) -> Iterator[str]:
 def _cells(row: IndexRow) -> tuple[object, ...]:
     none = (None, None, None)
     rest, ends = row.pre_curvature or (None, None), (*(row.low or none), *(row.high or none))
-    told = (row.worst, row.fault or row.reason, row.type, row.rms_relative, row.compatible)
+    told = (row.worst, str(row.fault or row.reason or ""), row.type, row.rms_relative, row.compatible)
     counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
     about = (row.id, row.status, row.usable, row.verdict, ";".join(row.causes), row.method)
     return (*about, *rest, *ends, *told, *counts, row.report, *ends, *rest)

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pipeline.messages import Message, as_message, sentence
 from pipeline.report.german import in_german
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
@@ -57,9 +58,7 @@ class Said:
     @property
     def sentence(self) -> str:
         """The text as a sentence of its own: a capital at its start, unless it starts with a file or a symbol."""
-        first = self.text.split(maxsplit=1)[:1]
-        plain_word = bool(first) and first[0].rstrip(",;:").isalpha() and first[0].islower()
-        return f"{self.text[0].upper()}{self.text[1:]}" if plain_word else self.text
+        return sentence(self.text)
 
 
 @dataclass(frozen=True)
@@ -103,12 +102,18 @@ class Words:
 
         return str(_table()["causes"].get(name, spoken(name))) if self.language == "de" else spoken(name)
 
-    def said(self, sentence: str) -> Said:
-        """A stored sentence (finding, reason, headline, advice) in this language, as far as it is known."""
-        if self.language == "de":
-            text, known = in_german(sentence, _german_causes())
-            return Said(text.replace("+-", "±"), "de" if known else "en")
-        return Said(sentence.replace("+-", "±"), "en")
+    def said(self, said: Message | str) -> Said:
+        """A message, or a sentence that is stored in English alone, in this language, as far as it is known."""
+        unknown: list[str] = []
+
+        def free(text: str) -> str:
+            told, known = in_german(text, _german_causes()) if self.language == "de" else (text, True)
+            if not known:
+                unknown.append(text)
+            return told.replace("+-", "±")
+
+        text = as_message(said).said(self.language, free)
+        return Said(text, "en" if unknown else self.language)
 
     def code(self, code: str) -> tuple[str, str] | None:
         """What a message's code means and what to do about it; None for one that is not known."""

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.result.diagnosed import DiagnosisPart
 from pipeline.result.parts import AnswerPart, BalancePart, FindingPart, InversePart, Method
 from pipeline.result.visited import Visited, html_table, visited
-from pipeline.rounding import plain
 
 if TYPE_CHECKING:
     from pipeline.result.whole import Result
@@ -29,15 +29,20 @@ class Answer:
     ----------
     usable : bool
         False where a fault of the data makes the numbers none of the cable's.
-    reason : str
-        Why it is this curve, or why it is not usable.
+    said : Message or str
+        Why it is this curve, or why it is not usable; `reason` in English.
     curve : Visited or None
         f_EI with its band and K0, over the curvatures that were visited; None if no way gave any.
     """
 
     usable: bool
-    reason: str
+    said: Message | str
     curve: Visited | None
+
+    @property
+    def reason(self) -> str:
+        """Why it is this curve, or why it is not usable, in a sentence."""
+        return str(self.said)
 
     @property
     def method(self) -> Method | None:
@@ -57,7 +62,8 @@ class Answer:
     def stored(self) -> AnswerPart:
         """What ``result.json`` keeps of it; the curve stands there under its method."""
         names = ("method", "usable", "reason", "pre_curvature_per_m", "pre_curvature_std_per_m")
-        return AnswerPart(**{name: getattr(self, name) for name in names})
+        data = self.said.stored() if isinstance(self.said, Message) else {}
+        return AnswerPart(**{name: getattr(self, name) for name in names}, **data)
 
     def _repr_html_(self) -> str:
         """Show the answer in a notebook."""
@@ -113,7 +119,7 @@ def _best(result: Result) -> Visited | None:
 
 
 def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The finding that comes before every number: with data at fault the numbers may be wrong, however well they fit.
+    """The fault of the data that is told before every number; None without one: faulty data may fit very well.
 
     An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
     refused for stands where its numbers would be, and an error of the program is none of the data.
@@ -140,74 +146,64 @@ def answer_of(result: Result) -> Answer:
     stored = result.answer_
     if stored is not None:
         curve = None if stored.method is None else curves(result).get(stored.method)
-        return Answer(stored.usable, stored.reason, curve)
+        return Answer(stored.usable, stored.message_or(stored.reason), curve)
     curve = _best(result)
     fault = data_fault(result, curve)
     if curve is None:
-        first = next((f.message for f in result.findings if f.level == "error"), "no characteristic was measured")
+        first = next((f.said for f in result.findings if f.level == "error"), Message("answer.none"))
         return Answer(False, fault or first, None)
-    return Answer(not fault, fault or _why(result, curve.method), curve)
+    return Answer(fault is None, fault or _why(result, curve.method), curve)
 
 
-def _why(result: Result, method: str) -> str:
+def _why(result: Result, method: str) -> Message:
     """Why a curve is the answer."""
     if method == "extended":
-        return "the model with the causes that were found explains the data best"
+        return Message("answer.extended")
     if refuted(result.diagnosis):
-        return "the data refute the extended model, so the plain one answers"
+        return Message("answer.refuted")
     if method == "inverse" and result.inverse is not None and result.inverse.converged:
-        return "the simulation was fitted, and no cause had to be added to it"
-    return "the simulation could not be fitted" if method == "balance" else "no other way gave a characteristic"
+        return Message("answer.inverse")
+    return Message("answer.balance" if method == "balance" else "answer.only")
 
 
-def data_fault(result: Result, curve: Visited | None) -> str:
-    """What makes the numbers of a result none of the cable's, in a sentence; empty if nothing does.
+def data_fault(result: Result, curve: Visited | None) -> Message | str | None:
+    """What makes the numbers of a result none of the cable's; None if nothing does.
 
     Faults that were left out or corrected (a photo of another step, a dead load cell, a sign turned midway) do not.
     """
     diagnosis = result.diagnosis
     turned = diagnosis is not None and any(part.factor < 0.0 for part in diagnosis.corrected_forces)
     wrong = WRONG_SCALE if turned else WRONG_SCALE | {"force/sign"}
-    told = next((finding.message for finding in result.findings if finding.code in wrong), "")
+    told = next((finding.said for finding in result.findings if finding.code in wrong), None)
     return told or _other_length(result) or _moving_apart(result) or _negative(curve)
 
 
-def _other_length(result: Result) -> str:
+def _other_length(result: Result) -> Message | None:
     """The photos show a cable of quite another length than the one stated."""
     seen = [photo.traced_length_m for photo in result.photos if photo.traced_length_m is not None]
     stated = result.specimen.length_m
     if not seen or not stated or abs(float(np.median(seen)) / stated - 1.0) < OTHER_CABLE:
-        return ""
-    shown = plain(1e3 * float(np.median(seen)), 4)
-    return (
-        f"the photos show a cable of {shown} mm where length_mm says {plain(1e3 * stated, 4)}: they are of another "
-        "cable, or scale or length is in another unit"
-    )
+        return None
+    return Message("fault.other-length", seen_mm=1e3 * float(np.median(seen)), stated_mm=1e3 * stated)
 
 
-def _moving_apart(result: Result) -> str:
+def _moving_apart(result: Result) -> Message | None:
     """The bearings move apart on the photos that were used, where the log pushes them together."""
     unused = result.diagnosis.left_out_photos if result.diagnosis else []
     chords = {photo.step: photo.chord_m for photo in result.photos if photo.step not in unused}
     both = [(s.displacement_m, chord) for s in result.steps if (chord := chords.get(s.step)) is not None]
     if len(both) < 3:
-        return ""
+        return None
     moved, chord = np.array(both).T - np.mean(both, axis=0)[:, None]
-    if float(moved @ chord) <= TOGETHER * float(np.linalg.norm(moved) * np.linalg.norm(chord)):
-        return ""
-    return "on the photos the bearings move apart where the log pushes them together: they are of another test"
+    together = float(moved @ chord) > TOGETHER * float(np.linalg.norm(moved) * np.linalg.norm(chord))
+    return Message("fault.moving-apart") if together else None
 
 
-def _negative(curve: Visited | None) -> str:
-    """A cable that helps to bend itself."""
-    if curve is None or float(np.mean(curve.tangent)) > 0.0:
-        return ""
-    return "the bending stiffness comes out negative, which no cable has: the sign of the forces is wrong"
+def _negative(curve: Visited | None) -> Message | None:
+    """The stiffness comes out negative: the cable would help to bend itself."""
+    return None if curve is None or float(np.mean(curve.tangent)) > 0.0 else Message("fault.negative")
 
 
-def none_of_its_type(times: float, *, others: int, kind: str) -> str:
+def none_of_its_type(times: float, *, others: int, kind: str) -> Message:
     """Why a specimen is not usable whose f_EI is so many times that of most others of its type."""
-    return (
-        f"f_EI is {plain(times, 2)} times that of the other {others} specimens of type {kind}: check the unit of the "
-        "forces"
-    )
+    return Message("fault.none-of-its-type", times=times, others=others, type=kind)

@@ -85,7 +85,7 @@ class GainPart(Part):
 
 
 class BlindSpot(Part):
-    """A cause that cannot be seen here but would hurt."""
+    """A cause that these data could not have shown although it would change f_EI."""
 
     name: str = Field(description="of the cause")
     stiffness_bias_at_plausible_size: Number = Field(
@@ -95,7 +95,7 @@ class BlindSpot(Part):
 
 
 class NextExperiment(Part):
-    """The cheapest measurement that separates what is confused."""
+    """The cheapest measurement that tells apart causes which these data cannot."""
 
     what: str = Field(description="to do, in words")
     separates: list[str] = Field(description="causes that it tells apart")

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
+from pipeline.messages import Message
 from pipeline.result.whole import SCHEMA, Result
 
 LARGEST_BYTES = 256_000_000
@@ -47,18 +48,8 @@ def read_result(path: Path | str) -> Result:
     except (OSError, ValueError, RecursionError, MemoryError) as error:
         other = _other_version(error)
         if other:
-            raise InputError(
-                f"is of version {other}, and this program reads {SCHEMA}",
-                path=file,
-                code="result/version",
-                remedy="read it with the version of cablebend that wrote it, or measure the specimen again",
-            ) from error
-        raise InputError(
-            f"is no readable result ({_told(error)})",
-            path=file,
-            code="result/unreadable",
-            remedy="give a result.json that `cablebend run` wrote, or its folder",
-        ) from error
+            raise InputError(Message("result/version", other=other, own=SCHEMA), path=file) from error
+        raise InputError(Message("result/unreadable", why=_told(error)), path=file) from error
 
 
 def _other_version(error: Exception) -> str:

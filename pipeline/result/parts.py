@@ -7,10 +7,12 @@ provenance) keep their names; more stands beside them.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from pipeline.messages import UNREADABLE, Message
+from pipeline.records import Level
 from pipeline.result.lists import Floats, Number, check_one_length
 
 
@@ -232,7 +234,23 @@ class AgreementPart(Part):
 Method = Literal["extended", "inverse", "balance"]
 
 
-class AnswerPart(Part):
+class SaidPart(Part):
+    """A sentence as data, so that it can be said in any language."""
+
+    key: str = Field("", description="which sentence of the catalogue; empty where only its English text is known")
+    values: dict[str, Any] = Field(
+        {}, description="what stands in the sentence, by name; SI units, and further sentences as key and values"
+    )
+
+    def message_or(self, text: str) -> Message | str:
+        """The sentence, or its English text where the catalogue does not know it (any more)."""
+        try:
+            return Message.read({"key": self.key, "values": self.values}) if self.key else text
+        except UNREADABLE:
+            return text
+
+
+class AnswerPart(SaidPart):
     """Which of the curves is the result, why, and whether a fault of the data makes it none of the cable's."""
 
     method: Method | None = Field(None, description="which curve: extended, inverse or balance; null without any")
@@ -242,9 +260,20 @@ class AnswerPart(Part):
     pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
 
 
-class FindingPart(Part):
+class FindingPart(SaidPart):
     """Something a reader must know."""
 
     code: str = Field(description="what it is, for `cablebend explain CODE`")
-    level: Literal["info", "warning", "error"] = Field(description="error, warning or info")
+    level: Level = Field(description="error, warning or info")
     message: str = Field(description="one sentence for people")
+
+    @classmethod
+    def of(cls, level: Level, said: Message | str, *, code: str = "") -> FindingPart:
+        """The part for something said; its code is that of the message unless another is given."""
+        data = said.stored() if isinstance(said, Message) else {}
+        return cls(code=code or Message(data["key"]).code, level=level, message=str(said), **data)
+
+    @property
+    def said(self) -> Message | str:
+        """What is said, to be told in any language."""
+        return self.message_or(self.message)

@@ -3,6 +3,7 @@
 import pytest
 
 from pipeline.assembly import folded, headline, photo_findings, without_those_told_better
+from pipeline.messages import Message
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import first_screen
 from pipeline.report.words import Words
@@ -16,8 +17,8 @@ ENDS = "the file ends before the picture does; copy it again"
 @pytest.mark.parametrize("reason", [ENDS, f"images/b.png: {ENDS}"])
 def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name_once(reason):
     found = photo_findings(Rejected("images/b.png", "photo/truncated", reason))
-    assert found == (Finding("photo/truncated", "warning", f"images/b.png: {ENDS}"),)
-    assert Words("de").said(found[0].message).language == "de"
+    assert [(f.code, f.level, f.message) for f in found] == [("photo/truncated", "warning", f"images/b.png: {ENDS}")]
+    assert Words("de").said(found[0].said).language == "de"
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,8 @@ def measured():
 
 
 TOO_LARGE = "forces seem to be 1000 times too large (mN taken for N, or N for kN)"
-UNIT = FindingPart(code="size/force", level="error", message=f"the {TOO_LARGE}")
+READING = Message("size/force.too-large", times=1000.0, reading="mN-as-N")
+UNIT = FindingPart.of("error", Message("size/force.unit", readings=[READING]))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +55,7 @@ def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads
 
 def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
     plain, led = headline(measured), headline(measured.model_copy(update={"findings": [UNIT]}))
-    assert led == f"The {TOO_LARGE}. {plain}"
+    assert str(led) == f"The {TOO_LARGE}. {plain}"
     german = Words("de").said(led)
     assert german.language == "de" and german.text.endswith(Words("de").said(plain).text)
     assert german.text.startswith("Die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder N für kN). ")
@@ -90,6 +92,6 @@ def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     assert told[1] == axis and folded(noticed[:1]) == [noticed[0][1]]
     (alike,) = folded([narrow("a.png", 116), narrow("c.png", 116)])
     assert alike.message.startswith("2 photos (a.png, c.png): what was traced is 116 % as wide")
-    german = Words("de").said(told[0].message)
+    german = Words("de").said(told[0].said)
     assert german.language == "de" and german.text.startswith("3 Fotos (a.png, b.png, c.png), auf a.png: das ")
-    assert Words("de").said(alike.message).language == "de"
+    assert Words("de").said(alike.said).language == "de"

@@ -67,7 +67,7 @@ def test_other_units_of_force(factor, said):
     (finding,) = found_for(0.02 * factor, 4.6e-3)
     assert finding.code == "size/force" and said in finding.message
     assert not re.search(r"\de[+-]\d", finding.message)  # who is tired reads 1e+01 as 1
-    german = Words("de").said(finding.message)
+    german = Words("de").said(finding.said)
     assert german.language == "de" and "times too" not in german.text and " for " not in german.text
 
 

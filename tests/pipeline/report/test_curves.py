@@ -107,18 +107,20 @@ def test_pooling_tells_scatter_from_errors():
         return [straight(5.0 + shift, -0.1, 0.1, 0.1 * unit) for shift in shifts]
 
     same, different = pool(specimens(0.0)), pool(specimens(0.4))
-    assert same.p_value > 1e-3
-    assert different.p_value < 1e-6
+    assert same.stiffness.p_value > 1e-3
+    assert different.stiffness.p_value < 1e-6
     # 40 specimens know a scatter to 1 / sqrt(80), 11 %; three of those
-    assert different.scatter_relative * different.stiffness == pytest.approx(0.4, rel=0.34)
-    assert different.stiffness == pytest.approx(4.5, abs=4 * different.stiffness_std)
+    seen = different.stiffness
+    assert np.sqrt(seen.seen**2 - seen.own**2) == pytest.approx(0.4, rel=0.34)
+    assert seen.mean == pytest.approx(4.5, abs=4 * seen.mean_std)
+    assert seen.seen_std == pytest.approx(seen.seen / np.sqrt(78))
 
 
 def test_pooling_false_alarms_by_repetition():
     rng, alarms = np.random.default_rng(11), 0
     for _ in range(400):
         shifts = 0.1 * rng.normal(size=6)
-        alarms += pool([straight(5.0 + shift, 0.0, 0.1, np.full((11, 1), 0.1)) for shift in shifts]).p_value < 0.05
+        alarms += pool([straight(5.0 + s, 0.0, 0.1, np.full((11, 1), 0.1)) for s in shifts]).stiffness.p_value < 0.05
     # binomial with p = 0.05, n = 400: 20 with standard deviation 4.4; four of them
     assert 20 - 18 <= alarms <= 20 + 18
 

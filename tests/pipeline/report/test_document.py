@@ -129,8 +129,8 @@ def test_centerline_lies_on_the_photo(page, full_result):
 
 def test_what_all_photos_share_stands_under_their_table(page, full_result, brief):
     text = Page(page).text
-    assert "Common to all of them is the scale's, ± 0.04 %." in text
-    assert "too far apart, ± 0.41 %" in text
+    assert "the error of the scale, ± 0.04 %, is common to all photos" in text
+    assert "too far apart, by ± 0.41 %" in text
     pointed_at = full_result.scale.model_copy(update={"axis_parallax_std": 0.0})
     assert "too far apart" not in Page(report_html(brief.model_copy(update={"scale": pointed_at}))).text
 

@@ -1,15 +1,18 @@
 """The first screen: the answer in front, what could hide, what bands leave out; figures by the model that answers."""
 
+import numpy as np
 import pytest
 
 from pipeline.report.answer import first_screen
 from pipeline.report.document import report_html
 from pipeline.report.evidence import main_figure, pointer_data
 from pipeline.report.figures import steps_of_answer
+from pipeline.report.maps import photos_of_answer
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import BlindSpot, set_aside
 from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
 
 SETTINGS, WORDS = ReportSettings(), Words("en")
@@ -66,3 +69,17 @@ def test_forces_are_those_of_the_model_that_answers(diagnosed):
     for number, rest in zip(after.steps, left, strict=True):
         assert shown[number].force_N - shown[number].force_fit_N == pytest.approx(rest, rel=1e-9)
     assert steps_of_answer(measured_result()) == measured_result().steps
+
+
+def test_a_photo_shows_what_the_model_of_the_answer_leaves_of_it():
+    result = measured_result()
+    assert photos_of_answer(result) is result.photos  # the simulation answers
+    result = result.model_copy(update={"diagnosis": diagnosis_of("named", result.photos), "answer_": None})
+    assert result.answer.method == "extended"
+    residuals = result.diagnosis.residuals_after
+    for row, photo in zip(residuals.shape_sigma, photos_of_answer(result), strict=True):
+        assert photo.kappa_fit_per_m == []  # that of the simulation without the cause
+        middle, place = len(photo.s_m) // 2, len(residuals.s_m) // 2
+        sigma = np.interp(photo.s_m[middle], residuals.s_m, [np.nan if v is None else v for v in row])
+        assert np.isfinite(row[place]) and photo.shape_residual_std_m[middle] > 0.0
+        assert photo.shape_residual_m[middle] == pytest.approx(sigma * photo.shape_residual_std_m[middle])

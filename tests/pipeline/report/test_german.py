@@ -15,6 +15,7 @@ import pytest
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.words import SPOKEN, could_have_been_seen, headline
 from pipeline.errors import InputError
+from pipeline.messages import Message, free_text
 from pipeline.report.german import EDGES, entries
 from pipeline.report.words import Words
 from pipeline.result import CausePart, CauseRow
@@ -32,6 +33,7 @@ ELSEWHERE = (
     "pipeline/compare.py",
     "pipeline/diagnosis/rediscovery.py",
     "pipeline/intake/template.py",
+    "pipeline/messages/",
     "pipeline/predict.py",
     "pipeline/report/",
     "pipeline/result/visited.py",
@@ -184,29 +186,17 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
     ("sentence", "told"),
     [
         (
-            "inverse problem: " + InverseOutcome.NOT_VISIBLE.value + "; open: "
-            "f_EI at 3.4 1/m (+- 0.2 in the logarithm); f_EI at 5.2 1/m (+- 0.3 in the logarithm)",
+            Message(
+                "way.inverse-open",
+                outcome=free_text(InverseOutcome.NOT_VISIBLE.value),
+                open=[
+                    free_text("f_EI at 3.4 1/m (+- 0.2 in the logarithm)"),
+                    free_text("f_EI at 5.2 1/m (+- 0.3 in the logarithm)"),
+                ],
+            ),
             "inverses Problem: die Daten legen nicht jeden Parameter fest (die offenen Kombinationen stehen daneben); "
             "weiter biegen, Schritte oder ein Foto des kraftfreien Kabels ergänzen; offen: "
             "f_EI bei 3,4 1/m (± 0,2 im Logarithmus); f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
-        ),
-        (
-            InputError("key 'lenght_mm' is not known in [specimen]", path="a b/specimen.toml", line=3, code="x",
-                       remedy="rename it to length_mm or remove it").sentence,
-            "a b/specimen.toml, Zeile 3: der Schlüssel 'lenght_mm' ist in [specimen] nicht bekannt; "
-            "in length_mm umbenennen oder entfernen.",
-        ),
-        (
-            "force.csv, line 4: force '1.2.3' is no number (numbers of this file have a decimal point); "
-            "correct the cell or remove the row.",
-            "force.csv, Zeile 4: Kraft '1.2.3' ist keine Zahl (Zahlen dieser Datei haben als Dezimalzeichen: Punkt); "
-            "die Zelle berichtigen oder die Zeile entfernen.",
-        ),
-        (
-            "force.csv: no repeated samples; standard deviation of a force taken as 0.5 % of the largest force, "
-            "0.002 N",
-            "force.csv: keine wiederholten Messwerte; als Standardabweichung einer Kraft gilt 0,5 % der größten Kraft, "
-            "0,002 N",
         ),
         (
             "The left bearing moves on the photos, specimen.toml says moving_bearing = \"right\"; the camera may be "
@@ -216,8 +206,31 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
         ),
         ("a tape measure (length_error)", "ein Maßband (Längenfehler)"),
         (
-            "log.csv: branches by the order of the displacements: 1 mounted, 5 loading, 4 unloading",
+            InputError(Message("toml/unknown-key", name="'lenght_mm'", table="specimen", near="length_mm"),
+                       path="a b/specimen.toml", line=3).placed,
+            "a b/specimen.toml, Zeile 3: der Schlüssel 'lenght_mm' ist in [specimen] nicht bekannt; "
+            "in length_mm umbenennen oder entfernen.",
+        ),
+        (
+            Message("log/not-a-number", role="force", cell="'1.2.3'", sign="point"),
+            "Kraft '1.2.3' ist keine Zahl (Zahlen dieser Datei haben als Dezimalzeichen: Punkt); "
+            "die Zelle berichtigen oder die Zeile entfernen",
+        ),
+        (
+            Message(
+                "log/branch-inferred",
+                file="log.csv",
+                counts=[
+                    Message("log/branch-inferred.count", count=count, branch=branch)
+                    for branch, count in (("mounted", 1), ("loading", 5), ("unloading", 4))
+                ],
+            ),
             "log.csv: Äste nach der Reihenfolge der Verschiebungen: 1 eingelegt, 5 Belastung, 4 Entlastung",
+        ),
+        (
+            Message("log/force-std", file="force.csv", share=0.005, std_N=0.002),
+            "force.csv: keine wiederholten Messwerte; als Standardabweichung einer Kraft gilt 0,5 % der größten Kraft, "
+            "2\u00a0mN",
         ),
     ],
 )  # fmt: skip
@@ -228,7 +241,7 @@ def test_sentences_put_together_are_taken_apart(sentence, told):
 
 @pytest.mark.parametrize("outcome", [*InverseOutcome, *BalanceOutcome], ids=lambda outcome: outcome.name)
 def test_outcomes_are_known_whole(outcome):
-    told = Words("de").said(f"No characteristic was measured: {outcome.value}.").text
+    told = Words("de").said(Message("headline.none", advice=free_text(outcome.value))).text
     assert told == f"Keine Kennlinie wurde gemessen: {GERMAN[shown(outcome.value)]}."
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from pipeline.batch.store import write_entry
+from pipeline.messages import Message
 from pipeline.report.index import write_index
 from pipeline.report.row import as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
@@ -108,8 +109,21 @@ def test_repeat_specimens_are_pooled_by_type(full_result, tmp_path):
     ]
     page = write_index(repeats, tmp_path)[0].read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert page.count("<figcaption>") == 1
-    assert "3 specimens. Mean f_EI over 2.00 to 8.70 1/m: 13.2" in page
-    assert "the specimens differ no more than their errors (p = 1)" in page
+    assert (
+        "3 specimens, bent to 2.00 to 8.70 1/m by all. They may all be the same cable: the scatter of f_EI and K0 "
+        in page
+    )
+    assert '<td>f_EI</td><td>K0</td></tr><tr><th scope="row">mean</th><td>13.2' in page
+
+
+def test_repeats_that_are_not_one_cable_are_told_and_the_farthest_is_named(full_result, tmp_path):
+    other = full_result.answer.curve.pre_curvature + 5.0 * full_result.answer.curve.pre_curvature_std
+    inverse = full_result.inverse.model_copy(update={"pre_curvature_per_m": other})
+    turned = named(full_result, "turned", "B").model_copy(update={"inverse": inverse, "answer_": None})
+    page = write_index([*(named(full_result, str(i), "B") for i in range(3)), turned], tmp_path)[0].read_text("utf-8")
+    assert (
+        "They are not all the same cable: the scatter of K0 " in page and "Farthest off for its band is turned." in page
+    )
 
 
 def test_german_index(batch, tmp_path):
@@ -215,7 +229,8 @@ def test_what_is_not_usable_is_in_no_mean(full_result, tmp_path):
     batch = [named(full_result, str(i), "B") for i in range(3)] + [wrong]
     page, summary = write_index(batch, tmp_path)
     text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert "3 specimens. Mean f_EI over 2.00 to 8.70 1/m: 13.2" in text
+    assert "3 specimens, bent to 2.00 to 8.70 1/m by all" in text
+    assert '<td>f_EI</td><td>K0</td></tr><tr><th scope="row">mean</th><td>13.2' in text
     assert '<tr class="unusable">' in text and "data at fault" in text
     table = pd.read_csv(summary)
     assert list(table.usable) == [True, True, True, False]
@@ -232,7 +247,7 @@ def test_a_wrong_unit_that_shows_beside_repeat_specimens_alone(full_result, tmp_
     assert list(pd.read_csv(summary).usable) == [True] * 5 + [False]
     assert "f_EI is 1000 times that of the other 5 specimens of type B" in pd.read_csv(summary).reason[5]
     text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert said in text and ("5 specimens. Mean" in text or "5 Proben. Mittleres" in text)
+    assert said in text and ("5 specimens, bent" in text or "5 Proben, alle gebogen" in text)
 
 
 def test_of_two_that_contradict_each_other_neither_is_believed(full_result, tmp_path):
@@ -240,3 +255,10 @@ def test_of_two_that_contradict_each_other_neither_is_believed(full_result, tmp_
     assert not pd.read_csv(write_index(pair, tmp_path)[1]).usable.any()
     pair = [named(full_result, "a", "B"), scaled(named(full_result, "b", "B"), 20.0)]
     assert pd.read_csv(write_index(pair, tmp_path)[1]).usable.all()
+
+
+def test_a_reason_is_no_formula_in_the_summary(failed_result, tmp_path):
+    hostile = Message("error.file", path="=cmd|' /C calc'!A0", said=Message("log/empty"))
+    failed = failed_result.model_copy(update={"findings": [FindingPart.of("error", hostile, code="log/empty")]})
+    summary = write_index([failed], tmp_path)[1].read_text(encoding="utf-8")
+    assert "'=cmd|' /C calc'!A0: is empty; export the forces again." in summary

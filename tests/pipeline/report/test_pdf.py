@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from pipeline.messages import Message
 from pipeline.report.pdf import Sheet, list_troubles, pdf_bytes, printable, write_pdf
 from pipeline.report.words import Words
 from pipeline.result import FindingPart
@@ -39,10 +40,10 @@ def test_letters_without_a_shape_become_boxes():
 
 def test_findings_that_find_no_room_are_counted():
     sheet = Sheet("cable-07")
-    long = "the load cell reads 0.300 ± 0.025 N in the force-free step 0, 12.0 standard deviations from zero"
-    list_troubles(sheet, [FindingPart(code="x", level="warning", message=long)] * 60, Words("de"))
+    long = Message("identify/force-zero", force_N=(0.3, 0.025), step=0, z=12.0)
+    list_troubles(sheet, [FindingPart.of("warning", long)] * 60, Words("de"))
     told = [text.get_text() for text in sheet.figure.texts]
-    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 0,300 ± 0,025 N") for line in told)
+    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 300 ± 25\u00a0mN") for line in told)
     assert 10 < shown < 60
     assert told[-1] == f"{60 - shown} weitere in report.html."
     assert sheet.room() > 0.0

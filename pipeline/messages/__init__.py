@@ -1,0 +1,194 @@
+"""Sentences of the program in every language it speaks: a key and named values in, a sentence out.
+
+Whoever notices something makes a `Message`: which sentence it is, and the values that go into it, in SI units. The
+sentences stand in ``en.toml`` and ``de.toml`` beside this module under the same keys: the code of the finding or error,
+and behind a dot which of its sentences, where it has several. Two texts are what is wrong and what to do. A gap is
+written as in `str.format`; what may stand behind its colon:
+
+``.3g mm``, ``.1f %``
+    A number in that unit (mm, %), with the decimal sign of the language.
+``± 1/m``
+    A pair, value and standard deviation, in that unit.
+``N``, ``N m²``
+    A force or stiffness with the prefix that suits it; of a pair, value ± standard deviation.
+``p``, ``plain``, ``plain1``
+    A p value; a number to three significant digits, or to so many; ``curvature``, the end of a range in 1/m.
+``word``
+    A name used inside the program (a branch, a column) as one says it: the entry ``word.NAME``.
+``wrong``
+    Of a message: what is wrong, without what to do.
+`` and ``
+    Of a list: what stands between its parts; a comma, where nothing is said; a dot makes a sentence of each.
+"""
+
+from __future__ import annotations
+
+import string
+import tomllib
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pipeline.rounding import p_value, plain, rounded
+from pipeline.units import quantity
+
+LONGEST = 600
+"""Letters of a text that is quoted from a file: a line may have a million. What is cut is its middle."""
+DECIMAL = {"en": ".", "de": ","}
+FACTORS = {"mm": 1e3, "%": 1e2, "mN m²": 1e3, "1/m": 1.0, "N": 1.0}
+QUANTITIES = ("N", "N m²")
+UNREADABLE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+"""What `Message.read` raises on values that do not fit: those of another version, or changed by somebody."""
+
+
+@dataclass(frozen=True, init=False)
+class Message:
+    """One sentence without its words: which one it is, and what goes into it.
+
+    Parameters
+    ----------
+    key : str
+        Of the catalogue, such as ``log/empty`` or ``log/encoding.other-kind``; ``text`` for a sentence in English that
+        stands in no catalogue, given as ``text``.
+    **values : object
+        Numbers in SI units, texts, paths, further messages, and lists of these.
+    """
+
+    key: str
+    values: dict[str, Any]
+
+    def __init__(self, key: str, /, **values: object) -> None:
+        object.__setattr__(self, "key", key)
+        given = values if key == "text" else {name: _plain(value) for name, value in values.items()}
+        object.__setattr__(self, "values", given)
+
+    def __hash__(self) -> int:
+        return hash((self.key, str(self.values)))
+
+    def __str__(self) -> str:
+        return self.said()
+
+    @property
+    def code(self) -> str:
+        """The key without what tells the sentences of a code apart."""
+        return self.key.partition(".")[0]
+
+    def said(self, language: str = "en", free: Callable[[str], str] = str) -> str:
+        """The sentence in a language; ``free`` turns texts that stand in no catalogue."""
+        return "; ".join(self.parts(language, free))
+
+    def parts(self, language: str = "en", free: Callable[[str], str] = str) -> tuple[str, ...]:
+        """What is wrong and, where the catalogue has it, what to do."""
+        if self.key == "text":
+            return (free(str(self.values["text"])),)
+        return tuple(_Gaps(language, free).vformat(text, (), self.values) for text in catalogue(language)[self.key])
+
+    def stored(self) -> dict[str, Any]:
+        """The message as plain values for JSON."""
+        return {"key": self.key, "values": {name: _stored(value) for name, value in self.values.items()}}
+
+    @classmethod
+    def read(cls, stored: Mapping[str, Any]) -> Message:
+        """A message from `stored` values; one of `UNREADABLE` where they fit no sentence."""
+        message = cls(stored["key"], **{name: _read(value) for name, value in stored["values"].items()})
+        message.parts()
+        return message
+
+
+def free_text(text: str) -> Message:
+    """A sentence in English that stands in no catalogue, as a message."""
+    return Message("text", text=text)
+
+
+def as_message(said: Message | str) -> Message:
+    """What is said, as a message."""
+    return free_text(said) if isinstance(said, str) else said
+
+
+@cache
+def catalogue(language: str) -> dict[str, tuple[str, ...]]:
+    """All sentences of a language by key: one text, or two where the second says what to do."""
+    file = Path(__file__).with_name(f"{language}.toml")
+    rows = tomllib.loads(file.read_text(encoding="utf-8")).items()
+    return {key: (texts,) if isinstance(texts, str) else tuple(texts) for key, texts in rows}
+
+
+def sentence(text: str) -> str:
+    """A text with a capital at its start, unless it starts with a file or a symbol."""
+    first = text.split(maxsplit=1)[:1]
+    plain_word = bool(first) and first[0].rstrip(",;:").isalpha() and first[0].islower()
+    return f"{text[0].upper()}{text[1:]}" if plain_word else text
+
+
+def shortened(text: str) -> str:
+    """A text of at most `LONGEST` letters, cut in its middle."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 100]} ... {text[-95:]}"
+
+
+def printable(text: str) -> str:
+    """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
+
+
+class _Gaps(string.Formatter):
+    """Values of one language for the gaps of its sentences."""
+
+    def __init__(self, language: str, free: Callable[[str], str]) -> None:
+        self.language, self.free, self.decimal = language, free, DECIMAL[language]
+
+    def format_field(self, value: Any, spec: str) -> str:
+        """A value as the reader gets it; see the module for what ``spec`` may be."""
+        if isinstance(value, Message):
+            parts = value.parts(self.language, self.free)
+            return parts[0] if spec == "wrong" else "; ".join(parts)
+        if isinstance(value, str):
+            return catalogue(self.language)[f"word.{value}"][0] if spec == "word" else format(value, spec)
+        if spec in QUANTITIES:
+            number, std = value if isinstance(value, tuple) else (value, None)
+            return quantity(number, spec, std, decimal=self.decimal)
+        if isinstance(value, tuple) and spec[:1] == "±":
+            std, number = (FACTORS[spec[2:]] * one for one in reversed(value))
+            return f"{rounded(number, std, decimal=self.decimal)} {spec[2:]}"
+        if isinstance(value, tuple):
+            texts = [self.format_field(part, "") for part in value]
+            return (spec or ", ").join(texts) if spec != "." else " ".join(f"{sentence(t).rstrip('.')}." for t in texts)
+        return self._number(value, spec)
+
+    def _number(self, value: float, spec: str) -> str:
+        form, _, unit = spec.partition(" ")
+        number = FACTORS[unit] * value if unit else value
+        if form == "p":
+            text = p_value(number, decimal=self.decimal)
+        elif form == "curvature":
+            text = plain(number, 3, decimal=self.decimal, zeros=True)
+        elif form.startswith("plain"):
+            text = plain(number, int(form[5:] or 3), decimal=self.decimal)
+        else:
+            text = format(number, form).replace(".", self.decimal)
+        return f"{text} {unit}".rstrip()
+
+
+def _plain(value: Any) -> Any:
+    """A value of one of the kinds that a message holds."""
+    if value is None or isinstance(value, Message | bool):
+        return value
+    if isinstance(value, str | Path):
+        return printable(shortened(str(value)))
+    if isinstance(value, Iterable):
+        return tuple(map(_plain, value))
+    return value.item() if hasattr(value, "item") else value  # numpy's own numbers are none of JSON's
+
+
+def _stored(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_stored(part) for part in value]
+    return value.stored() if isinstance(value, Message) else value
+
+
+def _read(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_read(part) for part in value]
+    return Message.read(value) if isinstance(value, dict) else value

@@ -1,0 +1,80 @@
+"""What commands say: German where it was asked for, no line wider than the terminal, who is at which stage."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from pipeline.batch import run_batch
+from pipeline.cli import main, speech
+from pipeline.cli.design import echo_outlook
+from pipeline.diagnosis.plans.design import Plan, design
+from pipeline.settings import Settings
+from tests.pipeline.cheap_batch import cheap_stages, write_specimens
+
+BROKEN = Path(__file__).resolve().parents[1] / "fixtures" / "broken"
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("toml/missing-key", "in [specimen]; ergänzen: "),
+        ("log/not-a-number", "ist keine Zahl (Zahlen dieser Datei haben als Dezimalzeichen: "),
+        ("folder/no-photos", "hat kein Foto, das verwendet werden kann"),
+    ],
+)
+def test_check_speaks_german(code, told):
+    done = call("check", BROKEN / code / "specimen", "--language", "de")
+    assert told in done.output and "Fehler" in done.output and "error" not in done.output
+
+
+def test_errors_of_the_command_itself_are_german_too():
+    done = call("run", BROKEN, "-o", "out", "--set", "intake.nothing_alike=3", "--language", "de")
+    assert done.exit_code == 2
+    assert done.stderr.startswith("cablebend: die Einstellung intake.nothing_alike ist nicht bekannt; ")
+    assert "nothing_alike is not known" in call("run", BROKEN, "-o", "out", "--set", "intake.nothing_alike=3").stderr
+
+
+def test_a_name_is_proposed_only_where_one_is_near():
+    near = call("run", BROKEN, "-o", "out", "--set", "intake.log_max_byte=3").stderr
+    far = call("run", BROKEN, "-o", "out", "--set", "intake.weather=3").stderr
+    assert "the nearest one is intake.log_max_bytes" in near
+    assert "nearest" not in far and "init --settings" in far
+
+
+def test_tables_fit_a_terminal_and_are_a_line_a_record_in_a_pipe(monkeypatch, capsys):
+    found = design(Plan(), Settings().diagnosis)
+    lines = {}
+    for width in (80, None):
+        monkeypatch.setattr(speech, "columns", lambda width=width: width)
+        monkeypatch.setattr("pipeline.cli.design.columns", lambda width=width: width)
+        echo_outlook(found)
+        lines[width] = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines[80])) <= 80
+    (record,) = [line for line in lines[None] if line.startswith("hysteresis")]
+    assert "of its trace survives; like bearing_friction" in record
+
+
+def test_long_words_and_names_are_wrapped_beside_their_begin(monkeypatch):
+    monkeypatch.setattr(speech, "columns", lambda: 40)
+    lines = speech.entry("cable-07  measured  ", "the simulation explains forces and photos " * 3).splitlines()
+    assert max(map(len, lines)) <= 40 and all(line.startswith(" " * 13) for line in lines[1:])
+
+
+@pytest.mark.parametrize("batch", [{"in_process": True}, {"workers": 2}])
+def test_the_stage_of_each_specimen_is_told(batch, tmp_path):
+    write_specimens(tmp_path / "batch", ["a", "b", "c"])
+    folders, told = sorted((tmp_path / "batch").iterdir()), []
+    settings = Settings.model_validate({"batch": batch})
+    run_batch(
+        folders,
+        tmp_path / "out",
+        settings,
+        stages=cheap_stages(),
+        on_stage=lambda name, stage: told.append((name, stage)),
+    )
+    assert sorted(told) == [("a", "reports"), ("b", "reports"), ("c", "reports")]  # of a measurement of one's own
