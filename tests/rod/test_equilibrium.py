@@ -209,6 +209,7 @@ def test_controls_are_checked() -> None:
 
 def test_grids_and_rods_are_checked() -> None:
     assert graded(10, 0.5).sum() == pytest.approx(1.0, rel=1e-14)
+    assert graded(10, 0.5) == pytest.approx(graded(10, 0.5)[::-1], rel=1e-14)
     assert graded(11, 0.5)[5] / graded(11, 0.5)[0] == pytest.approx(0.5, rel=0.1)  # one element of 11 off the middle
     with pytest.raises(ValueError, match="two elements"):
         graded(1, 0.5)
