@@ -10,11 +10,12 @@ import pytest
 from rod.bending_test import TABLE_1, BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
 from rod.discretisation import graded
-from rod.elastica import pinned_linear, uniform_equilibrium
+from rod.elastica import uniform_equilibrium
 from rod.equilibrium import Outcome
 from rod.laws import StickSlip
 from rod.reduction import Hold
 from rod.support import Support
+from tests.rod.virtual_cable import pinned_linear
 
 #: Where the order of the grid is measured, elongation must stay below the errors of the finest grid.
 RIGID = {"axial_stiffness": 1e13, "shear_stiffness": 1e13}
