@@ -51,14 +51,40 @@ Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulati
 "Eq. (n) of the paper" and say where they depart from it.
 """
 
-from rod.bending_test import BendingTest, bend, simulate
-from rod.characteristic import Characteristic
-from rod.equilibrium import Equilibrium, Outcome, solve
-from rod.laws import StickSlip, as_law
-from rod.paper_fit import Virtual
-from rod.paper_fit import paper_fit as fit_characteristic
-from rod.reduction import Hold
-from rod.support import BEARING, CLAMP, FREE, Support
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rod.bending_test import BendingTest, bend, simulate
+    from rod.characteristic import Characteristic
+    from rod.equilibrium import Equilibrium, Outcome, solve
+    from rod.laws import StickSlip, as_law
+    from rod.paper_fit import Virtual
+    from rod.paper_fit import paper_fit as fit_characteristic
+    from rod.reduction import Hold
+    from rod.support import BEARING, CLAMP, FREE, Support
 
 __all__ = ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
 __all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
+
+_MODULES = {
+    "rod.bending_test": ("BendingTest", "bend", "simulate"),
+    "rod.characteristic": ("Characteristic",),
+    "rod.equilibrium": ("Equilibrium", "Outcome", "solve"),
+    "rod.laws": ("StickSlip", "as_law"),
+    "rod.paper_fit": ("Virtual", "paper_fit"),
+    "rod.reduction": ("Hold",),
+    "rod.support": ("BEARING", "CLAMP", "FREE", "Support"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name when it is first used: scipy takes half a second that one who needs a record alone can spare."""
+    at_home = {"fit_characteristic": "paper_fit"}.get(name, name)
+    module = next((module for module, names in _MODULES.items() if at_home in names), None)
+    if module is None or name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value = getattr(import_module(module), at_home)
+    return value

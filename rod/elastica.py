@@ -18,7 +18,7 @@ Signs and units: chord frame (origin left bearing, x to the right one, y toward 
 theta from x toward y (positive at the left bearing), K = -dtheta/ds positive in the direction of the bow, P positive in
 compression.
 
-Source: Eqs. (13) and (14) of the paper; for constant EI the elliptic integrals of Euler's elastica.
+Source: Eqs. (13) and (14) of the paper.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq, root
-from scipy.special import ellipe, ellipk
 
 from rod.characteristic import Array, MomentCurve
 
@@ -82,30 +81,6 @@ class UniformEquilibrium:
 def natural_chord(length: float, pre_curvature: float) -> float:
     """Chord (2/K0) sin(K0 L/2) of the force-free cable of constant pre-curvature, m."""
     return float(length * np.sinc(0.5 * pre_curvature * length / np.pi))
-
-
-def pinned_linear(EI: float, length: float, chord: float) -> float:
-    """Force of the straight pinned rod of constant stiffness after buckling, N (Euler's elastica).
-
-    chord/L = 2 E(k)/K(k) - 1 and P = EI (2 K(k)/L)^2, complete elliptic integrals of modulus k = sin(theta_end/2).
-
-    Parameters
-    ----------
-    EI : N m^2
-    length : m
-    chord : m
-        Between -length (never reached) and length.
-
-    Raises
-    ------
-    ValueError
-        If the chord is not shorter than the length or not above -length.
-    """
-    ratio = chord / length
-    if not -1.0 < ratio < 1.0:
-        raise ValueError(f"chord {chord} m must lie within (-length, length), length {length} m")
-    m = brentq(lambda k2: 2.0 * ellipe(k2) / ellipk(k2) - 1.0 - ratio, 0.0, 1.0 - 1e-16, xtol=1e-16, rtol=1e-15)
-    return float(EI * (2.0 * ellipk(m) / length) ** 2)
 
 
 def pure_bending(pre_curvature: float, *, length: float, points: int | ArrayLike = 101) -> UniformEquilibrium:

@@ -154,9 +154,11 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
             for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
                 yield judged(system, descended(system, beside), kept)
         return
+    if not patient:
+        return
     if first is not None:
-        yield judged(system, followed(system, first, side=side or 1, most=most), kept)
-    if branch == "natural" or not patient:
+        yield judged(system, followed(system, first, side=side or 1), kept)
+    if branch == "natural":
         return
     if branch != "jump":
         yield judged(system, _from_straight(system, side), side)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
 SlowErrors = tuple[tuple[float, float], ...]
@@ -98,6 +97,8 @@ class MeasuredShape:
 
     def section_offsets(self) -> Array:
         """Distance of the sections from the smooth curve along its normal, (k,) m; cubic Hermite between its points."""
+        from scipy.interpolate import CubicHermiteSpline  # takes half a second, and most who hold a record ask for none
+
         x = CubicHermiteSpline(self.s, self.x, np.cos(self.theta))(self.section_s)
         y = CubicHermiteSpline(self.s, self.y, np.sin(self.theta))(self.section_s)
         theta = np.interp(self.section_s, self.s, self.theta)

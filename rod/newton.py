@@ -19,7 +19,7 @@ from rod.characteristic import Array
 from rod.reduction import Balance, System
 
 #: Newton stops when a whole step turns no edge by more than this, rad: the error left is of the order of its square.
-STEP_TOLERANCE = 1e-7
+STEP_TOLERANCE = 1e-6
 #: Largest residual accepted, relative to EI/L (moments) and L (gaps): rounding of 3200 elements stays below it.
 RESIDUAL_TOLERANCE = 1e-9
 #: Largest turn of an edge in one Newton step, rad.

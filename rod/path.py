@@ -80,6 +80,7 @@ class Ramp:
         self.residual = system.under(float(not self.fresh)).balance(angles, R)
         self.begin = self.at(np.r_[angles, R, 0.0])
         self.along_share = np.r_[np.zeros(angles.size + 2), 1.0]
+        self.half = np.r_[np.zeros(angles.size), 0.5 * self.pull, 0.5]
 
     def at(self, state: Array) -> Point:
         """The state with its residuals."""
@@ -90,9 +91,8 @@ class Ramp:
 
     def solve(self, point: Point) -> tuple[Array, Array]:
         """Newton's step at a fixed share, and what the state changes by per share."""
-        at = point.start
+        at, forth = point.start, self.half
         # residuals are at most quadratic in the share: their derivative is a central difference of any width
-        forth = np.r_[np.zeros(at.angles.size), 0.5 * self.pull, 0.5]
         ahead, behind, here = self.at(point.state + forth).balance, self.at(point.state - forth).balance, point.balance
         turning, gap_turning = self.system.clamps_turning(here, *at, self.residual.gradient)
         rate, gap_rate = ahead.gradient - behind.gradient + turning, ahead.gap - behind.gap + gap_turning
@@ -100,7 +100,9 @@ class Ramp:
             here, -np.column_stack((here.gradient, rate)), -np.column_stack((here.gap, gap_rate))
         )
         self.steps += 1
-        return np.r_[angles[:, 0], R[:, 0], 0.0], np.r_[angles[:, 1], R[:, 1] + self.pull, 1.0]
+        moved = np.concatenate((angles.T, R.T, ((0.0,), (1.0,))), axis=1)
+        moved[1, -3:-1] += self.pull
+        return moved[0], moved[1]
 
     def product(self, a: Array, b: Array, near: Array) -> float:
         """Inner product of two directions near a state."""

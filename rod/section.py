@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -135,19 +135,6 @@ class Section:
     plastic_rate: float = 0.0
     law_stays: bool = False
 
-    def _elastic(self) -> Response:
-        """Moment of the law alone, without set; a uniform pre-curvature is passed as one number."""
-        bound = self.law.bound(self.rest())
-        if self.profile is None:
-            return bound
-        profile = self.profile
-
-        def scaled(K: Array) -> tuple[Array, Array]:
-            m, tangent = bound(K)
-            return profile * m, profile * tangent
-
-        return scaled
-
     def rest(self) -> Array:
         """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
         K0 = self.pre_curvature
@@ -174,7 +161,7 @@ class Section:
 
     def response(self, memory: Memory) -> Response:
         """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
-        elastic = self._set_response(memory) if self.plastic_rate else self._elastic()
+        elastic = self._set_response(memory) if self.plastic_rate else _elastic(self)
         if self.friction is None:
             return elastic
         stick, slip, relaxed = self.friction.stick, self.friction.slip, memory.relaxed
@@ -243,3 +230,18 @@ class Section:
         u = np.abs((K - memory.relaxed) / self.friction.stick)
         element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * self.friction.stick
         return np.asarray(energy + (self.friction.slip * element).sum(axis=0))
+
+
+@lru_cache(maxsize=16)
+def _elastic(section: Section) -> Response:
+    """Moment of the law alone, without set; remembered, since a fit asks for it at every step of a test."""
+    bound = section.law.bound(section.rest())
+    if section.profile is None:
+        return bound
+    profile = section.profile
+
+    def scaled(K: Array) -> tuple[Array, Array]:
+        m, tangent = bound(K)
+        return profile * m, profile * tangent
+
+    return scaled

@@ -13,6 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.threads import one_thread
+
+# before any test loads numpy: threads of two workers wait for each other, and a diagnosis takes three times the
+# processor time; so the command does it, and so do its workers
+one_thread()
+
 SHARED = Path(os.environ.get("CABLEBEND_SHARED", Path(__file__).resolve().parents[2] / "shared")) / "data"
 BROWSER = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
 INSTALL = "apt-get install chromium chromium-driver (Debian)"

@@ -16,7 +16,7 @@ ROD = [
     ("law_prior",),
     ("laws", "elastica", "section", "support"),
     ("discretisation",),
-    ("energy", "reduction"),
+    ("reduction",),
     ("branch",),
     ("newton",),
     ("path",),

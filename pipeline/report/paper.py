@@ -163,7 +163,7 @@ def statements(paper: Paper) -> list[Statement]:
     """What the paper says, and what came out here."""
     inverse, low = paper.inverse, 1e3 * paper.straight.characteristic.ordinates[0]
     errors = force_errors(paper)
-    off = ", ".join(f"{1e3 * error:+.0f}" for error in errors)
+    off = ", ".join(f"{1e3 * error:+.0f}" for error in errors).replace("-", "−")
     largest = 100.0 * float(np.max(np.abs(errors / [step.force for step in inverse.steps])))
     causes = ", ".join(f"{d.cause} {100 * d.share:.0f} % ({100 * d.rms:.0f} % rms alone)" for d in paper.causes[:-1])
     forces = {r: ", ".join(f"{f:.4f}" for f in paper.experiments[r, False].forces) for r in READINGS}

@@ -43,29 +43,28 @@ def draw_evolution(fit: PaperFit, figure: Area) -> Axes:
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
     finish(axes, x=ITERATION, y="relative to Table 1", decimal=".", legend=2)
     laws = plot_area(below, top=ONE_ROW)
-    for state, colour in zip(fit.history, step_colours(len(fit.history)), strict=True):
+    for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         law = Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates)
-        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4)
+        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4, label=_named(fit, number))
     _truth(laws)
-    return finish(laws, x=CURVATURE, y=STIFFNESS, decimal=".", legend=1)
+    return finish(laws, x=CURVATURE, y=STIFFNESS, decimal=".", legend=3)
 
 
 def draw_responses(fit: PaperFit, figure: Area) -> Axes:
-    """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of the last step."""
+    """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of step 3."""
     above, below = _halves(figure)
     axes = plot_area(above, top=ONE_ROW)
     count = np.arange(len(fit.history))
     forces = np.array([[step.force for step in state.steps] for state in fit.history])
     for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
-        axes.axhline(values[-1], color=colour, lw=0.8, ls=":")
         axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"step {number}")
-    finish(axes, x=ITERATION, y="force P [N]", decimal=".", legend=3)
+    axes.hlines(forces[-1], 0, count[-1], color=LIGHT["measured"], lw=1.2, ls=":", label="Table 1")
+    finish(axes, x=ITERATION, y="force P [N]", decimal=".", legend=4)
     bends = plot_area(below, top=ONE_ROW)
     s = 1e3 * fit.steps[-1].s
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
-        name = {0: "start", len(fit.history) - 1: "end, step 3"}.get(number)
-        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=name)
-    return finish(bends, x="arc length s [mm]", y=CURVATURE, decimal=".", legend=2)
+        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number))
+    return finish(bends, x="arc length s [mm]", y="κ of step 3 [1/m]", decimal=".", legend=2)
 
 
 def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, figure: Area) -> Axes:
@@ -95,6 +94,11 @@ def draw_difference(cause: Difference, figure: Area) -> Axes:
     axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)
     axes.set_ylim(0.0, 2e3 * float(max(cause.inverse.max(), cause.balance.max())))
     return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=3)
+
+
+def _named(fit: PaperFit, iteration: int) -> str | None:
+    """Name of an iteration in a legend: of the first and the last; between them colours go from dark to bright."""
+    return {0: "start", fit.iterations: "end"}.get(iteration)
 
 
 def _halves(figure: Area) -> list[Area]:

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
 
-from rod.energy import HALF_BANDWIDTH
+from tests.rod.potential_energy import HALF_BANDWIDTH
 
 
 def is_minimum(potential, q, free):

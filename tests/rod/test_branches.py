@@ -8,11 +8,11 @@ import pytest
 from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
-from rod.energy import Potential
 from rod.equilibrium import Outcome
 from rod.laws import StickSlip
 from rod.support import Support
 from tests.rod.minimum import is_minimum
+from tests.rod.potential_energy import Potential
 
 LINEAR = Characteristic.constant(5e-3)
 LAW = StickSlip(6e-3, 2.5e-3, 4.0)

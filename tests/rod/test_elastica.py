@@ -5,8 +5,9 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from rod.characteristic import Characteristic
-from rod.elastica import natural_chord, pinned_linear, pure_bending, uniform_equilibrium
+from rod.elastica import natural_chord, pure_bending, uniform_equilibrium
 from rod.laws import StickSlip
+from tests.rod.virtual_cable import pinned_linear
 
 TABLE_1 = ([0.0, 5.0, 10.0], [5e-3, 3e-3, 2e-3])
 

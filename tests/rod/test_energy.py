@@ -7,13 +7,13 @@ import pytest
 from scipy.linalg import eigh
 
 from rod.bending_test import BendingTest, simulate
-from rod.energy import HALF_BANDWIDTH, Potential
 from rod.equilibrium import Equilibrium
 from rod.laws import StickSlip
 from rod.reduction import System, negative_pivots
 from rod.section import InternalFriction
 from rod.support import Support
 from tests.rod.minimum import is_minimum
+from tests.rod.potential_energy import HALF_BANDWIDTH, Potential
 
 LAW = StickSlip(6e-3, 2.5e-3, 4.0)
 SOFT = {"axial_stiffness": 400.0, "shear_stiffness": 250.0}  # strains that matter: nothing hides behind rigidity

@@ -10,11 +10,12 @@ import pytest
 from rod.bending_test import TABLE_1, BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
 from rod.discretisation import graded
-from rod.elastica import pinned_linear, uniform_equilibrium
+from rod.elastica import uniform_equilibrium
 from rod.equilibrium import Outcome
 from rod.laws import StickSlip
 from rod.reduction import Hold
 from rod.support import Support
+from tests.rod.virtual_cable import pinned_linear
 
 #: Where the order of the grid is measured, elongation must stay below the errors of the finest grid.
 RIGID = {"axial_stiffness": 1e13, "shear_stiffness": 1e13}
@@ -209,6 +210,7 @@ def test_controls_are_checked() -> None:
 
 def test_grids_and_rods_are_checked() -> None:
     assert graded(10, 0.5).sum() == pytest.approx(1.0, rel=1e-14)
+    assert graded(10, 0.5) == pytest.approx(graded(10, 0.5)[::-1], rel=1e-14)
     assert graded(11, 0.5)[5] / graded(11, 0.5)[0] == pytest.approx(0.5, rel=0.1)  # one element of 11 off the middle
     with pytest.raises(ValueError, match="two elements"):
         graded(1, 0.5)

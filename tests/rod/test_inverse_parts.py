@@ -121,3 +121,19 @@ def test_zero_of_displacement_is_that_of_the_photos():
     value, std = zero_of_displacement(step_data(test))
     assert value == pytest.approx(force_free(LAW, LENGTH).chord, abs=4 * std)
     assert zero_of_displacement(()) is None
+
+
+def test_offsets_of_sections_are_those_along_the_normal():
+    """Sections beside an arc, between its points, on a line that turns by a right angle."""
+    K, first, s, at = 8.0, 1.2, np.linspace(0.0, 0.2, 41), np.linspace(0.003, 0.196, 60)
+    off = 1e-4 * np.sin(90.0 * at)
+
+    def arc(s):
+        theta = first - K * s
+        return (np.sin(first) - np.sin(theta)) / K, (np.cos(theta) - np.cos(first)) / K, theta
+
+    shape = bending_test(LAW, LENGTH, CHORDS[:1], np.random.default_rng(1))[0].steps[-1].shape
+    (x, y, theta), (u, v, turned) = arc(s), arc(at)
+    beside = {"section_s": at, "section_x": u - off * np.sin(turned), "section_y": v + off * np.cos(turned)}
+    bent = replace(shape, s=s, x=x, y=y, theta=theta, **beside)
+    assert bent.section_offsets() == pytest.approx(off, abs=1e-8)

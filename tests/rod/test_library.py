@@ -7,8 +7,8 @@ import pytest
 
 import rod
 from rod import CLAMP, FREE, BendingTest, Characteristic, StickSlip, as_law, bend
-from rod.energy import Potential
 from rod.newton import Outcome
+from tests.rod.potential_energy import Potential
 
 LAW = StickSlip(5e-3, 2e-3, 4.0)
 SOFT = {"axial_stiffness": 400.0, "shear_stiffness": 250.0}  # strains that matter: no rounding of stiff ones

@@ -16,12 +16,12 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
-from rod.energy import Potential
 from rod.equilibrium import Equilibrium, Outcome, Start, solve
 from rod.newton import newton
 from rod.reduction import Hold, System
 from rod.support import Support
 from tests.rod.minimum import is_minimum
+from tests.rod.potential_energy import Potential
 
 EI, LENGTH = 5e-3, 0.2
 UNIT = EI / LENGTH**2

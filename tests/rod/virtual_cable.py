@@ -14,6 +14,7 @@ import numpy as np
 from scipy.integrate import solve_bvp
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq, root
+from scipy.special import ellipe, ellipk
 
 
 @dataclass(frozen=True)
@@ -189,3 +190,27 @@ def bent_by_bvp(law, length, chord, *, bow):
     x, y, theta = found.sol(s)
     K = law.K0 + bow(s) + np.interp(P * y, moments, D)
     return TrueShape(P, float(x[-1]), s, x, y, theta, K)
+
+
+def pinned_linear(EI: float, length: float, chord: float) -> float:
+    """Force of the straight pinned rod of constant stiffness after buckling, N (Euler's elastica).
+
+    chord/L = 2 E(k)/K(k) - 1 and P = EI (2 K(k)/L)^2, complete elliptic integrals of modulus k = sin(theta_end/2).
+
+    Parameters
+    ----------
+    EI : N m^2
+    length : m
+    chord : m
+        Between -length (never reached) and length.
+
+    Raises
+    ------
+    ValueError
+        If the chord is not shorter than the length or not above -length.
+    """
+    ratio = chord / length
+    if not -1.0 < ratio < 1.0:
+        raise ValueError(f"chord {chord} m must lie within (-length, length), length {length} m")
+    m = brentq(lambda k2: 2.0 * ellipe(k2) / ellipk(k2) - 1.0 - ratio, 0.0, 1.0 - 1e-16, xtol=1e-16, rtol=1e-15)
+    return float(EI * (2.0 * ellipk(m) / length) ** 2)

@@ -88,13 +88,14 @@ def cylinder(
     lu, lv, lz = light.direction
     across = np.clip(across, -1.0, 1.0)
     up = np.sqrt(1.0 - across**2)
-    toward = normal_u * lu + normal_v * lv
-    lambert = np.maximum(across * toward + up * lz, 0.0)
+    slanted = across * (normal_u * lu + normal_v * lv)
+    lambert = np.maximum(slanted + up * lz, 0.0)
     # Ambient light reaches the flank from half the sky only; a white sheet gets ambient + (1 - ambient) * lz.
-    diffuse = light.ambient * (0.5 + 0.5 * up) + (1.0 - light.ambient) * lambert
+    diffuse = light.strength * (light.ambient * (0.5 + 0.5 * up) + (1.0 - light.ambient) * lambert)
+    if gloss == 0.0:  # a power takes as long as all else together
+        return diffuse, np.zeros_like(diffuse)
     half = sqrt(2.0 + 2.0 * lz)
-    glossy = gloss * np.maximum((across * toward + up * (1.0 + lz)) / half, 0.0) ** shininess
-    return light.strength * diffuse, light.strength * glossy
+    return diffuse, light.strength * (gloss * np.maximum((slanted + up * (1.0 + lz)) / half, 0.0) ** shininess)
 
 
 def sheet(light: Light, width: int, height: int) -> Image:

@@ -73,15 +73,17 @@ def expose(sensor: Sensor, brightness: Image, rng: np.random.Generator) -> Pixel
         picture = np.asarray(cv2.filter2D(picture, -1, _streak(sensor.motion_px, sensor.motion_rad)), np.float32)
     picture = np.maximum(picture.reshape(brightness.shape), np.float32(0.0))
     if sensor.noise or sensor.shot_noise:
-        spread = np.sqrt(np.float32(sensor.noise**2) + np.float32(sensor.shot_noise**2) * picture)
-        picture = picture + spread * rng.standard_normal(picture.shape, dtype=np.float32)
+        shot = np.float32(sensor.shot_noise**2) * picture if sensor.shot_noise else np.float32(0.0)
+        noise = rng.standard_normal(picture.shape, dtype=np.float32)
+        picture += np.sqrt(np.float32(sensor.noise**2) + shot) * noise
     if sensor.gamma != 1.0:
         picture = np.maximum(picture, 0.0) ** np.float32(1.0 / sensor.gamma)
     if sensor.sharpen:
         soft = cv2.GaussianBlur(picture, (0, 0), 1.5).reshape(picture.shape)
         picture = picture + np.float32(sensor.sharpen) * (picture - soft)
     top = 2**sensor.bit_depth - 1
-    counts = np.clip(np.rint(picture * top), 0, top)
+    counts = picture * top
+    np.clip(np.rint(counts, out=counts), 0, top, out=counts)
     pixels: Pixels = counts.astype(np.uint8) if sensor.bit_depth == 8 else counts.astype(np.uint16)
     if sensor.mode == "grey":
         return pixels[:, :, 0]

@@ -184,6 +184,7 @@ def _covered(
     inside = partial(soft_edge, blur_px=blur_px) if blur_px else half_plane
     # the farther border shows beside the nearer one only where a cable is hardly wider than what blurs it
     thin = radius * camera.px_per_m < CLEAR * max(blur_px, 1.0)
+    marked = ends.size or not strand.sheath.plain  # else it does not matter where along the cable a pixel lies
     alpha, colour, tip = np.zeros(i.size), np.zeros((i.size, channels)), t_grad[:, ends]
     steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
     for du in steps:
@@ -191,7 +192,7 @@ def _covered(
             tk, nk = t + t_grad[0] * du + t_grad[1] * dv, n + n_grad[0] * du + n_grad[1] * dv
             bend = 2 * nk - kappa * (tk**2 + nk**2)
             offset = bend / (1.0 + np.sqrt(np.maximum(1.0 - kappa * bend, 0.0))) - inward
-            along = s + tk / (1.0 - kappa * nk)
+            along = s + tk / (1.0 - kappa * nk) if marked else s
             cover = inside(radius - np.abs(offset), n_grad, SAMPLES)
             if thin:
                 cover += inside(radius + np.abs(offset), n_grad, SAMPLES) - 1.0
@@ -235,7 +236,11 @@ def half_plane(distance: Array, gradient: Array, cells: int = 1) -> Array:
 def soft_edge(distance: Array, gradient: Array, cells: int = 1, *, blur_px: float) -> Array:
     """Like `half_plane`, through a Gaussian lens; the cell's own box enters with its variance (1/12 of its width^2)."""
     slope = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2)
-    return np.asarray(ndtr(distance / (slope * sqrt(blur_px**2 + 1.0 / (12.0 * cells**2)))))
+    z = distance / (slope * sqrt(blur_px**2 + 1.0 / (12.0 * cells**2)))
+    cover = (z > 0.0).astype(float)
+    near = np.flatnonzero(np.abs(z) < CLEAR)  # the integral is dear, and farther off it is 0 or 1 within rounding
+    cover[near] = ndtr(z[near])
+    return np.asarray(cover)
 
 
 def disc_cover(
