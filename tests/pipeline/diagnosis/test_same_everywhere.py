@@ -26,25 +26,25 @@ def answer(test, names):
     return (names, found.alien), found.posterior.total(count=0, something_else=False)
 
 
-ON_LOADING = "bearing_friction displacement_offset hysteresis nonlinear_stiffness"
 IN_THE_PICTURE = "camera_tilt scale_error lens_distortion in_plane_load"
 LOADS = "in_plane_load force_offset displacement_offset"
 DISPLACED = "rig_compliance displacement_offset length_error"
 TURNING_BACK = "bearing_friction hysteresis plastic_set"
 
 BORDERLINE = [
-    ("three", "bearing_friction", 0.009745, ON_LOADING, "bearing_friction displacement_offset hysteresis"),
-    ("three", "bearing_friction", 0.009758, ON_LOADING, "bearing_friction displacement_offset"),
-    ("six", "camera_tilt", 0.001755, IN_THE_PICTURE, ""),
-    ("six", "camera_tilt", 0.00176, IN_THE_PICTURE, "in_plane_load camera_tilt"),
-    ("six", "in_plane_load", 0.03271, LOADS, ""),
-    ("six", "in_plane_load", 0.03282, LOADS, "in_plane_load"),
-    ("six", "rig_compliance", 5.624e-6, DISPLACED, "rig_compliance displacement_offset"),
-    ("six", "rig_compliance", 5.644e-6, DISPLACED, "rig_compliance"),
-    ("six", "displacement_offset", 3.806e-6, DISPLACED, ""),
-    ("six", "displacement_offset", 3.817e-6, DISPLACED, "displacement_offset"),
-    ("loop", "bearing_friction", 0.0001087, TURNING_BACK, "bearing_friction hysteresis"),
-    ("loop", "bearing_friction", 0.000109, TURNING_BACK, "bearing_friction"),
+    ("six", "camera_tilt", 0.001821, IN_THE_PICTURE, ""),
+    ("six", "camera_tilt", 0.001827, IN_THE_PICTURE, "camera_tilt in_plane_load lens_distortion scale_error"),
+    ("six", "camera_tilt", 0.002243, IN_THE_PICTURE, "camera_tilt in_plane_load scale_error"),
+    ("six", "in_plane_load", 0.03590, LOADS, ""),
+    ("six", "in_plane_load", 0.03600, LOADS, "in_plane_load force_offset"),
+    ("six", "rig_compliance", 4.728e-6, DISPLACED, "rig_compliance displacement_offset"),
+    ("six", "rig_compliance", 4.742e-6, DISPLACED, "rig_compliance"),
+    ("six", "displacement_offset", 4.246e-6, DISPLACED, ""),
+    ("six", "displacement_offset", 4.260e-6, DISPLACED, "displacement_offset length_error"),
+    ("loop", "bearing_friction", 7.58e-5, TURNING_BACK, ""),
+    ("loop", "bearing_friction", 7.62e-5, TURNING_BACK, "bearing_friction plastic_set hysteresis"),
+    ("loop", "force_offset", 0.01109, LOADS, ""),
+    ("loop", "force_offset", 0.01116, LOADS, "force_offset in_plane_load displacement_offset"),
 ]
 """Protocol, what is hidden, how much, the causes asked for, and those in the class; none is none."""
 
@@ -54,7 +54,7 @@ def test_words_beside_a_change_of_words_stay_when_inputs_move_by_a_billionth(pro
     cable, reading = HIDE[name](amount, Form())
     test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=31, reading=reading)
     words, probability = answer(test, asked.split())
-    assert words == (named, named.split(" ")[0], False)
+    assert words == (named, False)
     moved, likewise = answer(nudged(test), asked.split())
     assert moved == words
     # a twentieth of what a probability is good for, 0.03
