@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.intake.access import inside, is_folder, outside
+from pipeline.intake.photohints import read_hints
 from pipeline.intake.tomltable import (
     Check,
     TomlFile,
@@ -26,7 +27,7 @@ from pipeline.intake.tomltable import (
     text,
     whole,
 )
-from pipeline.records import Board, CameraSpec, RigSpec
+from pipeline.records import Board, CameraSpec, PhotoHints, RigSpec
 from pipeline.settings.intake import IntakeSettings
 
 NAME = "specimen.toml"
@@ -64,6 +65,7 @@ class SpecimenFile:
     log: LogSpec
     description: dict[str, str]
     source: TomlFile
+    hints: dict[str, PhotoHints] = field(default_factory=dict)
 
 
 def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
@@ -79,7 +81,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
         raise outside(folder / NAME, NAME)
     source = read_toml(path, limit=settings.toml_max_bytes)
     tables = _checks(settings)
-    check_names(source, source.tables, tuple(tables))
+    check_names(source, source.tables, (*tables, "photos"))
     values = {table: checked_table(source, table, checks) for table, checks in tables.items()}
     cable = values["specimen"]
     lengths = {"length_mm": "the cable length between the bearing axes", "diameter_mm": "the diameter of the cable"}
@@ -93,6 +95,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
         log=_log(values["force_log"], values["rig"]),
         description={key: cable[key] for key in DESCRIPTION if key in cable},
         source=source,
+        hints=read_hints(source),
     )
 
 

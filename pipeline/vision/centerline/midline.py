@@ -45,6 +45,7 @@ from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_pro
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
 from pipeline.vision.median import median, medians
 
+_WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _MEDIAN = 15  # sections of a running median: two to three diameters
 
 
@@ -162,7 +163,7 @@ def measure_sections(
         std=np.hypot(*(trust * std.T)),
         width=width,
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
-        systematic_std=_systematic(profiles, s, smooth_width, std, doubt, diameter, settings),
+        systematic_std=_systematic(profiles, s, smooth_width, doubt, diameter, settings),
         share=float(np.mean(keep)),
         profiles=profiles,
         contrast=median(step),
@@ -194,9 +195,21 @@ def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
     A pale sleeve before a pale ground leaves the edges of shadows and shades, 0.3 diameters off.
     """
     middle = median(width)
-    smooth, own = (np.abs(w - middle) > settings.width_departure * middle for w in (_running_median(width), width))
+    off = np.abs(width - middle)
+    # An outline may wave; and edges of webcams and JPEG are found to a third of a pixel, whatever the width.
+    limit = max(settings.width_departure * middle, 4.0 * 1.4826 * median(off), _WIDTH_FLOOR)
+    smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
+
+
+def slow_part(s: Array, values: Array, order: int) -> Array:
+    """What of ``values`` (n,) follows a polynomial of ``s``, outliers clipped, without its mean."""
+    off = values - median(values)
+    spread = 1.4826 * median(np.abs(off))
+    slow = np.polynomial.legendre.legvander(2.0 * (s - s.min()) / max(float(np.ptp(s)), 1e-300) - 1.0, order)
+    fitted = slow @ np.linalg.lstsq(slow, np.clip(off, -4.0 * spread, 4.0 * spread), rcond=None)[0]
+    return np.asarray(fitted - fitted.mean())
 
 
 def _running_median(values: Array) -> Array:
@@ -236,7 +249,6 @@ def _systematic(
     profiles: Profiles,
     s: Array,
     width: Array,
-    std: Array,
     doubt: Array,
     diameter: float | None,
     settings: CurveSettings,
@@ -253,8 +265,7 @@ def _systematic(
     share = settings.ramps_doubt if profiles.inside.any() or profiles.outside.any() else 1.0
     common = float(np.average(shift.sum(axis=0), weights=1.0 / doubt.sum(axis=0)))
     by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
-    noise2 = median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
-    by_width = 0.5 * np.sqrt(max(np.var(balance * (width - median(width))) - noise2, 0.0))
+    by_width = 0.5 * float(np.std(balance * slow_part(s, width, settings.slow_width_order)))
     by_blur = 0.5 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's; ``doubt`` is half the change.
     by_likely = 0.5 * min(2.0 * share, 1.0) * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))
