@@ -110,7 +110,7 @@ INSIDE = {
     "pipeline.vision.search": [
         ("flanks", "strips", "backdrop"),
         ("crosscut",),
-        ("bands", "closeup", "colour_distance"),
+        ("bands", "closeup"),
         ("candidates",),
         ("ends",),
         ("beyond",),

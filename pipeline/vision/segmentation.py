@@ -30,7 +30,6 @@ from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
-from pipeline.vision.search.colour_distance import as_colour_distance
 
 Window = tuple[int, int, int, int]
 
@@ -66,32 +65,6 @@ def find_cable(
     cable = Cable() if cable is None else cable
     if hints is not None:
         photo, cable = with_hints(photo, cable, hints)
-    found = _find_slender(photo, settings, cable, near)
-    if isinstance(found, RoughCable) and _is_settled(found):
-        return found
-    stage = settings.segmentation
-    coded = as_colour_distance(photo, stand_out(photo, choose_reduction(photo.size, None, stage), stage))
-    if coded is None:
-        return found
-    again = _find_slender(coded, settings, cable, near)
-    if isinstance(again, Rejected) or not again.evidence.enough:
-        return found
-    if isinstance(found, Rejected):
-        return again
-    # a half of it is sharper than a cable of two colours
-    both = again.half_width_px > _WIDER * found.half_width_px and _lies_on(again, [found.path_px])
-    return again if again.evidence.value > (0.7 if both else 1.0) * found.evidence.value else found
-
-
-def _is_settled(found: RoughCable) -> bool:
-    """True of a strip that leaves nothing to be looked for: all speaks for it, and it is no piece of a longer one."""
-    return found.evidence.clear and not found.goes_on
-
-
-def _find_slender(
-    photo: Photo, settings: VisionSettings, cable: Cable, near: RoughCable | None
-) -> RoughCable | Rejected:
-    """Find a cable about as many times as long as wide as it is stated to be."""
     found = _find_near(photo, settings, cable, near)
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness, settings):
         return found
@@ -102,6 +75,11 @@ def _find_slender(
         if _is_slender(again, cable.slenderness, settings):
             return again
     return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
+
+
+def _is_settled(found: RoughCable) -> bool:
+    """True of a strip that leaves nothing to be looked for: all speaks for it, and it is no piece of a longer one."""
+    return found.evidence.clear and not found.goes_on
 
 
 def _find_near(photo: Photo, settings: VisionSettings, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:

@@ -22,7 +22,7 @@ from pipeline.vision.scale.chord import ChordFrame
 
 _WIDTH_OFF = 0.15  # relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
-_UNEVEN_PX, _UNEVEN = 0.6, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
+_UNEVEN_PX, _UNEVEN = 0.8, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
 
 
