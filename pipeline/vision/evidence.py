@@ -23,6 +23,7 @@ from pipeline.vision.median import median
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
 _NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the window along a cable reaches to 2.25
 _SURE = 3.0  # standard deviations; a block's edge that noise passes for once in 700
+_FIRM = 4.0  # the same; of the median block of a strip that leaves no doubt
 _LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper on a third of a cable 0.4 is left
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
 _CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
@@ -67,7 +68,7 @@ class Evidence:
     @property
     def clear(self) -> bool:
         """Nothing to be weighed: no other reading of the photo need be looked at."""
-        return self.seen >= 0.9 and self.edges >= 4.0 and self.unsteady <= 1.0 and self.crossed is None
+        return self.seen >= 0.9 and self.edges >= _FIRM and self.unsteady <= 1.0 and self.crossed is None
 
     @property
     def enough(self) -> bool:
@@ -196,7 +197,7 @@ def _crossed(
 def unlike_a_cable(evidence: Evidence) -> tuple[str, str]:
     """Code and reason of a refusal: the figure that is farthest from that of a cable."""
     edges, steady = evidence.edges / 6.0, 1.0 / max(evidence.unsteady, 1.0)
-    if edges <= min(evidence.seen, steady):
+    if evidence.edges < _FIRM or edges <= min(evidence.seen, steady):
         return (
             "photo/contrast",
             f"the cable's weaker edge stands out of the ground by {evidence.edges:.1f} times the noise and texture"
