@@ -41,6 +41,8 @@ from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, 
 NO_EDGES = "no two edges of a cable are seen along what stands out of the ground"
 _MAD_TO_STD = 1.4826
 _FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
+_MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
+_LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
 
 
@@ -179,14 +181,28 @@ def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSe
     """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
     closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights, settings.segmentation)
-    if closeup.blur_px <= _BLURRED * width:
+    moved = _moved(photo, closeup, width)
+    if moved is not None or closeup.blur_px <= _BLURRED * width:
+        return moved
+    return refused(
+        photo,
+        "photo/blur",
+        f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
+        blur_px=closeup.blur_px,
+        width_px=width,
+    )
+
+
+def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
+    """Refuse a photo taken in motion: covers are doubled, and shading is smeared over the edges."""
+    if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION):
         return None
     return refused(
         photo,
         "photo/blur",
-        f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera, let the rig"
-        " come to rest, and use a shorter exposure",
-        blur_px=closeup.blur_px,
+        f"camera or cable moved by {closeup.motion_px:.0f} px during the exposure, the cable is {width:.0f} px "
+        "wide; let the rig come to rest, and use a shorter exposure",
+        motion_px=closeup.motion_px,
         width_px=width,
     )
 
@@ -303,6 +319,9 @@ def _assemble(
     path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
         return refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")
+    moved = _moved(photo, closeup, width)
+    if moved is not None:
+        return moved
     ratio = cut.contrast / float(np.hypot(cut.texture, closeup.noise))
     scatter = _scatter(cut.seen_widths) / cut.usual_width
     return RoughCable(

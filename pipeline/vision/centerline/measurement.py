@@ -287,7 +287,7 @@ def centerline_of(
         u_px=uv[:, 0],
         v_px=uv[:, 1],
         kappa_std=kappa_std,
-        position_std=std_along(shape.basis_normal, covariance),
+        position_std=std_along(shape.basis_normal, shape.covariance),
         chord_m=chord.chord,
         chord_std_m=float(np.sqrt(2.0)) * chord.axis_std,
         traced_length_m=float(s[-1] - s[0]),

@@ -163,7 +163,7 @@ def measure_sections(
         std=np.hypot(*(trust * std.T)),
         width=width,
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
-        systematic_std=_systematic(profiles, s, smooth_width, doubt, diameter, settings),
+        systematic_std=_systematic(profiles, s, smooth_width, std, doubt, diameter, settings),
         share=float(np.mean(keep)),
         profiles=profiles,
         contrast=median(step),
@@ -249,6 +249,7 @@ def _systematic(
     profiles: Profiles,
     s: Array,
     width: Array,
+    std: Array,
     doubt: Array,
     diameter: float | None,
     settings: CurveSettings,
@@ -265,7 +266,8 @@ def _systematic(
     share = settings.ramps_doubt if profiles.inside.any() or profiles.outside.any() else 1.0
     common = float(np.average(shift.sum(axis=0), weights=1.0 / doubt.sum(axis=0)))
     by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
-    by_width = 0.5 * float(np.std(balance * slow_part(s, width, settings.slow_width_order)))
+    noise2 = median(std**2) * 2.0 / 15.0 * 1.57  # what a running median over 15 sections leaves of the scatter
+    by_width = 0.5 * np.sqrt(max(np.var(balance * (width - median(width))) - noise2, 0.0))
     by_blur = 0.5 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's; ``doubt`` is half the change.
     by_likely = 0.5 * min(2.0 * share, 1.0) * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))

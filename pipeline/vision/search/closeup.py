@@ -38,12 +38,15 @@ class Closeup:
         Standard deviation of one pixel, without texture coarser than two pixels.
     blur_px : px
         Standard deviation of the edge spread.
+    motion_px : px
+        Length over which camera or cable moved during the exposure; 0 where the edges are equally sharp everywhere.
     """
 
     grey: NDArray[np.float32]
     origin_px: tuple[int, int]
     noise: float
     blur_px: float
+    motion_px: float
 
 
 def take_closeup(
@@ -63,13 +66,14 @@ def take_closeup(
         else:
             cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
     local = path_px - low
-    spreads = _edge_spreads(grey, local, width_px)
+    spreads, angles = _edge_spreads(grey, local, width_px)
     seen = spreads[np.isfinite(spreads)]
     return Closeup(
         grey=grey,
         origin_px=(int(low[0]), int(low[1])),
         noise=_pixel_noise(grey, local, width_px),
         blur_px=median(seen) if len(seen) else 0.0,
+        motion_px=_motion(spreads, angles),
     )
 
 
@@ -104,12 +108,12 @@ def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
     return _MAD_TO_STD * median(np.abs(differences)) / np.sqrt(6.0) if len(differences) else 0.0
 
 
-def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> Array:
-    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, NaN without an edge.
+def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:
+    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, NaN without an edge, and angle ``(k,)``.
 
     A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle.
     """
-    normal = path_normals(path)[1]
+    tangent, normal = path_normals(path)
     sections = np.linspace(0.1, 0.9, 8 * _GROUPS) * (len(path) - 1)
     centre = np.column_stack([np.interp(sections, np.arange(len(path)), column) for column in path.T])
     across = normal[np.rint(sections).astype(int)]
@@ -120,7 +124,28 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> Array
         u, v = ((centre[:, k, None] + across[:, k, None] * away).astype(np.float32) for k in (0, 1))
         profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets, outward=side > 0.0))
-    return np.array(spreads)
+    along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
+    return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
+
+
+def _motion(spreads: Array, angles: Array) -> float:
+    """Length of a motion blur by the edge spreads ``(2, k)`` and the angles ``(k,)`` of the cable.
+
+    A motion over L in the direction mu adds ``L^2/12 sin^2(angle - mu)`` to the squared spread: nothing where the cable
+    runs along it. The sharper of both edges counts: a shadow softens one of them, a motion both. Where the squared
+    spread changes by less than half along the cable, the cause is another one, or does the same as defocus.
+    """
+    sharper = np.min(spreads, axis=0)
+    known = np.isfinite(sharper)
+    if np.count_nonzero(known) < _GROUPS // 2:
+        return 0.0
+    squared, twice = sharper[known] ** 2, 2.0 * angles[known]
+    terms = np.column_stack([np.ones(len(twice)), np.cos(twice), np.sin(twice)])
+    # Turns of a few degrees leave the last two terms open: no more than the data ask for.
+    ridge = 1e-3 * len(terms) * np.diag([0.0, 1.0, 1.0])
+    fitted = np.linalg.solve(terms.T @ terms + ridge, terms.T @ squared)
+    smooth = terms @ fitted
+    return float(np.sqrt(24.0 * np.hypot(fitted[1], fitted[2]))) if smooth.min() < 0.5 * smooth.max() else 0.0
 
 
 def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: bool) -> Array:

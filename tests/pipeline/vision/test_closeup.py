@@ -1,4 +1,4 @@
-"""Blur by the edges of a drawn cable, and the refusal of photos whose covers are lost in it."""
+"""Blur and motion by the edges of a drawn cable, and the refusal of photos taken in motion or out of focus."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ from pipeline.vision.segmentation import find_cable
 WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis
 
 
-def arc(*, blur: float = 0.8, letters: bool = False) -> Closeup:
-    """Close-up of a dark arc of 80 degrees.
+def arc(
+    *, motion: float = 0.0, direction: float = 0.0, blur: float = 0.8, shadow: float = 0.0, letters: bool = False
+) -> Closeup:
+    """Close-up of a dark arc of 80 degrees, moved by so many px; ``shadow`` px of blur at its outer edge alone.
 
     With ``letters`` the sheath is bright, and bright strokes across it are a third of both ends of the arc.
     """
@@ -32,6 +34,15 @@ def arc(*, blur: float = 0.8, letters: bool = False) -> Closeup:
         along = BEND * np.arctan2(u - 550.0, 760.0 - v)
         inked = (np.abs(away) < 0.35 * WIDTH) & (np.abs(along) > 150.0) & (along % 23.0 < 9.0)
         grey = np.where(inked, 0.9, 0.5 - 0.5 * grey)
+    if shadow:
+        soft = cv2.GaussianBlur(grey, (0, 0), shadow)
+        grey = np.where(away > 0.0, soft, grey)
+    # A motion is the mean of pictures one after the other; four a pixel leave no steps.
+    count = max(1, round(4.0 * motion))
+    way = (np.arange(count) + 0.5) / count * motion - 0.5 * motion
+    moves = [np.array([[1.0, 0.0, w * np.cos(direction)], [0.0, 1.0, w * np.sin(direction)]]) for w in way]
+    size = grey.shape[::-1]
+    grey = np.mean([cv2.warpAffine(grey, m, size, borderMode=cv2.BORDER_REPLICATE) for m in moves], axis=0)
     grey = cv2.GaussianBlur(grey, (0, 0), blur)
     noise = 0.01 * np.random.default_rng(0).standard_normal(grey.shape)
     turn = np.linspace(-0.7, 0.7, 300)
@@ -40,24 +51,36 @@ def arc(*, blur: float = 0.8, letters: bool = False) -> Closeup:
     return take_closeup(Photo("a.png", pixels, 8), path, WIDTH, np.ones(1), VisionSettings().segmentation)
 
 
+@pytest.mark.parametrize("direction", [0.0, 0.6, 2.4])
+def test_motion_is_measured_by_what_it_does_to_the_edges(direction):
+    """A box of length L has the variance L^2 / 12; its steepest slope tells L to a fifth, enough for a refusal."""
+    assert_allclose(arc(motion=15.0, direction=direction).motion_px, 15.0, rtol=0.2)
+
+
 @pytest.mark.parametrize("blur", [0.8, 2.0, 4.0])
-def test_blur_is_measured_at_the_edges(blur):
+def test_defocus_is_not_motion(blur):
     closeup = arc(blur=blur)
+    assert closeup.motion_px == 0.0
     # The pixel's box adds a variance of 1/12 px^2, the linear interpolation between pixels 1/6; from a seventh of the
     # width on, sheath and ground are not reached within the 0.4 widths looked at, and the spread reads a tenth low.
     assert_allclose(closeup.blur_px, np.sqrt(blur**2 + 1.0 / 12.0 + 1.0 / 6.0), rtol=0.1)
 
 
-def test_letters_on_the_sheath_are_no_blur():
-    """Ink brighter than the sheath misplaces the crossings of its sections; these are left out."""
-    assert_allclose(arc(letters=True).blur_px, arc().blur_px, rtol=0.2)
+def test_soft_shadow_at_one_edge_is_not_motion():
+    assert arc(shadow=5.0).motion_px == 0.0
 
 
-def test_covers_lost_in_blur_are_no_reason_of_their_own():
+def test_letters_on_the_sheath_are_not_motion():
+    """Ink brighter than the sheath misplaced the crossings of its sections: a sharp cable was "moved" by 8 px."""
+    assert arc(letters=True).motion_px == 0.0
+
+
+@pytest.mark.parametrize("sensor", [Sensor(motion_px=15.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
+def test_covers_lost_in_blur_are_no_reason_of_their_own(sensor):
     length, scale = 0.181, 8_000.0
     curve = Curve.from_curvature(lambda s: 3.0 + 5.0 * np.sin(np.pi * s / length), length)
     camera = Camera(1640, 640, scale, look_at_m=(0.5 * curve.chord, 0.5 * curve.y.max()))
-    pixels = render(Scene(Strand(curve, 0.0046), camera, sensor=Sensor(blur_px=8.0))).pixels
+    pixels = render(Scene(Strand(curve, 0.0046), camera, sensor=sensor)).pixels
     known = Cable(0.0046 * scale, length * scale, BearingHints(cover_px=0.012 * scale))
     found = find_cable(Photo("a.png", pixels, 8), VisionSettings(), cable=known)
     assert isinstance(found, Rejected)
