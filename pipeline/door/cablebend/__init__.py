@@ -82,7 +82,7 @@ ROOMS = {
     "pipeline.result": ("Answer", "Result", "read_result"),
     "pipeline.run": ("measure", "write"),
     "pipeline.settings": ("Settings",),
-    "pipeline.vision.series": ("trace_photo",),
+    "pipeline.vision.single": ("trace_photo",),
     "rod.balance": ("balance",),
     "rod.bending_test": ("BendingTest", "simulate"),
     "rod.characteristic": ("Characteristic",),
