@@ -216,8 +216,11 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
     best = _widest_alike(likely)
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
-        longer = float(np.hypot(*np.diff(path, axis=0).T).sum()) > best.length_px
-        if longer and refusal.code in ("photo/crossing", "photo/hidden-end"):
+        length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+        # blur is judged last: a strip refused for it looks like a cable in all else
+        if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
+            return _two_candidates(photo, best.length_px, length)
+        if length > best.length_px and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
             return refusal
@@ -238,10 +241,11 @@ def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
     met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
     if met:
         return crossing(photo, met[0])
-    text = (
-        f"2 strips could be the cable ({best.length_px:.0f} px and {other.length_px:.0f} px long); "
-        "leave one cable in the picture"
-    )
+    return _two_candidates(photo, best.length_px, other.length_px)
+
+
+def _two_candidates(photo: Photo, one: float, other: float) -> Rejected:
+    text = f"2 strips could be the cable ({one:.0f} px and {other:.0f} px long); leave one cable in the picture"
     return refused(photo, "photo/two-candidates", text, candidates=2.0)
 
 
