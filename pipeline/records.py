@@ -89,6 +89,31 @@ class RigSpec:
 
 
 @dataclass(frozen=True)
+class PhotoHints:
+    """What a person says about one photo; all in px of the photo as displayed.
+
+    Attributes
+    ----------
+    use : bool
+        False leaves the photo out; its step keeps its force.
+    ends_px : pair of (u, v) or None
+        Where the cable's axis meets the two bearing axes, or ends.
+    path_px : tuple of (u, v)
+        Rough clicks along the cable, from one end to the other.
+    region_px : (u0, v0, u1, v1) or None
+        Only there is the cable looked for.
+    exclude_px : tuple of polygons
+        Things that hide or touch the cable.
+    """
+
+    use: bool = True
+    ends_px: tuple[tuple[float, float], tuple[float, float]] | None = None
+    path_px: tuple[tuple[float, float], ...] = ()
+    region_px: tuple[float, float, float, float] | None = None
+    exclude_px: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+
+@dataclass(frozen=True)
 class LoadStep:
     """One displacement step of the force log: a hold with its force samples and the photo taken in it.
 
@@ -115,7 +140,8 @@ class Specimen:
     """A specimen folder, read and checked; nothing measured yet.
 
     ``images`` maps the name relative to the folder (as in the log) to the path of an existing file; a photo named in
-    the log whose file is missing stays out of it and is a finding. ``hashes`` are SHA-256 by relative name.
+    the log whose file is missing stays out of it and is a finding. ``hashes`` are SHA-256 by relative name. ``hints``
+    are what a person says about single photos, by the same names.
     """
 
     id: str
@@ -129,6 +155,7 @@ class Specimen:
     description: dict[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
+    hints: dict[str, PhotoHints] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

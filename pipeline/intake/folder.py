@@ -16,6 +16,7 @@ from typing import Literal
 from pipeline.errors import InputError
 from pipeline.intake.access import inside, is_folder, outside, sha256, unreadable
 from pipeline.intake.forcelog import read_force_log
+from pipeline.intake.photohints import obeyed
 from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key
 from pipeline.intake.plausibility import size_findings
 from pipeline.intake.specimenfile import NAME, SpecimenFile, read_specimen_file
@@ -174,6 +175,7 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     photos = match_photos(
         folder, log.steps, calibration=file.camera.calibration, log_name=log_path.name, settings=settings
     )
+    steps, hinted = obeyed(photos.steps, file.hints)
     scale = file.camera.scale_px_per_m
     sizes = size_findings(file.length_m, file.diameter_m, photos.steps, scale_px_per_m=scale, settings=settings)
     calibration, doubts = _calibration_photos(folder, file, settings)
@@ -185,11 +187,12 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
         diameter_m=file.diameter_m,
         camera=file.camera,
         rig=file.rig,
-        steps=photos.steps,
+        steps=steps,
         images=photos.paths,
         description=file.description,
-        findings=(*noted, *log.findings, *photos.findings, *doubts, *sizes),
+        findings=(*noted, *log.findings, *photos.findings, *hinted, *doubts, *sizes),
         hashes={name: sha256(path) for name, path in names.items()} | photos.hashes | calibration,
+        hints=file.hints,
     )
 
 

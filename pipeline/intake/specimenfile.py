@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.intake.access import inside, is_folder, outside
+from pipeline.intake.photohints import read_hints
 from pipeline.intake.tomltable import (
     Check,
     TomlFile,
@@ -27,7 +28,7 @@ from pipeline.intake.tomltable import (
     whole,
 )
 from pipeline.messages import Message
-from pipeline.records import Board, CameraSpec, RigSpec
+from pipeline.records import Board, CameraSpec, PhotoHints, RigSpec
 from pipeline.settings.intake import IntakeSettings
 
 NAME = "specimen.toml"
@@ -65,6 +66,7 @@ class SpecimenFile:
     log: LogSpec
     description: dict[str, str]
     source: TomlFile
+    hints: dict[str, PhotoHints] = field(default_factory=dict)
 
 
 def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
@@ -80,7 +82,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
         raise outside(folder / NAME, NAME)
     source = read_toml(path, limit=settings.toml_max_bytes)
     tables = _checks(settings)
-    check_names(source, source.tables, tuple(tables))
+    check_names(source, source.tables, (*tables, "photos"))
     values = {table: checked_table(source, table, checks) for table, checks in tables.items()}
     cable = values["specimen"]
     missing = [key for key in ("length_mm", "diameter_mm") if key not in cable]
@@ -97,6 +99,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
         log=_log(values["force_log"], values["rig"]),
         description={key: cable[key] for key in DESCRIPTION if key in cable},
         source=source,
+        hints=read_hints(source),
     )
 
 

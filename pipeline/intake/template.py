@@ -37,6 +37,14 @@ moving_bearing = "left"     # or "right"
 # bearings_px = [[100, 500], [2000, 500]]  # axes in the first photo, left and right, where no cover can be seen
 # force_sign = "compression"               # or "tension": which sign of the log means compression
 
+# [[photos]]                # one such table for each photo that you correct, in px of that photo
+# image = "images/step_03.png"
+# use = false               # leave it out; its step keeps its force
+# region_px = [100, 50, 2000, 900]         # look for the cable only here
+# exclude_px = [[[400, 300], [460, 300], [460, 380]]]      # polygons around what hides or touches the cable
+# path_px = [[100, 500], [700, 300], [1300, 480]]          # clicks along the cable, from end to end
+# ends_px = [[100, 500], [1300, 480]]      # where its axis meets the bearing axes, or ends
+
 [force_log]                 # only what cannot be told from the file itself
 {file}# columns = {{force = "Kraft [N]", displacement = "Weg [mm]", step = "Schritt", image = "Bild"}}
 # units = {{force = "N", displacement = "mm", time = "s"}}

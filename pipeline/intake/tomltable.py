@@ -22,7 +22,7 @@ from pipeline.messages import Message
 
 Check = Callable[[Any], Any]
 TWICE = re.compile("overwrite|twice|duplicate", re.IGNORECASE)  # in the words of the parser
-HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
+HEADER = re.compile(r"\s*\[\[?([^\[\]]+)\]")
 
 DEEPEST = 8
 """Parts of a key, or brackets inside each other; specimens and settings have three."""

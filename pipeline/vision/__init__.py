@@ -3,6 +3,7 @@
 `trace_series` measures all photos of a specimen, `trace_photo` a single one without scale.
 """
 
-from pipeline.vision.series import trace_photo, trace_series
+from pipeline.vision.series import trace_series
+from pipeline.vision.single import trace_photo
 
 __all__ = ["trace_photo", "trace_series"]

@@ -17,6 +17,7 @@ from pipeline.records import Array, Finding, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
+from pipeline.vision.evidence import Course, weigh
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
@@ -25,7 +26,7 @@ from pipeline.vision.search.bands import by_diameter
 from pipeline.vision.search.beyond import follow, followed_in, shaded
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
-from pipeline.vision.search.crosscut import CrossCut, cut_across
+from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
     at_border,
     between_axes,
@@ -37,50 +38,38 @@ from pipeline.vision.search.ends import (
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
+NO_EDGES = "no two edges of a cable are seen along what stands out of the ground"
 _MAD_TO_STD = 1.4826
+_FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
+_MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
+_LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
+_BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
 
 
 @dataclass(frozen=True)
 class Cable:
     """What is known of the cable and its bearings before the photo is looked at; lengths in px, None if unknown.
 
-    ``slenderness`` is length over diameter, known without a scale too.
+    ``slenderness`` is length over diameter, known without a scale too. ``region`` (u0, v0, u1, v1) and ``path_px`` are
+    where a person says it lies.
     """
 
     diameter_px: float | None = None
     length_px: float | None = None
     bearings: BearingHints = field(default_factory=BearingHints)
     slenderness: float | None = None
+    region: tuple[int, int, int, int] | None = None
+    path_px: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def any_length(self) -> bool:
+        """True if nothing tells how long the cable is: a piece of it may be traced as such."""
+        return self.length_px is None and self.slenderness is None
 
 
 def refused(photo: Photo, code: str, reason: str, **figure: float) -> Rejected:
     """A refusal that names the photo, in one sentence, with its figures."""
     return Rejected(image=photo.name, code=code, reason=f"{photo.name}: {reason}.", figure=figure)
-
-
-def _too_faint(photo: Photo, ratio: float, stage: SegmentationSettings) -> Rejected:
-    return refused(
-        photo,
-        "photo/contrast",
-        f"the cable stands out of the ground by only {ratio:.1f} times its noise and texture, "
-        f"{stage.min_contrast_to_noise:.0f} are needed; a ground of another brightness or colour helps",
-        contrast_to_noise=ratio,
-    )
-
-
-def _disturbance(cut: CrossCut, standout: Standout, cable: Cable, stage: SegmentationSettings) -> float:
-    """Texture of the ground that counts against a strip: less of it where the strip's width shows that it is the cable.
-
-    Texture alone gives no two edges one diameter apart all along.
-    """
-    if cable.diameter_px is None:
-        return cut.texture
-    width = cut.seen_widths * standout.reduction / cable.diameter_px
-    if len(width) < stage.sure_edges_share * len(cut.width):
-        return cut.texture
-    off = abs(median(width) - 1.0)
-    sure = off < stage.sure_width_off and _scatter(width) < stage.sure_width_scatter
-    return stage.sure_texture_weight * cut.texture if sure else cut.texture
 
 
 def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage: SegmentationSettings) -> CrossCut:
@@ -105,7 +94,8 @@ def judge_strip(
 ) -> RoughCable | Rejected:
     """One strip: is it the cable? One that is a piece of it is followed beyond its ends and judged again."""
     outcome = _judge(photo, standout, reading, strip, cable, settings)
-    if not isinstance(outcome, Rejected) or outcome.code != "photo/hidden-end":
+    going_on = outcome.code == "photo/hidden-end" if isinstance(outcome, Rejected) else outcome.goes_on
+    if not going_on:
         return outcome
     stage = settings.segmentation
     cut = _cut(standout, strip.path, reading, cable, stage)
@@ -121,34 +111,27 @@ def judge_strip(
 def _judge(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
 ) -> RoughCable | Rejected:
-    """The checks run from what misleads most to what misleads least."""
     stage = settings.segmentation
     cut = _cut(standout, strip.path, reading, cable, stage)
-    ratio = cut.contrast / _disturbance(cut, standout, cable, stage)
-    faint = ratio < stage.min_contrast_to_noise
-    # Beside a crossing lies more cable, which is no texture; what hardly stands out shows no crossing either.
-    if faint and reading.level < stage.least_level:
-        return _too_faint(photo, ratio, stage)
-    if branches(strip, reading, stage) or approaches_itself(strip.path, reading.width):
-        place = standout.to_pixels(strip.path[len(strip.path) // 2])
-        return refused(
-            photo,
-            "photo/crossing",
-            "the cable crosses or touches itself or another strip, so its course is ambiguous",
-            branch_px=strip.branch * standout.reduction,
-            u_px=float(place[0]),
-            v_px=float(place[1]),
-        )
-    if faint:
-        return _too_faint(photo, ratio, stage)
+    if approaches_itself(strip.path, reading.width):
+        return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
+    if not len(cut.seen_widths):
+        return refused(photo, "photo/contrast", NO_EDGES)
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
+    branching = branches(strip, reading, stage)
     if isinstance(axes, Rejected):
+        if branching:  # which of its arms leaves the picture nobody can tell
+            return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
+        if cut.contrast < _FAINT * cut.texture:  # a fold of the cloth may leave the picture
+            return _too_faint(photo, cut.contrast / cut.texture)
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
-    short = short_of_axis(standout, cut, axes, stage) if len(cut.seen_widths) else None
+    short = short_of_axis(standout, cut, axes, stage)
     if short is not None:
         return _goes_on_beyond(photo, short)
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = _cut(standout, path, reading, cable, stage)
+    if not len(cut.seen_widths):
+        return refused(photo, "photo/contrast", NO_EDGES)
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     if refusal is not None:
         return refusal
@@ -156,40 +139,72 @@ def _judge(
     more = goes_on_at(standout, cut, axes, stage) or rest_faced_at(
         standout, cut, axes, others, stage, length_px=cable.length_px
     )
-    return _assemble(photo, standout, cut, axes, cable, settings) if more is None else _goes_on_beyond(photo, more)
+    if more is not None and not cable.any_length:
+        return _goes_on_beyond(photo, more)
+    found = _assemble(photo, standout, cut, axes, cable, settings)
+    if isinstance(found, Rejected):
+        return found
+    told = found.findings if more is None else (*found.findings, _partial(more))
+    widths = cut.seen_widths * standout.reduction
+    share = len(cut.seen_widths) / len(cut.width)
+    first, last = found.visible
+    path = found.path_px[first : last + 1]
+    course = Course(found.grey, found.origin_px, found.dark, path, path_normals(path)[1])
+    # a cell's edge is found to a fifth of it
+    evidence = weigh(course, widths, std=0.3 * standout.reduction, share=share, branching=branching)
+    return replace(found, branching=branching, goes_on=more is not None, evidence=evidence, findings=told)
+
+
+def crossing(photo: Photo, place: Sequence[float] | Array) -> Rejected:
+    """The refusal of a cable whose course is ambiguous at a place (u, v) px."""
+    u, v = float(place[0]), float(place[1])
+    return refused(
+        photo,
+        "photo/crossing",
+        "the cable crosses or touches itself or another strip, so its course is ambiguous",
+        u_px=u,
+        v_px=v,
+    )
+
+
+def _too_faint(photo: Photo, ratio: float) -> Rejected:
+    return refused(
+        photo,
+        "photo/contrast",
+        f"what is longest stands out of the ground by only {ratio:.1f} times its noise and texture; a ground of another"
+        " brightness or colour helps",
+        contrast_to_noise=ratio,
+    )
 
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
-    """Refuse a photo whose covers were not found because it is moved or out of focus."""
-    if not len(cut.seen_widths):
-        return None
+    """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
     closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights, settings.segmentation)
-    return _check_sharpness(photo, closeup, width, 0.5 * settings.curve.hint_blur_radii, settings)
+    moved = _moved(photo, closeup, width)
+    if moved is not None or closeup.blur_px <= _BLURRED * width:
+        return moved
+    return refused(
+        photo,
+        "photo/blur",
+        f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
+        blur_px=closeup.blur_px,
+        width_px=width,
+    )
 
 
-def _check_sharpness(
-    photo: Photo, closeup: Closeup, width: float, max_blur: float, settings: VisionSettings
-) -> Rejected | None:
-    """Refuse a photo taken in motion, or with more blur than ``max_blur`` widths."""
-    if closeup.motion_px > 0.5 * settings.curve.max_motion_radii * width:
-        return refused(
-            photo,
-            "photo/blur",
-            f"camera or cable moved by {closeup.motion_px:.0f} px during the exposure, the cable is {width:.0f} px "
-            "wide; let the rig come to rest, and use a shorter exposure",
-            motion_px=closeup.motion_px,
-            width_px=width,
-        )
-    if closeup.blur_px > max_blur * width:
-        return refused(
-            photo,
-            "photo/blur",
-            f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
-            blur_px=closeup.blur_px,
-            width_px=width,
-        )
-    return None
+def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
+    """Refuse a photo taken in motion: covers are doubled, and shading is smeared over the edges."""
+    if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION):
+        return None
+    return refused(
+        photo,
+        "photo/blur",
+        f"camera or cable moved by {closeup.motion_px:.0f} px during the exposure, the cable is {width:.0f} px "
+        "wide; let the rig come to rest, and use a shorter exposure",
+        motion_px=closeup.motion_px,
+        width_px=width,
+    )
 
 
 def _axes(
@@ -238,8 +253,8 @@ def _leaves(photo: Photo, place: Sequence[float] | Array) -> Rejected:
 def _check_width(
     photo: Photo, cut: CrossCut, reduction: int, cable: Cable, stage: SegmentationSettings
 ) -> Rejected | None:
-    """Refuse a strip whose width is not the cable's, or not constant."""
-    widths = cut.seen_widths * reduction
+    """Refuse a strip whose width is not that of a cable of known diameter, and one too short for a cable."""
+    width = cut.usual_width * reduction
     slender = float(np.hypot(*np.diff(cut.path, axis=0).T).sum()) / cut.usual_width
     if cable.diameter_px is None and slender < stage.least_slenderness:
         return refused(
@@ -248,32 +263,15 @@ def _check_width(
             f"the strip is only {slender:.0f} times as long as it is wide, a cable that bends is longer",
             slenderness=slender,
         )
-    if len(widths) < 0.5 * len(cut.width):
-        share = len(widths) / len(cut.width)
-        return refused(
-            photo,
-            "photo/width",
-            f"both edges of the cable are seen on only {100 * share:.0f} % of its length",
-            share=share,
-        )
-    usual = median(widths)
     low, high = stage.accepted_width_ratio
-    if cable.diameter_px is not None and not low <= usual / cable.diameter_px <= high:
+    if cable.diameter_px is not None and not low <= width / cable.diameter_px <= high:
         return refused(
             photo,
             "photo/width",
-            f"the strip is {usual:.1f} px wide, the cable should be {cable.diameter_px:.1f} px; "
+            f"the strip is {width:.1f} px wide, the cable should be {cable.diameter_px:.1f} px; "
             "a highlight may split it, or the scale or diameter is wrong",
-            width_px=usual,
+            width_px=width,
             diameter_px=cable.diameter_px,
-        )
-    scatter = _scatter(widths) / usual
-    if scatter > stage.max_width_scatter:
-        return refused(
-            photo,
-            "photo/width",
-            f"the strip's width varies by {100 * scatter:.0f} %, a cable's does not",
-            width_scatter=scatter,
         )
     return None
 
@@ -288,6 +286,14 @@ def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
         u_px=float(u),
         v_px=float(v),
     )
+
+
+def _partial(place: tuple[float, float]) -> Finding:
+    text = (
+        f"the cable was followed to ({place[0]:.0f}, {place[1]:.0f}) px and seems to go on beyond; the traced length "
+        "may be short of the cable's"
+    )
+    return Finding("photo/hidden-end", "warning", text)
 
 
 def _assemble(
@@ -313,12 +319,10 @@ def _assemble(
     path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
         return refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")
-    ratio = cut.contrast / float(np.hypot(_disturbance(cut, standout, cable, stage), closeup.noise))
-    if ratio < stage.min_contrast_to_noise:
-        return _too_faint(photo, ratio, stage)
-    unsharp = _check_sharpness(photo, closeup, width, stage.max_blur_widths, settings)
-    if unsharp is not None:
-        return unsharp
+    moved = _moved(photo, closeup, width)
+    if moved is not None:
+        return moved
+    ratio = cut.contrast / float(np.hypot(cut.texture, closeup.noise))
     scatter = _scatter(cut.seen_widths) / cut.usual_width
     return RoughCable(
         image=photo.name,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array, Finding
+from pipeline.vision.evidence import Evidence
 
 AxisKind = Literal["cover", "given", "end", "clamp"]
 
@@ -79,6 +80,12 @@ class RoughCable:
     quality : dict
         Figures for the report: contrast_to_noise, width_scatter, ...
     findings : tuple of Finding
+    branching : bool
+        Something of the cable's width seems to leave it: its course may be ambiguous.
+    goes_on : bool
+        The cable seems to go on beyond an end of it.
+    evidence : Evidence
+        For being a cable, along the path.
     """
 
     image: str
@@ -96,6 +103,9 @@ class RoughCable:
     weights: tuple[float, ...] = (1.0,)
     quality: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    branching: bool = False
+    goes_on: bool = False
+    evidence: Evidence = field(default_factory=Evidence)
 
     @property
     def length_px(self) -> float:

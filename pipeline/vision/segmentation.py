@@ -12,16 +12,19 @@ The cable is the longest strip of the right width; known bearings decide between
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.records import Array, Rejected
+from pipeline.records import Array, PhotoHints, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import SoughtCovers
-from pipeline.vision.judgement import Cable, judge_strip, refused
+from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
+from pipeline.vision.evidence import unlike_a_cable
+from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
@@ -30,15 +33,17 @@ from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_a
 
 Window = tuple[int, int, int, int]
 
-
-# Other readings of a photo that shows a crossing may well show one arm of it as a clean strip.
-_CONCLUSIVE = ("photo/crossing", "photo/two-candidates")
-# What is refused so looks like a cable that is not seen whole: something shorter elsewhere is not the cable either.
-_IN_PIECES = ("photo/hidden-end", "photo/two-candidates")
+_WIDER = 1.08  # of the width; a course's strip that is wider by more has other edges
+_RIVAL = 0.35  # of the best strip's evidence; on wire piles another cable has more, pieces of one cable less
 
 
 def find_cable(
-    photo: Photo, settings: VisionSettings, *, cable: Cable | None = None, near: RoughCable | None = None
+    photo: Photo,
+    settings: VisionSettings,
+    *,
+    cable: Cable | None = None,
+    near: RoughCable | None = None,
+    hints: PhotoHints | None = None,
 ) -> RoughCable | Rejected:
     """Find the cable.
 
@@ -50,12 +55,16 @@ def find_cable(
         What is known of it.
     near : RoughCable, optional
         The cable on a neighbouring photo of the series: only its surroundings are searched first.
+    hints : PhotoHints, optional
+        What a person says about this photo.
 
     Returns
     -------
     RoughCable or Rejected
     """
     cable = Cable() if cable is None else cable
+    if hints is not None:
+        photo, cable = with_hints(photo, cable, hints)
     found = _find_near(photo, settings, cable, near)
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness, settings):
         return found
@@ -68,14 +77,32 @@ def find_cable(
     return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
 
 
+def _is_settled(found: RoughCable) -> bool:
+    """True of a strip that leaves nothing to be looked for: all speaks for it, and it is no piece of a longer one."""
+    return found.evidence.clear and not found.goes_on
+
+
 def _find_near(photo: Photo, settings: VisionSettings, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     """Find the cable where a neighbour photo lets it be expected, then anywhere."""
     cable = replace(cable, bearings=replace(cable.bearings, sought=SoughtCovers()))
-    if near is not None:
+    if cable.path_px:
+        return _along_clicks(photo, settings, cable)
+    if near is not None and cable.region is None:
         found = _find_in(photo, settings, cable, _surroundings(near, photo, settings.segmentation))
         if isinstance(found, RoughCable):
             return found
-    return _find_in(photo, settings, cable, None)
+    return _find_in(photo, settings, cable, cable.region)
+
+
+def _along_clicks(photo: Photo, settings: VisionSettings, cable: Cable) -> RoughCable | Rejected:
+    """The cable along a person's clicks, of the width that has the most evidence."""
+    judged = []
+    for width in widths_tried(cable):
+        standout = stand_out(photo, choose_reduction(photo.size, width, settings.segmentation), settings.segmentation)
+        reading = reading_along(standout, cable.path_px, width)
+        outcome = judge_strip(photo, standout, reading, reading.strips[0], cable, settings)
+        judged.append(_Judged([outcome], [standout.to_pixels(reading.strips[0].path)], [width]))
+    return _chosen(photo, judged, settings.segmentation.rival_share)
 
 
 def _is_slender(found: RoughCable | Rejected, slenderness: float, settings: VisionSettings) -> bool:
@@ -118,32 +145,19 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
             return alone
     standout = stand_out(photo, reduction, stage, window=window)
     wanted = _wanted(standout, cable, stage)
-    first: Rejected | None = None
-    leaving: list[Array] = []
-    going_on: list[tuple[Rejected, Array]] = []
+    judged: list[_Judged] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
-            if first is not None:
-                return first
+            if judged:
+                break
             return _blank(photo, settings.photo) or _nothing(
                 photo, standout, readings[0], known=wanted.width is not None
             )
-        outcome, path = _weigh(photo, standout, readings, wanted, cable, settings)
-        if isinstance(outcome, RoughCable):
-            if first is not None and _lies_on(outcome, leaving):
-                return first
-            more = _more_shown(outcome, going_on, settings)
-            return outcome if more is None else more[0]
-        if outcome.code in _CONCLUSIVE:
+        judged += [_judged(photo, standout, reading, wanted, cable, settings) for reading in readings]
+        outcome = _chosen(photo, judged, settings.segmentation.rival_share)
+        if isinstance(outcome, RoughCable) and _is_settled(outcome):
             return outcome
-        if outcome.code == "photo/leaves-frame":
-            leaving.append(path)
-        if outcome.code == "photo/hidden-end":
-            going_on.append((outcome, path))
-        first = outcome if first is None else first
-    if first is None:
-        raise ValueError("read_photo always gives a reading")
-    return first
+    return _chosen(photo, judged, settings.segmentation.rival_share)
 
 
 def _find_alone(
@@ -162,108 +176,104 @@ def _find_alone(
     reading = read_alone(standout, wanted, stage)
     if reading is None:
         return None
-    found, _ = _weigh(photo, standout, (reading,), wanted, cable, settings)
-    return found if isinstance(found, RoughCable) else None
+    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable, settings)], stage.rival_share)
+    return found if isinstance(found, RoughCable) and _is_settled(found) else None
 
 
-def _weigh(
-    photo: Photo,
-    standout: Standout,
-    readings: tuple[Reading, ...],
-    wanted: Wanted,
-    cable: Cable,
-    settings: VisionSettings,
-) -> tuple[RoughCable | Rejected, Array]:
-    """Judge the long strips of each reading; the largest strip with a clear verdict speaks for the photo.
+class _Judged(NamedTuple):
+    """Outcomes of the long strips of one reading, and paths (k, 2) px and areas of the strips."""
 
-    Returns the verdict and the strip's path in px.
-    """
-    verdicts: list[tuple[float, RoughCable | Rejected, Array]] = []
-    for reading in readings:
-        least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
-        rivals = [strip for strip in reading.strips if strip.length >= least]
-        outcomes = _whole([judge_strip(photo, standout, reading, strip, cable, settings) for strip in rivals], settings)
-        contrasts = [outcome.contrast if isinstance(outcome, RoughCable) else 0.0 for outcome in outcomes]
-        # a shadow that lies apart from the cable is as long and fainter
-        faintest = settings.segmentation.rival_share * max(contrasts, default=0.0)
-        accepted = [k for k, contrast in enumerate(contrasts) if contrast > 0.0 and contrast >= faintest]
-        accepted.sort(key=lambda k: -_length(outcomes[k]))  # a piece that was followed farther is more of the cable
-        area = reading.longest * reading.width
-        chosen = accepted[0] if accepted else 0
-        outcome = outcomes[chosen]
+    outcomes: list[RoughCable | Rejected]
+    paths: list[Array]
+    areas: list[float]
+
+
+def _judged(
+    photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable, settings: VisionSettings
+) -> _Judged:
+    least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
+    strips = [strip for strip in reading.strips if strip.length >= least]
+    judged = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in strips]
+    paths = [standout.to_pixels(strip.path) for strip in strips]
+    return _Judged(judged, paths, [strip.length * reading.width for strip in strips])
+
+
+def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCable | Rejected:
+    """The strip of all readings with the most evidence, or why there is none."""
+    likely = [found for reading in judged for found in reading.outcomes if isinstance(found, RoughCable)]
+    # a shadow that lies apart from the cable is as long and fainter
+    strongest = max((found.contrast for found in likely), default=0.0)
+    likely = [found for found in likely if found.contrast >= rival_share * strongest]
+    likely.sort(key=lambda found: -found.evidence.value)
+    refusals = [
+        (area, outcome, path)
+        for reading in judged
+        for outcome, path, area in zip(reading.outcomes, reading.paths, reading.areas, strict=True)
+        if isinstance(outcome, Rejected)
+    ]
+    if not likely:
+        return max(refusals, key=lambda refusal: refusal[0])[1]
+    best = _widest_alike(likely)
+    for _, refusal, path in refusals:
+        # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
+        length = float(np.hypot(*np.diff(path, axis=0).T).sum())
         # blur is judged last: a strip refused for it looks like a cable in all else
-        blurred = [k for k, verdict in enumerate(outcomes) if _code(verdict) == "photo/blur"]
-        alike = _apart(accepted, outcomes) + blurred
-        if accepted and len(alike) > 1:
-            lengths = [rivals[k].length * standout.reduction for k in alike]
-            text = (
-                f"{len(alike)} strips could be the cable ({lengths[0]:.0f} px and {lengths[1]:.0f} px long); "
-                "leave one cable in the picture"
-            )
-            outcome = refused(photo, "photo/two-candidates", text, candidates=float(len(alike)))
-        if isinstance(outcome, RoughCable):  # it may have been followed farther
-            area = 2.0 * outcome.half_width_px * outcome.length_px / standout.reduction**2
-        verdicts.append((area, outcome, standout.to_pixels(rivals[chosen].path)))
-    clear = [v for v in verdicts if isinstance(v[1], RoughCable) or v[1].code in _CONCLUSIVE]
-    _, outcome, path = max(clear or verdicts, key=lambda verdict: verdict[0])
-    if isinstance(outcome, RoughCable):
-        going_on = [(v[1], v[2]) for v in verdicts if isinstance(v[1], Rejected) and v[1].code in _IN_PIECES]
-        outcome, path = _more_shown(outcome, going_on, settings) or (outcome, path)
-    return outcome, path
+        if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
+            return _two_candidates(photo, best.length_px, length)
+        if length > best.length_px and refusal.code in ("photo/crossing", "photo/hidden-end"):
+            return refusal
+        if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
+            return refusal
+    if not best.evidence.enough:
+        return refused(photo, *unlike_a_cable(best.evidence), likeness=best.evidence.likeness)
+    hidden = any(finding.code == "photo/hidden-end" for finding in best.findings)
+    if best.evidence.crossed is not None or (best.branching and hidden):
+        return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
+    beside = next(reading.outcomes for reading in judged if any(best is found for found in reading.outcomes))
+    other = next((o for o in beside if isinstance(o, RoughCable) and _is_rival(o, best)), None)
+    if other is not None:
+        return _two(photo, best, other)
+    return best
 
 
-def _code(outcome: RoughCable | Rejected) -> str:
-    return outcome.code if isinstance(outcome, Rejected) else ""
+def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
+    """The refusal of two strips, one of which may be the cable, or both, where they meet."""
+    met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
+    if met:
+        return crossing(photo, met[0])
+    return _two_candidates(photo, best.length_px, other.length_px)
 
 
-def _length(outcome: RoughCable | Rejected) -> float:
-    return outcome.length_px if isinstance(outcome, RoughCable) else 0.0
+def _two_candidates(photo: Photo, one: float, other: float) -> Rejected:
+    text = f"2 strips could be the cable ({one:.0f} px and {other:.0f} px long); leave one cable in the picture"
+    return refused(photo, "photo/two-candidates", text, candidates=2.0)
 
 
-def _more_shown(
-    found: RoughCable, going_on: list[tuple[Rejected, Array]], settings: VisionSettings
-) -> tuple[Rejected, Array] | None:
-    """Refusal and path of a strip that another reading showed to go on: where this one ends, or longer, elsewhere."""
-    tree = cKDTree(found.path_px)
-    for refusal, path in going_on:
-        longer = float(np.hypot(*np.diff(path, axis=0).T).sum()) > found.length_px
-        elsewhere = median(tree.query(path)[0]) > found.half_width_px
-        at_end = refusal.code == "photo/hidden-end" and _ends_at(found, refusal, settings)
-        if at_end or (longer and elsewhere):
-            return refusal, path
-    return None
+def _widest_alike(likely: list[RoughCable]) -> RoughCable:
+    """The likeliest strip, or a wider one on its course that is nearly as likely and stands out as much.
+
+    A highlight or a shaded half is a strip within the cable, and nothing doubles a cable.
+    """
+    best = likely[0]
+    for found in likely[1:]:
+        wider = found.half_width_px > _WIDER * best.half_width_px and found.contrast > 0.95 * best.contrast
+        if wider and found.evidence.value > 0.85 * best.evidence.value and _lies_on(found, [best.path_px]):
+            best = found
+    return best
 
 
-def _ends_at(found: RoughCable, refusal: Rejected, settings: VisionSettings) -> bool:
-    """True if what was found ends, under no cover, where a strip was seen to go on."""
-    stage, width = settings.segmentation, 2.0 * found.half_width_px
-    place = np.array([refusal.figure["u_px"], refusal.figure["v_px"]])
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(found.path_px, axis=0).T))]
-    distance = np.hypot(*(found.path_px - place).T)
-    passed = along[int(np.argmin(distance))]  # a place that was passed is followed beyond
-    at_end = min(passed, along[-1] - passed) < stage.beyond_least_widths * width
-    return found.left.radius_px is None and at_end and bool(distance[[0, -1]].min() < stage.hidden_widths * width)
+def _meets(one: RoughCable, other: RoughCable) -> Array | None:
+    """Where an end of one strip lies on another, if it does."""
+    ends = one.path_px[[0, -1]]
+    distance = np.asarray(cKDTree(other.path_px).query(ends)[0])
+    return np.asarray(ends[int(np.argmin(distance))]) if distance.min() < 4.0 * other.half_width_px else None
 
 
-def _whole(outcomes: list[RoughCable | Rejected], settings: VisionSettings) -> list[RoughCable | Rejected]:
-    """The verdicts, but for a cable that ends where another strip is known to go on: it is the piece beyond."""
-    going_on = [o for o in outcomes if isinstance(o, Rejected) and o.code == "photo/hidden-end"]
-
-    def piece_of(found: RoughCable) -> Rejected | None:
-        return next((other for other in going_on if _ends_at(found, other, settings)), None)
-
-    return [(piece_of(o) or o) if isinstance(o, RoughCable) else o for o in outcomes]
-
-
-def _apart(chosen: list[int], outcomes: list[RoughCable | Rejected]) -> list[int]:
-    """Those chosen that do not lie on one before: two pieces of one cable are followed to the same whole."""
-    kept: list[int] = []
-    for k in chosen:
-        found = outcomes[k]
-        before = [o for o in (outcomes[other] for other in kept) if isinstance(o, RoughCable)]
-        if not (isinstance(found, RoughCable) and _lies_on(found, [other.path_px for other in before])):
-            kept.append(k)
-    return kept
+def _is_rival(found: RoughCable, best: RoughCable) -> bool:
+    """True for a strip of about the width of the best, elsewhere, that is as surely a cable and about as long."""
+    alike = 0.6 < found.half_width_px / best.half_width_px < 1.6
+    long = found.evidence.value > _RIVAL * best.evidence.value
+    return alike and long and found.evidence.enough and not _lies_on(found, [best.path_px])
 
 
 def _lies_on(found: RoughCable, paths: list[Array]) -> bool:

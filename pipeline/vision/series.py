@@ -11,25 +11,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from pipeline.records import Array, Centerline, Finding, Preview, Rejected, Scale, Specimen, Traces
+from pipeline.records import Array, Centerline, Finding, Rejected, Scale, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
-from pipeline.vision.centerline.ground_waves import Waves
 from pipeline.vision.centerline.lay import without_lay
-from pipeline.vision.centerline.measurement import Followed, centerline_of, follow_cable, waves_of
+from pipeline.vision.centerline.measurement import Followed, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.guard import guarded, jointly
-from pipeline.vision.judgement import Cable
-from pipeline.vision.photo import load_photo
 from pipeline.vision.picture_size import of_one_size
-from pipeline.vision.preview import reduce_photo, with_strip
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.board import calibrate_by_board
 from pipeline.vision.scale.calibration import (
@@ -41,9 +36,8 @@ from pipeline.vision.scale.calibration import (
 )
 from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
-from pipeline.vision.scale.plane import PlaneMap
-from pipeline.vision.segmentation import find_cable
 from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
+from pipeline.vision.single import shown, trace_photo
 from pipeline.vision.stated_width import with_width_seen
 
 Line = Centerline | Rejected
@@ -51,35 +45,6 @@ Told = TypeVar("Told")
 
 NOT_ALIKE = "What all photos have in common could not be told; the centerlines stay as they are. Please report it."
 _UNTOLD = Finding("photo/program-error", "warning", NOT_ALIKE)
-
-
-def trace_photo(
-    path: Path, *, diameter_px: float | None = None, settings: VisionSettings | None = None
-) -> Centerline | Rejected:
-    """Trace the cable on a single photo, without a specimen and without a scale.
-
-    Parameters
-    ----------
-    path : Path
-    diameter_px : px, optional
-        Diameter of the cable; measured on the photo if not given.
-    settings : VisionSettings, optional
-
-    Returns
-    -------
-    Centerline or Rejected
-        From visible end to visible end. Lengths are in px wherever the record says m.
-    """
-    settings = VisionSettings() if settings is None else settings
-    photo = load_photo(Path(path), settings.photo)
-    if isinstance(photo, Rejected):
-        return photo
-    preview = reduce_photo(photo, settings.preview)
-    rough = find_cable(photo, settings, cable=Cable(diameter_px=diameter_px))
-    if isinstance(rough, Rejected):
-        return _shown(rough, preview, settings)
-    plane = PlaneMap.from_scale(1.0)
-    return _shown(follow_cable(rough, plane=plane, diameter_m=diameter_px, settings=settings), preview, settings)
 
 
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
@@ -260,7 +225,7 @@ def _tied(
     _, told = jointly(images, sights, _told)
     _, waves = jointly(images, cables, partial(waves_of, settings=settings))
     return tuple(
-        guarded(shot.found.image, partial(_shown, cable, shot.preview, settings, axes, waves))
+        guarded(shot.found.image, partial(shown, cable, shot.preview, settings, axes, waves))
         for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
     )
 
@@ -269,20 +234,6 @@ def _told(sights: Sequence[AxisSight | Rejected | None]) -> list[AxesTold | None
     """What the other photos tell of each that was not refused."""
     told = iter(told_by_others([sight for sight in sights if isinstance(sight, AxisSight)]))
     return [next(told) if isinstance(sight, AxisSight) else None for sight in sights]
-
-
-def _shown(
-    cable: Followed | Rejected,
-    preview: Preview | None,
-    settings: VisionSettings,
-    told: AxesTold | None = None,
-    waves: Waves | None = None,
-) -> Centerline | Rejected:
-    """Centerline of a cable, with its picture."""
-    if isinstance(cable, Rejected):
-        return cable if preview is None else replace(cable, preview=preview)
-    line = centerline_of(cable, settings, told, waves)
-    return line if preview is None else replace(line, preview=with_strip(preview, line, cable.rough, settings.preview))
 
 
 def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:

@@ -138,7 +138,8 @@ def _find_as_on(
     cable = _expected(specimen, calibration, shot.step.displacement_m - first)
     seen = expected_covers(near.found, specimen.rig.moving_bearing, travel)
     cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-    again = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near.found))
+    hints = specimen.hints.get(photo.name)
+    again = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near.found, hints=hints))
     return again if isinstance(again, RoughCable) else shot.found
 
 
@@ -216,7 +217,8 @@ def _find_all(
             scale = 1.0 if calibration is None else calibration.scale.px_per_m
             seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
             cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-        found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near))
+        hints = specimen.hints.get(photo.name)
+        found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near, hints=hints))
         if isinstance(found, RoughCable):
             near, last = found, step
         shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))
@@ -282,4 +284,5 @@ def _find_beside(
     cable = Cable(
         specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=diameter, seen=(cover,))
     )
-    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable))
+    hints = specimen.hints.get(photo.name)
+    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable, hints=hints))

@@ -27,6 +27,9 @@ LOOKED_AT = 3
 ALIKE = 0.05
 """Relative; widths on several photos of one cable agree to a percent, those of shadows and highlights do not."""
 
+OFF = 0.15
+"""Relative; diameters and scales are known to some percent, and light moves both edges of a cable by less."""
+
 LEAST_LENGTH, MOST_LENGTH = 0.7, 1.1
 """Visible length over the stated one: covers hide up to a diameter or three at each end, and photos have a scale."""
 
@@ -95,7 +98,7 @@ def _width_seen(
     alike = np.ptp(widths) < ALIKE * np.median(widths)
     whole = lengths.min() > LEAST_LENGTH and lengths.max() < MOST_LENGTH
     width = float(np.median(widths))
-    off = abs(width / specimen.diameter_m - 1.0) > settings.curve.max_width_error
+    off = abs(width / specimen.diameter_m - 1.0) > OFF
     return width if alike and whole and off else None
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pipeline.result import Answer, Result, read_result
     from pipeline.run import measure, write
     from pipeline.settings import Settings
-    from pipeline.vision.series import trace_photo
+    from pipeline.vision.single import trace_photo
     from rod.balance import balance
     from rod.bending_test import BendingTest, simulate
     from rod.characteristic import Characteristic
@@ -82,7 +82,7 @@ ROOMS = {
     "pipeline.result": ("Answer", "Result", "read_result"),
     "pipeline.run": ("measure", "write"),
     "pipeline.settings": ("Settings",),
-    "pipeline.vision.series": ("trace_photo",),
+    "pipeline.vision.single": ("trace_photo",),
     "rod.balance": ("balance",),
     "rod.bending_test": ("BendingTest", "simulate"),
     "rod.characteristic": ("Characteristic",),

@@ -217,76 +217,16 @@ class CurveSettings(StageSettings):
         " in twenty series at most",
     )
     points: int = Field(201, ge=20, description="points of the centerline: 1 mm for a cable of 0.2 m")
-    max_blur_radii: float = Field(
-        0.4, gt=0, description="of the radius; with more blur the two edges run into each other and move inward"
-    )
-    max_motion_radii: float = Field(
-        0.5,
+    max_band_percent: float = Field(
+        30.0,
         gt=0,
-        description="of the radius; a longer motion during the exposure doubles covers and smears the shading over the"
-        " edges: from 0.55 on midlines were off by more than their bands",
-    )
-    hint_blur_radii: float = Field(
-        0.2, gt=0, description="of the radius; with more blur that, and no missing cover, is why no axis was found"
-    )
-    max_width_error: float = Field(
-        0.15,
-        gt=0,
-        description="relative; a strip split off along a highlight is 30 % or more too narrow, scales and"
-        " diameters are known to some percent",
-    )
-    max_width_scatter: float = Field(
-        0.08, gt=0, description="relative, robust, along s; a cable's width is constant within 5 %"
-    )
-    max_section_scatter: float = Field(
-        0.025,
-        gt=0,
-        description="of the width, along the normal; 0.006 on the worst of 280 photos of whole rigs, 0.04 and more"
-        " where shades of a white cable on white ground were followed, 20 px beside it",
-    )
-    min_contrast_to_noise: float = Field(
-        5.0, gt=0, description="ratio; below it false edges win and the errors are not Gaussian"
-    )
-    patterned_contrast_to_noise: float = Field(
-        1.65,
-        gt=0,
-        description="ratio, where the width is surely constant; strands of two colours scatter by half their contrast,"
-        " and by a tenth of it more with the shade between them",
-    )
-    sure_width_scatter: float = Field(
-        0.04, gt=0, description="relative, robust; edges sought in noise scattered by 0.09, in coarse texture by 0.2"
-    )
-    quiet_width_scatter: float = Field(
-        0.07,
-        gt=0,
-        description="relative, robust, where the pixels are quiet: strands that swell the outline reach 0.065,"
-        " twisted pairs 0.1, coarse texture 0.2",
-    )
-    min_measured_share: float = Field(
-        0.6, gt=0, le=1, description="of the visible sections; with fewer both edges were not found on a cable"
+        description="per cent of the range of curvature; a photo whose 95 % band is wider on either side tells no law",
     )
     axis_distance_radii: float = Field(
         0.25,
         gt=0,
         description="of the radius; a centerline that misses a bearing axis by more is worth a warning: over 100"
         " rendered rigs right ones missed by 0.06 at most",
-    )
-    max_axis_distance_radii: float = Field(
-        0.5,
-        gt=0,
-        description="of the radius; a centerline that misses a cover's axis by more follows a flank, a shadow or a"
-        " stripe: those missed by 0.85 and more, a cable sits in its bearing by a tenth",
-    )
-    max_bend_diameters: float = Field(
-        0.5,
-        gt=0,
-        description="curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends",
-    )
-    max_end_distance_radii: float = Field(
-        2.0,
-        gt=0,
-        description="of the radius; a curve that misses the cable's own visible end by more was led astray in a gap;"
-        " at a clamp's jaw, which the last sections feel, right ones missed by half a radius",
     )
     least_departure: float = Field(
         0.25,

@@ -10,20 +10,8 @@ from pipeline.settings.vision.stage import StageSettings
 class SegmentationSettings(StageSettings):
     """Search for the cable."""
 
-    min_contrast_to_noise: float = Field(
-        5.0, gt=0, description="ratio; below it the edges' errors stop being Gaussian and false edges win"
-    )
-    sure_edges_share: float = Field(
-        0.95, gt=0, le=1, description="share of sections with both edges from which their distance can show the cable"
-    )
-    sure_width_off: float = Field(
-        0.1, gt=0, description="relative; distance of the edges to a known diameter: scale and blur are off by less"
-    )
     sure_width_scatter: float = Field(
         0.04, gt=0, description="relative, robust; a cable's edges keep their distance, a texture's vary by 0.1"
-    )
-    sure_texture_weight: float = Field(
-        0.5, gt=0, le=1, description="weight of the texture beside a strip whose width shows that it is the cable"
     )
     reduced_side_cells: int = Field(
         1000,
@@ -189,15 +177,11 @@ class SegmentationSettings(StageSettings):
         description="ratio of length to width as seen and as stated, where no scale is known; covers hide up to a "
         "third of a short, thick cable, and a sheath may be dark at its flanks",
     )
-    max_width_scatter: float = Field(0.15, gt=0, description="relative; width of a cable is constant, of a shadow not")
     seen_share: float = Field(
         0.4, gt=0, lt=1, description="share of the median contrast from which a section counts as seen"
     )
     corridor_widths: float = Field(
         2.25, gt=2, description="widths; half corridor kept at full resolution: noise is read up to 1.6 widths away"
-    )
-    max_blur_widths: float = Field(
-        0.2, gt=0, description="widths; beyond it the spreads of both edges overlap in the middle"
     )
     search_margin_share: float = Field(
         0.12, gt=0, description="share of the cable's extent; a step moves the bow by less, else all is searched"

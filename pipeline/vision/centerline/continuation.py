@@ -41,6 +41,7 @@ from pipeline.vision.median import quantile
 from pipeline.vision.rough import AxisKind
 from pipeline.vision.scale.chord import ChordFrame
 
+_END_WIDTHS = 0.25  # widths; how far aside of the cable's middle the search puts a visible end: a corner of its mask
 _PLACES = 60  # along the seen part: the curvature has about ten degrees of freedom there
 
 
@@ -63,7 +64,7 @@ def continue_to_axes(
         Of the curve's parameters, the light's errors included.
     chord : ChordFrame
     kinds : pair of str
-        Of the axes: a visible end is put where the cable is seen to end and tells nothing more.
+        Of the axes: a visible end tells roughly where the curve ends, where its last sections are lost.
     width : m
         Of the cable.
     told : AxesTold, optional
@@ -74,9 +75,12 @@ def continue_to_axes(
         past, misses, normals = _axes(fit, chord)
         if told is None:
             told = told_alone(_sight(misses, np.eye(2), normals, chord, settings.axis_play_widths * width))
-        rows, values = np.vstack([rows, past]), np.concatenate([values, misses - told.shift])
-        loose = told.covariance + chord.axis_std**2 * np.eye(2)
-        noise = np.block([[noise, np.zeros((2, 2))], [np.zeros((2, 2)), loose]])
+        shift, loose = told.shift, told.covariance + chord.axis_std**2 * np.eye(2)
+    else:
+        past, misses, _ = _axes(fit, chord)
+        shift, loose = np.zeros(2), (_END_WIDTHS * width) ** 2 * np.eye(2)
+    rows, values = np.vstack([rows, past]), np.concatenate([values, misses - shift])
+    noise = np.block([[noise, np.zeros((2, 2))], [np.zeros((2, 2)), loose]])
     step, updated = _updated(covariance, rows, values, noise)
     return replace(fit, curve=fit.curve.moved(step)), updated
 

@@ -27,6 +27,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
+from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along, width_excess
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
@@ -35,17 +36,16 @@ from pipeline.vision.centerline.refusal import (
     feet_of_axes,
     middle_width,
     refusal,
-    refusal_beside_axis,
-    refusal_of_bend,
-    refusal_of_scatter,
+    refusal_of_band,
 )
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
 from pipeline.vision.rough import AxisKind, RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
-from rod.measurement import MeasuredShape, slow_covariance
+from rod.measurement import MeasuredShape
 
+_HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
 
 
@@ -148,6 +148,16 @@ class Followed:
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
+    def axis_std(self, fit: CurveFit, feet: Array) -> float:
+        """Std (m) of the axes across the chord; ``feet`` are their arc lengths on the curve.
+
+        A visible end lies on the curve: what is open is where along it, and that moves it across the chord by the
+        slope of the curve there.
+        """
+        if self._kinds[0] in ("cover", "given"):
+            return self.chord.axis_std
+        return self.chord.axis_std * float(np.sqrt(np.mean(np.sin(fit.curve.at(feet)[1]) ** 2)))
+
     @property
     def _kinds(self) -> tuple[AxisKind, AxisKind]:
         return self.rough.left.kind, self.rough.right.kind
@@ -173,21 +183,16 @@ def follow_cable(
         return sections
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
-    refused = refusal(rough, sections, width, diameter_m, options)
-    if refused is not None:
-        return refused
     fit = _fit(sections, chord, width, breaks_m, options)
-    refused = (
-        refusal_beside_axis(rough, fit, chord, width, options)
-        or refusal_of_bend(rough, fit, width, options)
-        or refusal_of_scatter(rough, fit, width, options)
-    )
+    refused = refusal(rough, sections, fit, chord, width, diameter_m)
     if refused is not None:
         return refused
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
-    covariance = fit.smooth.covariance + _slow(fit, *light)
-    covariance *= _width_excess(fit, sections.balance * (width - median(width)), covariance, options) ** 2
+    covariance, slow = fit.smooth.covariance, slow_errors(fit, *light)
+    # what the width shows beyond that is short, as the scatter is: the light's slow error is none the larger
+    covariance = covariance * width_excess(fit, sections.balance * (width - median(width)), covariance, options) ** 2
+    covariance = covariance + slow
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
@@ -242,8 +247,8 @@ def centerline_of(
     settings: VisionSettings,
     told: AxesTold | None = None,
     waves: Waves | None = None,
-) -> Centerline:
-    """Record of a followed cable, from foot to foot of the bearing axes.
+) -> Centerline | Rejected:
+    """Record of a followed cable, from foot to foot of the bearing axes; or that its band is of no use.
 
     Parameters
     ----------
@@ -259,12 +264,18 @@ def centerline_of(
     misses = feet_of_axes(followed.fit, chord)[1]
     metres = median(width / sections.width)
     waves = waves or Waves()
-    errors = _slow(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
+    errors = slow_errors(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
     fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told, settings)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
-    shape = _shape(fit, s, _with_axes(covariance, chord), followed.light, waves)
-    length_std = _length_std(fit, s, shape.basis_normal, covariance)
+    shape = _shape(
+        fit, s, _with_axes(covariance, followed.axis_std(fit, feet), chord.chord), followed.light, waves, width=middle
+    )
+    kappa_std = std_along(shape.basis_kappa, shape.covariance)
+    useless = refusal_of_band(rough.image, shape.kappa[shape.seen], kappa_std[shape.seen], float(s[-1] - s[0]), options)
+    if useless is not None:
+        return useless
+    own_std = length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
     quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
@@ -275,12 +286,12 @@ def centerline_of(
         shape=shape,
         u_px=uv[:, 0],
         v_px=uv[:, 1],
-        kappa_std=_std(shape.basis_kappa, shape.covariance),
-        position_std=_std(shape.basis_normal, shape.covariance),
+        kappa_std=kappa_std,
+        position_std=std_along(shape.basis_normal, shape.covariance),
         chord_m=chord.chord,
         chord_std_m=float(np.sqrt(2.0)) * chord.axis_std,
         traced_length_m=float(s[-1] - s[0]),
-        traced_length_std_m=float(np.hypot(np.sqrt(2.0) * chord.axis_std, length_std)),
+        traced_length_std_m=float(np.hypot(np.sqrt(2.0) * chord.axis_std, own_std)),
         left_px=rough.left.center_px,
         right_px=rough.right.center_px,
         axis_std_px=float(np.hypot(rough.left.std_px, rough.right.std_px) / np.sqrt(2.0)),
@@ -292,18 +303,27 @@ def centerline_of(
     )
 
 
-def _with_axes(covariance: Array, chord: ChordFrame) -> Array:
+def _with_axes(covariance: Array, axis_std: float, chord: float) -> Array:
     """Covariance of q with the errors of the axes.
 
     They shift and turn the chord frame against the curve: exactly q's first two directions.
     """
     whole = covariance.copy()
-    whole[0, 0] += chord.axis_std**2
-    whole[1, 1] += 2.0 * (chord.axis_std / chord.chord) ** 2
+    whole[0, 0] += axis_std**2
+    whole[1, 1] += 2.0 * (axis_std / chord) ** 2
     return whole
 
 
-def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: Waves) -> MeasuredShape:
+def _seen(s: Array, measured: Array, reach: float) -> NDArray[np.bool_]:
+    """Arc lengths (n,) no farther than ``reach`` from a measured section, (m,) ascending or nearly so."""
+    measured = np.sort(measured)
+    after = np.clip(np.searchsorted(measured, s), 1, len(measured) - 1)
+    return np.asarray(np.minimum(np.abs(s - measured[after - 1]), np.abs(s - measured[after])) <= reach)
+
+
+def _shape(
+    fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: Waves, *, width: float
+) -> MeasuredShape:
     """What is measured at arc lengths ``s`` (n,), from the first on; slow errors of light and ground, m."""
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
@@ -315,7 +335,7 @@ def _shape(fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float
         y=where[:, 1],
         theta=theta,
         kappa=-fit.curve.curvature(s),
-        seen=(s >= fit.s[0] - gap) & (s <= fit.s[-1] + gap),
+        seen=_seen(s, fit.s[used], max(gap, _HIDDEN_WIDTHS * width)),
         basis_normal=normal,
         basis_theta=turn,
         basis_kappa=-bend,
@@ -348,36 +368,3 @@ def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.
         "effective_parameters": fit.smooth.freedom,
         "width_scatter": middle_width(sections.width)[1],
     }
-
-
-def _std(basis: Array, covariance: Array) -> Array:
-    return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
-
-
-def _slow(fit: CurveFit, std: float, length: float) -> Array:
-    """Covariance of q that a slow error of the midline makes, carried through the fit.
-
-    The light's error follows the direction of the cable against the light, a smooth function of s; that of the edges'
-    waves what lies along them: Gaussian correlation.
-    """
-    return np.asarray(fit.smooth.gain @ slow_covariance(fit.s[fit.weight > 0.0], ((std, length),)) @ fit.smooth.gain.T)
-
-
-def _width_excess(fit: CurveFit, off_width: Array, covariance: Array, options: CurveSettings) -> float:
-    """Ratio, at least 1, of the errors of the curvature to those that scatter and light tell.
-
-    The cable's width is constant, so half of what the measured width varies is an error of the edges that no bend of
-    the cable can pass for: carried through the fit like the midline's, it is what the midline's errors do to kappa.
-    The ratio is that of each point: the ends, ten times less certain than the rest, would speak for all.
-    """
-    used = fit.weight > 0.0
-    half, s = 0.5 * off_width[used], fit.s[used]
-    bend = fit.curve.curvature_basis(s)
-    ratio = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half) / _std(bend, covariance)) ** 2)))
-    return ratio if ratio > options.width_excess else 1.0
-
-
-def _length_std(fit: CurveFit, s: Array, normal: Array, covariance: Array) -> float:
-    """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
-    row = np.trapezoid(fit.curve.curvature(s)[:, None] * normal, s, axis=0)
-    return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

@@ -45,6 +45,7 @@ from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_pro
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
 from pipeline.vision.median import median, medians
 
+_WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _MEDIAN = 15  # sections of a running median: two to three diameters
 
 
@@ -194,9 +195,21 @@ def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
     A pale sleeve before a pale ground leaves the edges of shadows and shades, 0.3 diameters off.
     """
     middle = median(width)
-    smooth, own = (np.abs(w - middle) > settings.width_departure * middle for w in (_running_median(width), width))
+    off = np.abs(width - middle)
+    # An outline may wave; and edges of webcams and JPEG are found to a third of a pixel, whatever the width.
+    limit = max(settings.width_departure * middle, 4.0 * 1.4826 * median(off), _WIDTH_FLOOR)
+    smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
+
+
+def slow_part(s: Array, values: Array, order: int) -> Array:
+    """What of ``values`` (n,) follows a polynomial of ``s``, outliers clipped, without its mean."""
+    off = values - median(values)
+    spread = 1.4826 * median(np.abs(off))
+    slow = np.polynomial.legendre.legvander(2.0 * (s - s.min()) / max(float(np.ptp(s)), 1e-300) - 1.0, order)
+    fitted = slow @ np.linalg.lstsq(slow, np.clip(off, -4.0 * spread, 4.0 * spread), rcond=None)[0]
+    return np.asarray(fitted - fitted.mean())
 
 
 def _running_median(values: Array) -> Array:

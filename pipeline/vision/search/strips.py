@@ -148,7 +148,7 @@ def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[tuple[float
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
     ridge = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.3)
     widths = 2.0 * depth[ridge]
-    edges = np.geomspace(2.0, max(mask.shape) / 25.0, 20)
+    edges = np.geomspace(2.0, max(max(mask.shape) / 25.0, 4.0), 20)  # a picture of 50 cells has some width too
     counts = np.histogram(widths, edges)[0].astype(np.float64)
     # A ridge is up to as thick as the strip's cells allow; neighbouring bins belong to the same strip.
     pooled = np.convolve(counts, [0.5, 1.0, 0.5], mode="same")

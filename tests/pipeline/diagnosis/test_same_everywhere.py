@@ -42,7 +42,7 @@ BORDERLINE = [
     ("six", "displacement_offset", 4.246e-6, DISPLACED, ""),
     ("six", "displacement_offset", 4.260e-6, DISPLACED, "displacement_offset length_error"),
     ("loop", "bearing_friction", 7.58e-5, TURNING_BACK, ""),
-    ("loop", "bearing_friction", 7.62e-5, TURNING_BACK, "bearing_friction plastic_set hysteresis"),
+    ("loop", "bearing_friction", 7.62e-5, TURNING_BACK, "bearing_friction plastic_set"),
     ("loop", "force_offset", 0.01109, LOADS, ""),
     ("loop", "force_offset", 0.01116, LOADS, "force_offset in_plane_load displacement_offset"),
 ]

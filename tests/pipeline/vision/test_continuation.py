@@ -106,9 +106,10 @@ def test_band_covers_the_truth_when_covers_are_seen_too_far_apart(cases):
         assert np.mean(off_by < 1.96) > 0.85, off  # 24 ends: two of a true 95 % band fall outside once in three times
 
 
-def test_axes_of_visible_ends_tell_nothing(cases):
-    here, there = (_errors(cases[0], kinds=("end", "cover"), beside=off)[0] for off in (0.0, 1e-3))
-    np.testing.assert_allclose(here, there, rtol=1e-9)
+def test_axes_of_visible_ends_tell_roughly_where_the_curve_ends(cases):
+    """Off by a quarter of the width, as far as a search may put them: no more than a part of what is stated."""
+    (here, std), (there, _) = (_errors(cases[0], kinds=("end", "cover"), beside=off) for off in (0.0, 1e-3))
+    assert (np.abs(np.asarray(here) - there) < 0.3 * np.asarray(std)).all()
 
 
 @pytest.mark.parametrize("off", [{}, {"apart": 4e-4, "beside": 2e-4}], ids=["flat", "parallax"])

@@ -9,6 +9,7 @@ import pytest
 from pipeline.records import Centerline, Rejected, RigSpec
 from pipeline.vision import series as series_module
 from pipeline.vision import shots as shots_module
+from pipeline.vision import single as single_module
 from pipeline.vision import trace_series
 from pipeline.vision.guard import jointly
 from tests.pipeline.vision.test_series import FLAT, SETTINGS, lines, series
@@ -44,7 +45,8 @@ def test_work_on_all_photos_that_always_breaks_costs_none(tmp_path: Path, monkey
 def test_photo_that_breaks_the_program_costs_that_photo_alone(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = shots_module if stage in ("load_photo", "find_cable") else series_module
+    modules = {"load_photo": shots_module, "find_cable": shots_module, "with_strip": single_module}
+    module = modules.get(stage, series_module)
     sound, calls = getattr(module, stage), []
 
     def broken(*args: object, **named: object) -> object:

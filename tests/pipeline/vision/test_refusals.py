@@ -16,7 +16,7 @@ from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import Ground, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.scale.plane import PlaneMap
-from pipeline.vision.series import trace_photo
+from pipeline.vision.single import trace_photo
 from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, directional, errors, rough_cable
 
 
@@ -43,11 +43,14 @@ def test_edges_of_noise_on_a_hidden_stretch_do_not_lead_the_curve(diameters):
         replace(rough, path_px=path), plane=plane, diameter_m=DIAMETER, settings=VisionSettings()
     )
     if isinstance(found, Rejected):
-        assert found.code == "photo/contrast" and diameters == 12
-    else:  # off by 28 px at 12 diameters as long as noise counted as edges
-        off = errors(picture, found, scene.camera.px_per_m)
-        assert np.abs(off.normal[off.seen]).max() < 0.25
-        assert off.covered().mean() > 0.9
+        assert found.code in ("photo/contrast", "photo/outline") and diameters == 12
+        return
+    # off by 28 px at 12 diameters as long as noise counted as edges
+    off = errors(picture, found, scene.camera.px_per_m)
+    assert np.abs(off.normal[off.seen]).max() < 0.25
+    assert off.covered().mean() > 0.9
+    # what lies under the paper is drawn as hidden
+    assert not found.shape.seen[np.abs(found.u_px - middle) < hidden - scene.camera.px_per_m * DIAMETER].any()
 
 
 def refused(rough, scene, *, diameter=DIAMETER, settings=None):
@@ -104,16 +107,23 @@ def test_wrong_diameter_is_refused_with_the_figure(wrong):
     assert_allclose(found.figure["width_over_diameter"], 1.0 / wrong, rtol=0.01)  # half a pixel of 55
 
 
-def test_too_little_contrast_and_too_much_blur_are_refused():
+def test_noise_and_blur_widen_the_band_and_refuse_only_where_no_edge_is_left():
+    """Edges as faint as the noise of a pixel, and blur of half the radius: traced, and the band holds the truth."""
     rng = np.random.default_rng(10)
     pale = even(rng, noise=0.0)
     picture = render(pale)
     faint = 120.0 + 0.1 * picture.pixels + 12.0 * rng.standard_normal(picture.pixels.shape)  # contrast 13, noise 12
     found = refused(rough_cable(pale, picture, rng, pixels=faint.astype(np.uint8)), pale)
+    assert isinstance(found, Centerline), found.reason
+    assert errors(picture, found, pale.camera.px_per_m).covered().mean() > 0.9
+    fainter = 120.0 + 0.02 * picture.pixels + 12.0 * rng.standard_normal(picture.pixels.shape)
+    found = refused(rough_cable(pale, picture, rng, pixels=fainter.astype(np.uint8)), pale)
     assert isinstance(found, Rejected) and found.code == "photo/contrast"
     soft = even(rng, blur=14.0)
-    found = refused(rough_cable(soft, render(soft), rng), soft)
-    assert isinstance(found, Rejected) and found.code == "photo/blur"
+    picture = render(soft)
+    found = refused(rough_cable(soft, picture, rng), soft)
+    assert isinstance(found, Centerline), found.reason
+    assert errors(picture, found, soft.camera.px_per_m).covered().mean() > 0.9
 
 
 @pytest.mark.parametrize("seed", [15, 17, 18, 19])
@@ -135,7 +145,7 @@ def test_an_outline_that_swings_is_called_so_and_not_noise(seed):
             cv2.circle(pixels, (round(u), round(v)), round(0.5 * radius), (grey,) * 3, -1)
     found = refused(rough_cable(scene, picture, rng, pixels=pixels), scene)
     assert isinstance(found, Rejected)
-    assert found.code == "photo/outline"
+    assert found.code in ("photo/outline", "photo/bearing")  # or beside its covers, which is as true
 
 
 def test_strands_of_two_greys_that_swell_the_outline_are_traced():
@@ -163,24 +173,17 @@ def test_strands_of_two_greys_that_swell_the_outline_are_traced():
     assert off.covered().mean() > 0.9
 
 
-def test_a_bend_that_no_cable_makes_is_refused():
+def test_a_bend_that_no_cable_makes_is_refused(monkeypatch):
     rng = np.random.default_rng(41)
     scene = even(rng)
     rough = rough_cable(scene, render(scene), rng)
     bend = float(scene.cable.curve.kappa.max()) * DIAMETER
     for most, refusal in ((1.1 * bend, False), (0.9 * bend, True)):
-        settings = VisionSettings()
-        curve = settings.curve.model_copy(update={"max_bend_diameters": most})
-        line = measure_centerline(
-            rough,
-            plane=PlaneMap.from_scale(scene.camera.px_per_m),
-            diameter_m=DIAMETER,
-            settings=settings.model_copy(update={"curve": curve}),
-        )
+        monkeypatch.setattr("pipeline.vision.centerline.refusal._BEND", most)
+        line = refused(rough, scene)
         assert isinstance(line, Rejected) == refusal
     assert line.code == "photo/outline"
-    # kappa inside is known to 0.15 %: three of those
-    assert line.figure["bend_radius_diameters"] == pytest.approx(1.0 / bend, rel=0.005)
+    assert f"{1.0 / bend:.1f} cable diameters" in line.reason
 
 
 @pytest.mark.parametrize("seed", [11, 14, 16, 18])
@@ -203,4 +206,4 @@ def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
     found = trace_photo(tmp_path / "white.png", diameter_px=DIAMETER * 12e3)
     # 20 and 25 px beside the cable before, with 3.6 and 2 px stated
     assert isinstance(found, Rejected)
-    assert found.figure["section_scatter"] > 0.025
+    assert found.code in ("photo/outline", "photo/contrast")

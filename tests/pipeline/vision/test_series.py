@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from pipeline.intake.folder import read_specimen
-from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Side, Specimen, Traces
+from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejected, RigSpec, Side, Specimen, Traces
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import shots as shots_module
@@ -170,9 +170,14 @@ def test_other_photos_tell_where_the_fixed_cover_stands(
     sound = shots_module.find_cable
 
     def misled(
-        photo: Photo, settings: VisionSettings, *, cable: Cable | None = None, near: RoughCable | None = None
+        photo: Photo,
+        settings: VisionSettings,
+        *,
+        cable: Cable | None = None,
+        near: RoughCable | None = None,
+        hints: PhotoHints | None = None,
     ) -> RoughCable | Rejected:
-        found = sound(photo, settings, cable=cable, near=near)
+        found = sound(photo, settings, cable=cable, near=near, hints=hints)
         if photo.name != "step_02.png" or isinstance(found, Rejected) or (near is None and not always):
             return found
         u, v = found.right.center_px
@@ -350,7 +355,7 @@ def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
     sound, asked = shots_module.find_cable, []
 
     def strict(
-        photo: Photo, settings: VisionSettings, *, cable: Cable, near: RoughCable | None
+        photo: Photo, settings: VisionSettings, *, cable: Cable, near: RoughCable | None, hints: PhotoHints | None
     ) -> RoughCable | Rejected:
         asked.append(photo.name)
         told = near is not None and cable.diameter_px is not None and lost != (2,)

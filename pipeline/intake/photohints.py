@@ -1,0 +1,100 @@
+"""``[[photos]]`` of ``specimen.toml`` -> `PhotoHints` by photo: what a person says where the program does not see it.
+
+A photo that is left out leaves its step with its force. Lines about a photo that is no longer there are passed over, so
+that a bad photo can simply be deleted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from pipeline.intake.tomltable import Check, TomlFile, checked_table, flag, number, path_text
+from pipeline.messages import Message
+from pipeline.records import Finding, LoadStep, PhotoHints, inferred
+
+Point = tuple[float, float]
+MOST_POINTS = 10_000
+
+
+def read_hints(source: TomlFile) -> dict[str, PhotoHints]:
+    """Hints by the photo's name relative to the folder.
+
+    Raises
+    ------
+    InputError
+        ``toml/unknown-key``, ``toml/wrong-value``, ``toml/missing-key``.
+    """
+    tables = source.tables.get("photos", [])
+    if not isinstance(tables, list) or any(not isinstance(table, dict) for table in tables):
+        raise source.error(Message("toml/wrong-value.photos"), table="", key="photos")
+    hints: dict[str, PhotoHints] = {}
+    for table in tables:
+        values = checked_table(replace(source, tables={"photos": table}), "photos", CHECKS)
+        if "image" not in values:
+            raise source.error(Message("toml/missing-key.image"), table="photos")
+        name = values.pop("image")
+        hints[name] = PhotoHints(**values)
+    return hints
+
+
+def obeyed(
+    steps: tuple[LoadStep, ...], hints: dict[str, PhotoHints]
+) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
+    """Steps without the photos that are to be left out, and what there is to tell of the hints."""
+    there = {step.image for step in steps}
+    without = {name for name, hint in hints.items() if not hint.use and name in there}
+    findings = [
+        *(inferred("photo/left-out", image=name) for name in sorted(without)),
+        *(inferred("photo/hint-unused", image=name) for name in sorted(hints.keys() - there)),
+    ]
+    kept = tuple(replace(step, image=None) if step.image in without else step for step in steps)
+    return kept, tuple(findings)
+
+
+def _points(least: int, wanted: str) -> Check:
+    def check(value: Any) -> tuple[Point, ...]:
+        if not isinstance(value, list) or not least <= len(value) <= MOST_POINTS:
+            raise ValueError(Message(wanted))
+        if any(not isinstance(point, list) or len(point) != 2 for point in value):
+            raise ValueError(Message(wanted))
+        points = tuple((number(point[0]), number(point[1])) for point in value)
+        if len(set(points)) < least or max(abs(x) for point in points for x in point) > 1e6:
+            raise ValueError(Message("wanted.points", least=least, wanted=Message(wanted)))
+        return points
+
+    return check
+
+
+def _ends(value: Any) -> tuple[Point, Point]:
+    points = _points(2, "wanted.ends")(value)
+    if len(points) != 2:
+        raise ValueError(Message("wanted.ends"))
+    return points[0], points[1]
+
+
+def _region(value: Any) -> tuple[float, float, float, float]:
+    wanted = "wanted.region"
+    if not isinstance(value, list) or len(value) != 4:
+        raise ValueError(Message(wanted))
+    u0, v0, u1, v1 = (number(x) for x in value)
+    if not (u0 < u1 and v0 < v1):
+        raise ValueError(Message(wanted))
+    return u0, v0, u1, v1
+
+
+def _polygons(value: Any) -> tuple[tuple[Point, ...], ...]:
+    wanted = "wanted.polygons"
+    if not isinstance(value, list):
+        raise ValueError(Message(wanted))
+    return tuple(_points(3, wanted)(polygon) for polygon in value)
+
+
+CHECKS: dict[str, Check] = {
+    "image": path_text,
+    "use": flag,
+    "ends_px": _ends,
+    "path_px": _points(2, "wanted.clicks"),
+    "region_px": _region,
+    "exclude_px": _polygons,
+}

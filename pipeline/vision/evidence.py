@@ -1,0 +1,215 @@
+"""How much a strip that was measured looks like a cable, in units of its photo's own noise.
+
+``picture along the measured midline -> steps of both edges against the steps that the ground makes -> Evidence``
+
+Two edges along the seen length, a width as constant as the edges' own scatter lets it be, and nothing of the cable's
+look beside it on both sides. No figure needs a threshold that knows the photo: steps count in standard deviations of
+the same sums taken beside the cable, where there is no edge, so noise, texture and weave of the ground are in them.
+
+Lengths in px and in *widths* of the cable; a block is a piece of the cable one width long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records import Array
+from pipeline.vision.median import median
+
+_PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
+_NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the window along a cable reaches to 2.25
+_SURE = 3.0  # standard deviations; a block's edge that noise passes for once in 700
+_FIRM = 4.0  # the same; of the median block of a strip that leaves no doubt
+_LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper on a third of a cable 0.4 is left
+_LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
+_CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
+_ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
+_ALONG = 5  # sections pooled for the width's constancy: two to three widths, over which an outline's waves average
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a strip.
+
+    Attributes
+    ----------
+    length : px
+        Measured.
+    seen : share
+        Of the blocks, those with both edges three standard deviations above the ground's own steps.
+    edges : ratio
+        Median over the blocks of the weaker edge's step in standard deviations of the ground's.
+    unsteady : ratio
+        Scatter of the width, waves averaged, over what camera and edges explain; about 1 or less on a cable.
+    crossed : (u, v) px or None
+        Where what is beside the strip on both sides looks like the strip itself.
+    """
+
+    length: float = 0.0
+    seen: float = 0.0
+    edges: float = 0.0
+    unsteady: float = np.inf
+    crossed: tuple[float, float] | None = None
+
+    @property
+    def likeness(self) -> float:
+        """From 0 to 1: a cable has two edges all along, of one width, that stand out."""
+        return self.seen * min(1.0, 1.0 / max(self.unsteady, 1e-9)) * min(1.0, self.edges / 6.0)
+
+    @property
+    def value(self) -> float:
+        """To rank strips of one photo: px of cable, each as sure as it is."""
+        return self.length * self.likeness
+
+    @property
+    def clear(self) -> bool:
+        """Nothing to be weighed: no other reading of the photo need be looked at."""
+        return self.seen >= 0.9 and self.edges >= _FIRM and self.unsteady <= 1.0 and self.crossed is None
+
+    @property
+    def enough(self) -> bool:
+        """More for a cable than against it: its band may be wide, but it is the band of a cable."""
+        return self.likeness >= _LEAST_LIKENESS and self.edges >= _SURE
+
+
+@dataclass(frozen=True)
+class Course:
+    """A strip on a picture.
+
+    Attributes
+    ----------
+    grey : (h, w)
+        Window of the photo, one grey value.
+    origin_px : (u, v) px
+        Photo pixel of ``grey[0, 0]``.
+    dark : bool
+        The strip is darker than its ground in ``grey``.
+    middle : (n, 2) px
+        Points about evenly along it, at most a quarter of its width apart or so.
+    across : (n, 2)
+        Unit vectors from its one edge to the other.
+    """
+
+    grey: NDArray[np.float32]
+    origin_px: tuple[int, int]
+    dark: bool
+    middle: Array
+    across: Array
+
+
+def weigh(course: Course, widths: Array, *, std: float, share: float = 1.0, branching: bool = False) -> Evidence:
+    """The evidence for a strip.
+
+    Parameters
+    ----------
+    course : Course
+    widths : (m,) px
+        Of the strip along it.
+    std : px
+        Of a width, by what scatter its edges have.
+    share : float
+        Of the length asked for, on which widths were found.
+    branching : bool
+        Something seems to leave the strip: one side that looks like it is then enough for a crossing.
+    """
+    middle, width = course.middle, median(widths)
+    gap = median(np.hypot(*np.diff(middle, axis=0).T))
+    each = max(1, round(width / max(gap, 1e-9)))
+    length = gap * (len(middle) - 1)
+    if len(middle) < 4 * each:
+        return Evidence(length)
+    picture, offset = _straightened(course, width)
+    blocks = _blocks(picture, each)
+    reach = max(1, round(0.25 * width / (offset[1] - offset[0])))
+    ground = _steps(blocks, offset, np.concatenate([np.array(_NULL), -np.array(_NULL)]) * width, reach)
+    noise = float(np.hypot(1.4826 * median(np.abs(ground - np.median(ground, axis=0))), _LEVEL))
+    weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
+    return Evidence(
+        length=length,
+        seen=float(np.mean(weaker > _SURE)) * share,
+        edges=median(weaker),
+        unsteady=_unsteady(widths, width, std),
+        crossed=_crossed(picture, offset / width, middle, max(1, each // 4), sides=1 if branching else 2),
+    )
+
+
+def _straightened(course: Course, width: float) -> tuple[NDArray[np.float32], Array]:
+    """Grey ``(n, m)`` along the midline with the cable dark, and the offsets of its columns, px."""
+    spacing = max(1.0, width / _PER_WIDTH)
+    offset = np.arange(-np.ceil(2.1 * width / spacing), np.ceil(2.1 * width / spacing) + 1.0) * spacing
+    at = (course.middle - course.origin_px)[:, None, :] + offset[None, :, None] * course.across[:, None, :]
+    u, v = (at[..., k].astype(np.float32) for k in (0, 1))
+    grey = cv2.remap(course.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(grey if course.dark else -grey, np.float32), offset
+
+
+def _blocks(picture: NDArray[np.float32], each: int) -> Array:
+    """Means over ``each`` neighbouring rows."""
+    count = len(picture) // each
+    return np.asarray(picture[: count * each].reshape(count, each, -1).mean(axis=1), np.float64)
+
+
+def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
+    """Step ``(k, p)`` of each block at each place: the ``reach`` columns outward of it less those inward."""
+    total = np.cumsum(np.pad(blocks, ((0, 0), (1, 0))), axis=1)
+    column = np.rint(np.interp(places, offset, np.arange(len(offset)))).astype(int)
+    right = (total[:, column + reach + 1] - total[:, column + 1]) / reach
+    left = (total[:, column] - total[:, column - reach]) / reach
+    return np.asarray((right - left) * np.sign(places))
+
+
+def _unsteady(widths: Array, width: float, std: float) -> float:
+    calm = np.convolve(widths, np.ones(_ALONG) / _ALONG, mode="valid") if len(widths) > _ALONG else widths
+    scatter = 1.4826 * median(np.abs(calm - median(calm)))
+    return scatter / max(_CALM_PX, _CALM * width, 1.5 * std)
+
+
+def _crossed(
+    picture: NDArray[np.float32], offset: Array, places: Array, each: int, *, sides: int
+) -> tuple[float, float] | None:
+    """Where rays from 0.62 widths on look like the core within three widths on so many sides, if anywhere.
+
+    To 1.4 widths where they do on both sides, to two widths where on one: so large is no bolt. Not on the first and
+    last three widths: there covers and clamps are. ``each`` rows of the picture make a ray, four rays a width.
+    """
+    rays = _blocks(picture, each)
+    core = np.median(rays[:, np.abs(offset) < 0.3], axis=1)
+    beside = (np.abs(offset) > 0.62) & (np.abs(offset) < (1.4 if sides == 2 else 2.0))
+    step = _ALIKE * abs(median(rays[:, beside]) - median(core))
+    # where the strip itself is not seen, its ground looks like it
+    like = (np.abs(rays - core[:, None]) < step) & (np.abs(core - median(core)) < step)[:, None]
+    found = [like[:, beside & (side * offset > 0.0)].all(axis=1) for side in (-1.0, 1.0)]
+    near = np.ones(12)
+    if len(rays) <= 2 * len(near):
+        return None
+    met = np.sum([np.convolve(side, near, mode="same") > 0 for side in found], axis=0) >= sides
+    met[: len(near)] = met[-len(near) :] = False
+    if not met.any():
+        return None
+    place = places[int(np.argmax(met)) * each]
+    return float(place[0]), float(place[1])
+
+
+def unlike_a_cable(evidence: Evidence) -> tuple[str, str]:
+    """Code and reason of a refusal: the figure that is farthest from that of a cable."""
+    edges, steady = evidence.edges / 6.0, 1.0 / max(evidence.unsteady, 1.0)
+    if evidence.edges < _FIRM or edges <= min(evidence.seen, steady):
+        return (
+            "photo/contrast",
+            f"the cable's weaker edge stands out of the ground by {evidence.edges:.1f} times the noise and texture"
+            " beside it only; a ground of another brightness or colour helps",
+        )
+    if evidence.seen <= steady:
+        return (
+            "photo/outline",
+            f"two edges of one strip are seen on {100.0 * evidence.seen:.0f} % of its length only",
+        )
+    return (
+        "photo/outline",
+        f"the width of what was traced varies {evidence.unsteady:.1f} times as much as noise and an outline's waves"
+        " explain; a cable's does not",
+    )
