@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.statistics.score import descending, scores_of_noise
+from pipeline.diagnosis.statistics.score import descending
 
 Array = NDArray[np.float64]
 
@@ -60,20 +60,3 @@ def best_pairs(gains: Array, owner: NDArray[np.int_], *, count: int) -> list[Pai
             seen.add(names)
             found.append(Pair(int(row[at]), int(column[at]), float(value[at])))
     return found
-
-
-def null_pair_gain(
-    unit: Array,
-    sign: Array,
-    owner: NDArray[np.int_],
-    *,
-    collinear: float,
-    level: float,
-    draws: int,
-    rng: np.random.Generator,
-) -> float:
-    """Gain the best pair exceeds with probability ``level`` when nothing is wrong: draws of scores N(0, U^T U)."""
-    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
-    scores = scores_of_noise(unit, draws=draws, rng=rng)
-    best = [float(pair_gains(z, cosine, sign, owner, collinear=collinear).max(initial=0.0)) for z in scores]
-    return float(np.quantile(best, 1.0 - level))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.statistics.pairs import best_pairs, null_pair_gain, pair_gains
+from pipeline.diagnosis.statistics.pairs import best_pairs, pair_gains
 from pipeline.diagnosis.statistics.score import score
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 
@@ -36,14 +36,6 @@ def test_forms_of_one_cause_and_wrong_signs_make_no_pair(scored):
     sign = np.array([0, 0, 0, 0, 1, 0])  # direction 4 enters with a negative amount
     gains = pair_gains(found.z, cosines(found.unit), sign, owner, collinear=0.999)
     assert gains[0, 1] == 0.0 and gains[2, 4] == 0.0 and gains[2, 3] > 0.0
-
-
-def test_best_pair_of_noise_alone_is_that_of_two_independent_scores():
-    """Two orthogonal directions have one pair, whose gain is chi-square of two degrees: 1 % exceed -2 log 0.01."""
-    rng = np.random.default_rng(4)
-    owner, sign = np.arange(2), np.zeros(2)
-    found = null_pair_gain(np.eye(5)[:, :2], sign, owner, collinear=0.985, level=0.01, draws=20000, rng=rng)
-    assert found == pytest.approx(-2.0 * np.log(0.01), rel=0.05)  # 200 draws lie beyond: 3 sigma are 5 %
 
 
 def test_nearest_twin():
