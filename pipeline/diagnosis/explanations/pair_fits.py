@@ -33,7 +33,7 @@ def linear_pairs(bench: Workbench, settings: DiagnosisSettings) -> list[Pair]:
     suspicion = bench.suspicion
     cosine = cosines(suspicion.scores.unit)
     gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner, collinear=settings.pair_collinear)
-    # a place or width that is tuned costs two of chi-square (Akaike): a smooth form that does nearly as well comes first
+    # a tuned place or width costs two of chi-square (Akaike): a smooth form that does nearly as well comes first
     cost = 2.0 * np.array([len(term.variant.tuned) for term in suspicion.terms])
     gains = np.maximum(gains - cost[:, None] - cost, 0.0)
     pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
