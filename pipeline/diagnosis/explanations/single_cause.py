@@ -110,12 +110,17 @@ def _by_setting(
     """The best fit of a single form of a cause for each setting; empty where no form can be simulated."""
     to_the_noise = settings.fits * (len(base.residual) - base.extension.size)
     best: dict[str, Fit] = {}
+    enough: set[str] = set()
     for direction in _first_forms(suspicion, cause):
-        if any(one.converged and one.chi2 < to_the_noise for one in best.values()):
-            break
+        # a law of any form beside the wrong kind of a cause may leave no more than noise, so each kind is tried
+        label = suspicion.terms[direction].variant.label
+        if label in enough:
+            continue
         found = _fit_form(observation, base, suspicion, direction, settings, hopeless=hopeless)
         if found is None:
             continue
+        if found.converged and found.chi2 < to_the_noise:
+            enough.add(label)
         setting = suspicion.terms[direction].variant.setting
         best[setting] = min(best.get(setting, found), found, key=_cost)
         if found.chi2 >= hopeless and _are_starts_only(suspicion, cause):
