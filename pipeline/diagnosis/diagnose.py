@@ -93,7 +93,7 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
     search = searched(bench, settings)
     first = conclusion_of(bench, search, settings)
     chance, std = _scatter(bench, first)
-    if chance < 0.5:
+    if first.alien or chance < 0.5:  # scatter is among the error models: where something else is likelier, it is none
         return faults, bench, first
     scattered = with_scatter(faults, std)
     again = prepare(scattered, settings, knots=settings.knots)

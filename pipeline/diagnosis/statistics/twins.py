@@ -29,9 +29,13 @@ def between_causes(cosine: Array, owner: Owner, count: int) -> Array:
     return table
 
 
+DIGITS = 5
+"""Of a cosine: where few data leave few directions many causes are exact twins, and rounding would choose among them."""
+
+
 def nearest(table: Array) -> tuple[NDArray[np.int_], Array]:
     """Index and cosine of the nearest twin of each cause; index -1 where a cause has none."""
     others = table - np.diag(np.diag(table)) - np.eye(len(table))
-    index = np.argmax(others, axis=1)
+    index = np.argmax(np.round(others, DIGITS), axis=1)
     value = others[np.arange(len(table)), index]
     return np.where(value > 0.0, index, -1), np.maximum(value, 0.0)
