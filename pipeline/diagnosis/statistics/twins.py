@@ -30,7 +30,7 @@ def between_causes(cosine: Array, owner: Owner, count: int) -> Array:
 
 
 DIGITS = 5
-"""Of a cosine: where few data leave few directions many causes are exact twins, and rounding would choose among them."""
+"""Of a cosine: few data leave few directions, many causes are exact twins there, and rounding would choose."""
 
 
 def nearest(table: Array) -> tuple[NDArray[np.int_], Array]:
