@@ -27,6 +27,8 @@ import numpy as np
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.posterior.explanation import Explanation
 
+Word = Literal["base", "causes", "rest"]
+
 SHARES = {0: (0.55, 0.05), 1: (0.30, 0.03), 2: (0.06, 0.01)}
 """Probability beforehand by the number of causes, without and with something else."""
 
@@ -67,10 +69,11 @@ class Posterior:
         )
 
     @property
-    def word(self) -> Literal["base", "causes", "rest"]:
+    def word(self) -> Word:
         """What is likeliest."""
         base, rest = self.total(count=0, something_else=False), self.total(something_else=True)
-        return max((("base", base), ("causes", 1.0 - base - rest), ("rest", rest)), key=lambda pair: pair[1])[0]  # type: ignore[return-value]
+        chances: dict[Word, float] = {"base": base, "causes": 1.0 - base - rest, "rest": rest}
+        return max(chances, key=lambda word: chances[word])
 
     def of(self, cause: int) -> float:
         """Probability of all that hold a cause and nothing else."""
