@@ -29,7 +29,7 @@ from pipeline.diagnosis.explanations.pair_fits import (
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.displacements import displacement_columns
 from pipeline.diagnosis.fits.fit import Fit, fit_from
-from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
@@ -108,16 +108,18 @@ class Search:
                 rival = min(rival, one.fitted.chi2)
                 yield one
 
-    def pairs(self, best: Explanation | None, linear: list[Pair]) -> None:
+    def beside(self, best: Explanation) -> Suspicion:
+        """Scores of all causes about the best single cause."""
+        settings, causes = self.settings, self.bench.suspicion.causes
+        return suspect(self.bench.observation, best.fitted, causes, visible=settings.visible, trace=settings.trace)
+
+    def pairs(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> None:
         """Refit pairs: of the linear search, and what scores beside the best single cause."""
         bench, settings = self.bench, self.settings
         self.effort = Effort.of(settings.search_newton_steps)
         hopeless = bench.base.chi2 if best is None else best.fitted.chi2
         found = refitted_pairs(bench, linear, settings, hopeless=hopeless, effort=self.effort)
-        if best is not None:
-            second = suspect(
-                bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
-            )
+        if best is not None and second is not None:
             found += beside_best(bench, best, second, settings)
         found = self.add(found)
         self.add(list(self._pruned(found)))
@@ -147,17 +149,14 @@ class Search:
                 reached[left] = min(rest.chi2, reached.get(left, np.inf))
                 yield explanation_of(left, self.bench.base, rest)
 
-    def pairs_speak(self, best: Explanation | None, linear: list[Pair]) -> bool:
+    def pairs_speak(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> bool:
         """Whether two causes, or something else, may explain more than the best single cause."""
-        bench, settings = self.bench, self.settings
+        bench = self.bench
         for pair in linear[:1]:
             own = weighed(self.grid, linear_fit(bench, pair)).own
             causes = (int(bench.suspicion.owner[pair.first]), int(bench.suspicion.owner[pair.second]))
             self.hypotheses.append(Hypothesis(causes, own.plain, own.rest))
-        if best is not None:
-            second = suspect(
-                bench.observation, best.fitted, bench.suspicion.causes, visible=settings.visible, trace=settings.trace
-            )
+        if best is not None and second is not None:
             beside = weighed(self.grid.plain, best.fitted, second)
             mine = next(one for one in self.hypotheses if one.found is best)
             for cause, (plain, _) in beside.further.items():
@@ -196,7 +195,8 @@ def _foreseen(bench: Workbench, found: Explanation) -> bool:
 def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
     """All hypotheses about a specimen that are worth it, weighed."""
     search = Search(bench, settings)
-    linear = [pair for pair in linear_pairs(bench, settings) if pair.gain > bench.largest**2 + settings.masked_least]
+    every = linear_pairs(bench, settings)
+    linear = [pair for pair in every if pair.gain > bench.largest**2 + settings.masked_least]
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     if silent and first.word == "base" and not linear and bench.largest < bench.limit:
@@ -204,6 +204,7 @@ def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
     singles = search.singles()
     believed = search.posterior.explanations(count=1)
     best = believed[0].found if believed else max(singles, key=lambda e: e.gain, default=None)
-    if search.pairs_speak(best, linear):
-        search.pairs(best, linear or linear_pairs(bench, settings))
+    second = None if best is None else search.beside(best)
+    if search.pairs_speak(best, second, linear):
+        search.pairs(best, second, linear or every)
     return search
