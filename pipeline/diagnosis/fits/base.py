@@ -35,6 +35,9 @@ AXES = ("left_along", "left_across", "right_along", "right_across", "parallax")
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
 
+FLOOR = 0.02
+"""Share of the largest ordinate below which no law starts: beyond its own control points a spline may fall to zero."""
+
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
 
@@ -204,6 +207,10 @@ class Base:
         """Change (k, p) of the law at ``knots`` (k,) per unit of the first p parameters, N m^2."""
         own = np.array_equal(knots, self.knots)
         return (np.eye(len(knots)) if own else self._cardinal(knots)) * self.ordinates(vector)
+
+    def following(self, law: Characteristic) -> Array:
+        """Parameters (p,) of this law's control points that lie on another law, as far as that is stiff enough."""
+        return np.asarray(np.log(np.maximum(law.f(self.knots), FLOOR * float(np.max(law.ordinates))) / self.stiffness))
 
     def ordinates(self, vector: Array) -> Array:
         """Control points (p,) of the law, N m^2."""

@@ -58,14 +58,9 @@ def with_exact_displacements(
     known, given = exact.extension.base, scattered.extension.base
     law, moved, first = given.characteristic(scattered.vector), len(given.moved), len(given.knots)
     rest = np.delete(scattered.vector[first:], np.arange(moved) + len(given.names) - 2 - moved - first)
-    ordinates = np.log(np.maximum(law.f(known.knots), FLOOR * float(np.max(law.ordinates))) / known.stiffness)
     extension = replace(scattered.extension, base=known, facts=exact.extension.facts)
-    found = fit_from(observation, extension, np.r_[ordinates, rest], exact, settings)
+    found = fit_from(observation, extension, np.r_[known.following(law), rest], exact, settings)
     return None if found.run.prediction is None else found
-
-
-FLOOR = 0.02
-"""Share of the largest ordinate below which no law starts: beyond its own control points a spline may fall to zero."""
 
 
 def with_scatter(faults: Faults, std: float) -> Faults:

@@ -18,8 +18,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.law import LAW
-from pipeline.diagnosis.fits.extended import law_of
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.search import suspect
@@ -33,9 +31,6 @@ Array = NDArray[np.float64]
 
 TAUS = (0.05, 60.0)
 """Range of the roughness of log f that is averaged over: from nearly straight to a change by a factor e^7."""
-
-FLOOR = 0.02
-"""Share of the largest ordinate below which none starts: beyond its own control points a spline may fall to zero."""
 
 FORGOTTEN = 100.0
 """Plausible sizes: prior of the amount of a cause where data tell nothing of it, so that its band is not infinite."""
@@ -84,7 +79,7 @@ def identified_again(
     if fitted.extension.base.straight or len(fitted.extension.base.knots) < 3:
         return Identified(fitted, fitted.covariance)
     tau, slope = FIRST_SIZES
-    extension, vector = _with_fine_law(fitted, settings.knots_identified)
+    extension, vector = with_knots(fitted, settings.knots_identified)
     base = replace(extension.base, roughness=tau, rest_slope=slope, places=None)
     rich = _fit(observation, replace(extension, base=base), vector, fitted, settings)
     if rich is None:
@@ -113,16 +108,6 @@ def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, err
     shift = np.zeros(count)
     shift[observation.rows.force] = np.concatenate(rows)
     return np.asarray(response @ (fitted.jacobian[:count].T @ (_weights(observation, fitted) ** 2 * shift)))
-
-
-def _with_fine_law(fitted: Fit, count: int) -> tuple[Extension, Array]:
-    """The model with a law of ``count`` control points; what a cause added to the law is part of that."""
-    extension, vector = with_knots(fitted, count)
-    whole = law_of(fitted).f(extension.base.knots)
-    ordinates = np.log(np.maximum(whole, FLOOR * float(np.max(whole))) / extension.base.stiffness)
-    in_law = [k for k, term in enumerate(extension.terms) if term.cause.name == LAW]
-    extension, vector = extension.without(vector, in_law)
-    return extension, np.r_[ordinates, vector[count:]]
 
 
 def _fit(

@@ -167,10 +167,9 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
 def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
     """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
     knots, base = place_knots(0.0, float(fitted.excess.max()), count), fitted.extension.base
-    law = base.characteristic(fitted.vector)
-    ordinates = np.log(np.maximum(law.f(knots), 0.02 * float(np.max(law.ordinates))) / base.stiffness)
-    extension = replace(fitted.extension, base=replace(base, knots=knots))
-    return extension, np.r_[ordinates, fitted.vector[len(base.knots) :]]
+    moved = replace(base, knots=knots)
+    ordinates = moved.following(base.characteristic(fitted.vector))
+    return replace(fitted.extension, base=moved), np.r_[ordinates, fitted.vector[len(base.knots) :]]
 
 
 def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
