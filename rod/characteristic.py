@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,7 +65,6 @@ class MomentCurve(Protocol):
         """Energy per length int_{K0}^{K} m dk, N."""
 
 
-@runtime_checkable
 class ParametricCurve(MomentCurve, Protocol):
     """A moment curve with numbers that a fit may move: control points, or coefficients."""
 
@@ -75,6 +74,11 @@ class ParametricCurve(MomentCurve, Protocol):
 
     def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment by them at fixed curvature, (n, p)."""
+
+
+def parametric(law: MomentCurve) -> TypeGuard[ParametricCurve]:
+    """Whether a law has numbers that a fit may move; to ask the Protocol itself takes as long as a Newton step."""
+    return hasattr(law, "moment_by_parameters")
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,17 +263,21 @@ class Characteristic:
         p, excess, secant = self._pieces, self.abscissa == "excess", self.reading == "secant"
         table = np.vstack([p.f, p.F])
         rest = evaluate(p.F, p.cardinal, np.zeros(1) if excess else K0)
+        uniform = rest.size == 1
+        if uniform:
+            table[4] -= rest
 
         def moment_and_tangent(K: Array) -> tuple[Array, Array]:
-            D = K - K0
-            u = D if excess else K
+            u = K - K0 if excess else K
             segment = p.cardinal.breaks.searchsorted(u)
             t = u - p.cardinal.origin.take(segment)
             f0, f1, f2, f3, F0, F1, F2, F3, F4 = table.take(segment, axis=1)
             f = ((f3 * t + f2) * t + f1) * t + f0
             if secant:
+                D = K - K0
                 return f * D, f + ((3.0 * f3 * t + 2.0 * f2) * t + f1) * D
-            return (((F4 * t + F3) * t + F2) * t + F1) * t + (F0 - rest), f
+            rise = (((F4 * t + F3) * t + F2) * t + F1) * t + F0
+            return rise if uniform else rise - rest, f
 
         return moment_and_tangent
 

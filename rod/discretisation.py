@@ -113,6 +113,17 @@ class Rod:
         return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
 
     @cached_property
+    def arc_lengths(self) -> Array:
+        """Arc length at the vertices, the axes and the joints, (n + 3,) m."""
+        return np.concatenate(([0.0], np.cumsum(self.edges)))
+
+    @cached_property
+    def right_share(self) -> Array:
+        """Share of the edge on the right in the angle at each inner joint, (n - 1,): that of the other's length."""
+        inner = self.edges[1:-1]
+        return np.asarray(inner[:-1] / (inner[:-1] + inner[1:]))
+
+    @cached_property
     def length_beyond(self) -> Array:
         """Length to the right of each edge's middle, (n + 2,) m."""
         return np.asarray(0.5 * self.edges + (self.length - np.cumsum(self.edges)))

@@ -194,15 +194,15 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     rod, memory, angles, R = system.rod, system.memory, trial.angles, trial.R
     h, n = rod.edges, rod.edges.size
     path, (theta, kappa, moment) = np.zeros((2, n + 1)), np.zeros((3, n + 1))
-    np.cumsum(h * system.directions(system.edge_state(angles, R)), axis=1, out=path[:, 1:])
-    theta[2:-2] = (angles[1:-2] * h[2:-1] + angles[2:-1] * h[1:-2]) / (h[1:-2] + h[2:-1])
+    np.cumsum(h * system.directions(trial.balance.edge), axis=1, out=path[:, 1:])
+    theta[2:-2] = angles[1:-2] + rod.right_share * (angles[2:-1] - angles[1:-2])
     theta[:2], theta[-2:] = angles[0], angles[-1]
     kappa[1:-1], moment[1:-1] = trial.balance.K, trial.balance.m
     moment[0], moment[-1] = moment[1], moment[-2]
     keep = slice(0 if h[0] else 1, n + 1 if h[-1] else n)
     load = rod.vertex_load
     return Equilibrium(
-        s=np.concatenate(([0.0], np.cumsum(h)))[keep],
+        s=rod.arc_lengths[keep],
         x=path[0, keep],
         y=path[1, keep],
         theta=theta[keep],

@@ -9,6 +9,7 @@ Units: rad, N, m; tolerances are relative to EI and length.
 from __future__ import annotations
 
 from enum import Enum
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -103,7 +104,7 @@ def newton(system: System, start: Start) -> Trial:
     for count in range(1, ITERATIONS + 1):
         dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
         step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
-        if not np.isfinite(step):
+        if not isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
         share = min(1.0, STEP_LIMIT / step) if step else 1.0
         # Friction makes the residual piecewise linear: a step across a kink may overshoot and is then shortened.
@@ -115,7 +116,7 @@ def newton(system: System, start: Start) -> Trial:
                 break
             share *= 0.5
         angles, R, balance, norm = angles_new, R_new, tried, norm_new
-        if not np.isfinite(norm):
+        if not isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
             return Trial(angles, R, balance, count, Outcome.CONVERGED)

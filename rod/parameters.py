@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, MomentCurve, ParametricCurve
+from rod.characteristic import Array, MomentCurve, parametric
 
 Basis = ArrayLike | Callable[[Array], ArrayLike] | Sequence[Callable[[Array], ArrayLike]]
 
@@ -108,17 +108,26 @@ class Directions:
     @cached_property
     def geometric(self) -> bool:
         """Whether any edge changes its length."""
-        return bool(np.any(self.edges))
+        return bool(self.edges.any())
+
+    @cached_property
+    def weights(self) -> Array:
+        """Change of the joint weights with the edges, (q, n)."""
+        inner = 0.5 * self.edges[:, 1:-1]
+        weights = np.zeros((inner.shape[0], inner.shape[1] + 1))
+        weights[:, 1:] += inner
+        weights[:, :-1] += inner
+        return weights
 
     @cached_property
     def lawful(self) -> bool:
         """Whether any control point changes."""
-        return bool(np.any(self.ordinates))
+        return bool(self.ordinates.any())
 
     @cached_property
     def profiled(self) -> bool:
         """Whether the stiffness profile changes."""
-        return bool(np.any(self.profile))
+        return bool(self.profile.any())
 
     def has(self, *names: str) -> bool:
         """Whether one of these numbers is a parameter."""
@@ -168,7 +177,7 @@ def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions
     names = tuple(name for block in blocks for name in block[0])
     q, joints = len(names), test.rod.section.pre_curvature.size
     law, friction = test.characteristic, test.friction
-    p = law.parameters if isinstance(law, ParametricCurve) else 0
+    p = law.parameters if parametric(law) else 0
     e = 0 if friction is None else friction.stick.size
     pre_curvature, profile, ordinates, edges, slip, stick = (
         np.zeros((q, size)) for size in (joints, joints, p, joints + 1, e, e)
@@ -269,7 +278,7 @@ def _block(test: BendingTest, parameter: Parameter) -> tuple[tuple[str, ...], st
     if given is not None:
         raise ValueError(f"{name} takes no basis")
     if name == "ordinates":
-        if not isinstance(test.characteristic, ParametricCurve):
+        if not parametric(test.characteristic):
             raise ValueError("only a law with parameters has ordinates")
         p = test.characteristic.parameters
         return tuple(f"ordinates[{i}]" for i in range(p)), name, np.eye(p)

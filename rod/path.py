@@ -91,10 +91,10 @@ class Ramp:
 
     def solve(self, point: Point) -> tuple[Array, Array]:
         """Newton's step at a fixed share, and what the state changes by per share."""
-        at, forth = point.start, self.half
+        forth = self.half
         # residuals are at most quadratic in the share: their derivative is a central difference of any width
         ahead, behind, here = self.at(point.state + forth).balance, self.at(point.state - forth).balance, point.balance
-        turning, gap_turning = self.system.clamps_turning(here, *at, self.residual.gradient)
+        turning, gap_turning = self.system.clamps_turning(here, self.residual.gradient)
         rate, gap_rate = ahead.gradient - behind.gradient + turning, ahead.gap - behind.gap + gap_turning
         angles, R = self.system.solve(
             here, -np.column_stack((here.gradient, rate)), -np.column_stack((here.gap, gap_rate))

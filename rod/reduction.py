@@ -78,12 +78,19 @@ class Hold:
         return R if self.tip is None else np.asarray(self.tip, float)
 
 
+class EdgeState(NamedTuple):
+    """Direction of every edge, its sine and cosine (2, n + 2), and the force along and across it (2, n + 2), N."""
+
+    direction: Array
+    force: Array
+
+
 class Balance(NamedTuple):
     """Residuals and Hessian of Lambda at one state; see the module for the symbols.
 
     ``gradient`` (n + 2,) N m; ``diagonal`` (n + 2,) and ``off`` (n + 1,) N m/rad; ``border`` (2, n + 2) m; ``softness``
     (2, 2) m/N without compliance; ``gap`` (2,) m: imposed minus actual position, 0 if not imposed; ``K``, ``m``,
-    ``tangent`` (n + 1,).
+    ``tangent`` (n + 1,); ``edge`` directions and forces of the edges.
     """
 
     gradient: Array
@@ -95,15 +102,7 @@ class Balance(NamedTuple):
     K: Array
     m: Array
     tangent: Array
-
-
-class EdgeState(NamedTuple):
-    """Directions of the edges and the force in them along and across, (n + 2,) each; N."""
-
-    cos: Array
-    sin: Array
-    along: Array
-    across: Array
+    edge: EdgeState
 
 
 class System:
@@ -115,12 +114,13 @@ class System:
         self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
         self._inverse_weights, self._load_beyond = 1.0 / rod.weights, rod.load_beyond
+        self._signed_edges = np.array((rod.edges, -rod.edges))
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
-        self._even_softness = self._axial * rod.length * np.eye(2)
+        self._even_softness = np.array(((self._axial * rod.length, 0.0), (0.0, self._axial * rod.length)))
         self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
-        self._imposed = [i for i, imposed in enumerate(hold.imposed) if imposed]
-        units = [self.force_scale / rod.length] * len(self._imposed) + [1.0 / self.moment_scale]
+        self._imposed = slice(hold.imposed.count(False), 2)  # x and y, y, or none
+        units = [self.force_scale / rod.length] * hold.imposed.count(True) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
 
@@ -153,61 +153,71 @@ class System:
         return self._response(K)
 
     def edge_state(self, angles: Array, R: Array) -> EdgeState:
-        """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
-        cos, sin = np.cos(angles), np.sin(angles)
-        fx, fy = R.tolist() if self._load_beyond is None else R[:, None] + self._load_beyond
-        return EdgeState(cos, sin, fx * cos + fy * sin, fy * cos - fx * sin)
+        """Directions and forces of the edges at ``angles`` (n + 2,) and reaction ``R`` (2,) N."""
+        direction = np.empty((2, angles.size))
+        sin, cos = np.sin(angles, out=direction[0]), np.cos(angles, out=direction[1])
+        if self._load_beyond is None:
+            fx, fy = R.tolist()
+            return EdgeState(direction, np.asarray(np.array(((fy, fx), (-fx, fy))) @ direction))
+        fx, fy = R[:, None] + self._load_beyond
+        return EdgeState(direction, np.array((fx * cos + fy * sin, fy * cos - fx * sin)))
 
     def balance(self, angles: Array, R: Array) -> Balance:
         """Residuals and Hessian at ``angles`` (n + 2,) and reaction ``R`` (2,)."""
-        h = self.rod.edges
         K = (angles[:-1] - angles[1:]) * self._inverse_weights
         m, tangent = self._response(K)
         edge = self.edge_state(angles, R)
-        gradient = -h * self.turning(edge)
+        diagonal, gradient = self._signed_edges * self.turning(edge)
         gradient[:-1] += m
         gradient[1:] -= m
-        off = -tangent * self._inverse_weights
-        diagonal = h * (edge.along if self._difference == 0.0 else self._restoring(edge))
-        diagonal[:-1] -= off
-        diagonal[1:] -= off
-        border = self.border(edge)
-        gap = self._shortfall(edge, border, R)
-        gap[0] = gap[0] + self.hold.chord - self.hold.compliance * R[0] if self.hold.chord is not None else 0.0
-        gap[1] *= self.hold.tip is None
+        stiffness = tangent * self._inverse_weights
+        diagonal[:-1] += stiffness
+        diagonal[1:] += stiffness
+        off, border = -stiffness, self.border(edge)
+        gap = self._gap(edge, border, R)
         self._hold_ends(angles, gradient, diagonal, off, border)
-        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent)
+        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent, edge)
 
-    def _shortfall(self, edge: EdgeState, border: Array, R: Array) -> Array:
-        """Minus the extent of the chain, (2,) m; with EA = GA strains do not depend on direction and sums do."""
+    def _gap(self, edge: EdgeState, border: Array, R: Array) -> Array:
+        """Imposed minus actual position of the right axis, (2,) m; 0 where it is not imposed."""
         if self._difference != 0.0:
-            return np.asarray(-(self.directions(edge) @ self.rod.edges))
-        beyond = 0.0 if self._load_beyond is None else self._load_beyond @ self.rod.edges
-        return np.array((border[1].sum(), -border[0].sum())) - self._axial * (self.rod.length * R + beyond)
+            x, y = (self.directions(edge) @ self.rod.edges).tolist()
+        else:  # with EA = GA strains do not depend on the direction, and sums do
+            force = self.rod.length * R
+            if self._load_beyond is not None:
+                force += self._load_beyond @ self.rod.edges
+            (along, across), (rise, back) = (self._axial * force).tolist(), np.add.reduce(border, 1).tolist()
+            x, y = along - back, across + rise
+        hold = self.hold
+        lacking = 0.0 if hold.chord is None else hold.chord - hold.compliance * float(R[0]) - x
+        return np.array((lacking, -y if hold.tip is None else 0.0))
 
     def directions(self, edge: EdgeState) -> Array:
         """Derivative of position by arc length on every edge, (2, n + 2): tangent, stretch and shear."""
-        stretch, shear = 1.0 + edge.along * self._axial, edge.across * self._shear
-        return np.array((stretch * edge.cos - shear * edge.sin, stretch * edge.sin + shear * edge.cos))
+        (sin, cos), (along, across) = edge
+        stretch, shear = 1.0 + along * self._axial, across * self._shear
+        return np.array((stretch * cos - shear * sin, stretch * sin + shear * cos))
 
     def turning(self, edge: EdgeState) -> Array:
-        """Moment per length that the edge forces exert on the angles, (n + 2,) N."""
+        """What the edge forces do to the angles, per length: restoring stiffness and moment, (2, n + 2) N."""
         if self._difference == 0.0:
-            return edge.across
-        return edge.across * (1.0 + edge.along * self._difference)
+            return edge.force
+        along, across = edge.force
+        stiffness = along + (along**2 - across**2) * self._difference
+        return np.array((stiffness, across * (1.0 + along * self._difference)))
 
     def border(self, edge: EdgeState) -> Array:
         """Derivative of the gradient by R, (2, n + 2) m; minus that of the extent of the edges by the angles."""
-        h = self.rod.edges
-        border = np.array((h * edge.sin, -h * edge.cos))
+        border = self._signed_edges * edge.direction
         if self._difference != 0.0:
-            border *= 1.0 + edge.along * self._difference
-            border -= h * np.array((edge.cos, edge.sin)) * (edge.across * self._difference)
-        return border
+            along, across = edge.force
+            border *= 1.0 + along * self._difference
+            border -= self.rod.edges * edge.direction[::-1] * (across * self._difference)
+        return np.asarray(border)
 
     def softened(self, edge: EdgeState, force: Array) -> Array:
         """Extent of every edge, (2, q, n + 2) m, for a small force (2, q, n + 2) or (2, q, 1) N: h rot C^-1 rot^T."""
-        h, cos, sin = self.rod.edges, edge.cos, edge.sin
+        h, (sin, cos) = self.rod.edges, edge.direction
         if self._difference == 0.0:
             return np.asarray((self._axial * h) * force)
         along, across = self._axial * (cos * force[0] + sin * force[1]), self._shear * (cos * force[1] - sin * force[0])
@@ -217,9 +227,6 @@ class System:
         if self._difference == 0.0:
             return self._even_softness
         return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
-
-    def _restoring(self, edge: EdgeState) -> Array:
-        return edge.along + (edge.along**2 - edge.across**2) * self._difference
 
     def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
         """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
@@ -239,17 +246,17 @@ class System:
         ends = (0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0)
         return [e for e in ends if e[1].kind == "clamp" or e[1].stiffness or e[1].friction_moment or e[1].moment]
 
-    def clamps_turning(self, here: Balance, angles: Array, R: Array, residual: Array) -> tuple[Array, Array]:
+    def clamps_turning(self, here: Balance, residual: Array) -> tuple[Array, Array]:
         """Change of gradient (n + 2,) and gap (2,) while clamps turn by what they lack in ``residual`` (n + 2,) N m.
 
         The Hessian of ``here`` holds them at rest.
         """
-        gradient, gap = np.zeros(angles.size), np.zeros(2)
+        gradient, gap = np.zeros_like(residual), np.zeros(2)
         for end, support, *_ in self._ends:
             if support.kind == "clamp" and (turn := -residual[end] / self.moment_scale):
                 near, joint = (1, 0) if end == 0 else (-2, -1)
                 gradient[near] -= here.tangent[joint] * self._inverse_weights[joint] * turn
-                gap += self.border(self.edge_state(angles, R))[:, end] * turn
+                gap += self.border(here.edge)[:, end] * turn
         return gradient, gap
 
     def solve(self, balance: Balance, rhs: Array, gap: Array) -> tuple[Array, Array]:
@@ -267,45 +274,47 @@ class System:
         dalpha : (n + 2, p) rad, dR : (2, p) N
             Not a number if the matrix is singular.
         """
-        columns, solved, schur = self._eliminated(balance, rhs)
-        k, p = len(self._imposed), rhs.shape[1]
-        low = columns[:, : k + 1].T @ -solved[:, k + 1 :]
-        low[:k] += gap if k == 2 else gap[self._imposed]
+        solved, schur, low = self._eliminated(balance, rhs)
+        k = len(schur) - 1
+        low[:k] += gap[self._imposed]
         _, _, multipliers, info = dgesv(schur, self._scale * low)
-        multipliers = self._scale * multipliers if info == 0 else np.full((k + 1, p), np.nan)
-        dR = np.zeros((2, p))
+        multipliers = self._scale * multipliers if info == 0 else np.full_like(low, np.nan)
+        dR = np.zeros(gap.shape)
         dR[self._imposed] = multipliers[:k]
         return (solved.T[k + 1 :] - multipliers.T @ solved.T[: k + 1]).T, dR
 
     def excess_negatives(self, balance: Balance) -> int:
         """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
-        _, _, schur = self._eliminated(balance, np.zeros((balance.gradient.size, 0)))
-        if not np.all(np.isfinite(schur)):
+        _, schur, _ = self._eliminated(balance, np.empty((balance.gradient.size, 0)))
+        if not np.isfinite(schur).all():
             return 1
+        below = int(np.count_nonzero(dsyev(schur, compute_v=0)[0] < 0.0))
+        return negative_pivots(self._stiffened(balance), balance.off) + below + 1 - len(schur)
+
+    def _stiffened(self, balance: Balance) -> Array:
+        """Diagonal of H with the spring on its middle edge, (n + 2,)."""
         diagonal = balance.diagonal.copy()
         diagonal[self._middle] += self._spring
-        count = negative_pivots(diagonal, balance.off) + int(np.count_nonzero(dsyev(schur, compute_v=0)[0] < 0.0))
-        return count - len(self._imposed)
+        return diagonal
 
     def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
-        """Border columns and right-hand sides, both solved by the stiffened H, and the scaled Schur complement."""
-        k, p = len(self._imposed), rhs.shape[1]
-        columns = np.zeros((rhs.shape[0], k + 1 + p), order="F")
-        columns[:, :k] = balance.border.T if k == 2 else balance.border[self._imposed].T
-        columns[self._middle, k] = -self._spring
-        columns[:, k + 1 :] = rhs
-        diagonal = balance.diagonal.copy()
-        diagonal[self._middle] += self._spring
-        *_, solved, info = dgtsv(balance.off, diagonal, balance.off, columns)
+        """Border and ``rhs`` solved by the stiffened H, the scaled Schur complement, minus border times solved rhs."""
+        imposed = self._imposed
+        k = 2 - imposed.start
+        columns = np.zeros((k + 1 + rhs.shape[1], rhs.shape[0]))
+        columns[:k] = balance.border[imposed]
+        columns[k, self._middle] = -self._spring
+        columns[k + 1 :] = rhs.T
+        *_, solved, info = dgtsv(balance.off, self._stiffened(balance), balance.off, columns.T)
         if info != 0:
-            solved = np.full_like(columns, np.nan)
-        schur = columns[:, : k + 1].T @ -solved[:, : k + 1]
-        softness = balance.softness if k == 2 else balance.softness[self._imposed][:, self._imposed]
-        schur[:k, :k] -= softness
+            solved = np.full_like(solved, np.nan)
+        product = -(columns[: k + 1] @ solved)
+        schur, low = product[:, : k + 1], product[:, k + 1 :]
+        schur[:k, :k] -= balance.softness[imposed, imposed]
         if self.hold.compliance:
             schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
-        return columns, solved, schur * self._scales
+        return solved, schur * self._scales, low
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, ParametricCurve
+from rod.characteristic import Array, parametric
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System
@@ -148,7 +148,7 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     cos, sin = np.cos(rod.mounted.angles), np.sin(rod.mounted.angles)
     turn = rod.weights * moves.pre_curvature
     if moves.geometric:
-        turn += _weights(moves) * rod.section.pre_curvature
+        turn += moves.weights * rod.section.pre_curvature
     relative = -_cumulated(turn)
     along, across = -relative @ (h * sin), relative @ (h * cos)
     if moves.geometric:
@@ -157,23 +157,14 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     return _Rest(relative - across[:, None] / rod.mounted.chord, zero)
 
 
-def _weights(moves: Directions) -> Array:
-    """Change of the joint weights with the edges, (q, n)."""
-    inner = 0.5 * moves.edges[:, 1:-1]
-    weights = np.zeros((inner.shape[0], inner.shape[1] + 1))
-    weights[:, 1:] += inner
-    weights[:, :-1] += inner
-    return weights
-
-
 def _step(
     test: BendingTest, step: Equilibrium, moves: Directions, rest: _Rest, past: _Past
 ) -> tuple[Derivatives, _Past]:
     """Derivatives of one step, and of the memory after it."""
     rod, R = step.rod, step.right_reaction
     system = System(rod, step.hold, step.before)
-    balance, edge = system.balance(step.angles, R), system.edge_state(step.angles, R)
-    border = system.border(edge)
+    balance = system.balance(step.angles, R)
+    edge, border = balance.edge, system.border(balance.edge)
     given = _explicit(test, step, balance, moves, rest, past)
     gradient, gap, extent = _residuals(system, step, balance, edge, given, moves)
     _clamps(system, balance, border, gradient, gap, moves, rest)
@@ -200,7 +191,7 @@ def _explicit(
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):
         load = np.array([_load_beyond(step, moves, axis) for axis in (0, 1)])
-    curvature = -balance.K / rod.weights * _weights(moves) if moves.geometric else np.zeros_like(moves.pre_curvature)
+    curvature = -balance.K / rod.weights * moves.weights if moves.geometric else np.zeros_like(moves.pre_curvature)
     ends = (
         _end_moment(step, moves, rest.angles[:, 0], past.left, side="left"),
         _end_moment(step, moves, rest.angles[:, -1], past.right, side="right"),
@@ -230,12 +221,12 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
         set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
         reads = section.read(K, section.set_at(K, memory))
-    moment = np.zeros_like(move)
+    moment: Array | float = 0.0
     for read in reads:
         by_read = law.moment_by_pre_curvature(read.at, K0) * move
         if read.by_set:
             by_read = by_read + law.tangent(read.at, K0) * (read.by_set * set_move + read.by_rest * move)
-        if isinstance(law, ParametricCurve) and moves.lawful:
+        if moves.lawful and parametric(law):
             by_read = by_read + moves.ordinates @ law.moment_by_parameters(read.at, K0).T
         for column, before, after, by in moves.laws:
             by_read[column] += (after.moment(read.at, K0) - before.moment(read.at, K0)) / by
@@ -243,8 +234,10 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
             by_read = section.profile * by_read
         if moves.profiled:
             by_read = by_read + law.moment(read.at, K0) * moves.profile
-        moment += read.share * by_read
-    return moment if section.friction is None else moment + _friction_moment(section.friction, K, step, moves, past)
+        moment = moment + read.share * by_read
+    if section.friction is not None:
+        moment = moment + _friction_moment(section.friction, K, step, moves, past)
+    return np.asarray(moment)
 
 
 def _friction_moment(friction: InternalFriction, K: Array, step: Equilibrium, moves: Directions, past: _Past) -> Array:
@@ -279,7 +272,7 @@ def _residuals(
 ) -> tuple[Array, Array, Array]:
     """Change of gradient (q, n + 1), gap (2, q) and extent of the edges (2, q, n + 1), angles and reaction fixed."""
     moment = balance.tangent * given.curvature + given.moment
-    gradient = -system.turning(edge) * moves.edges
+    gradient = -system.turning(edge)[1] * moves.edges
     gradient[:, :-1] += moment
     gradient[:, 1:] -= moment
     gradient[:, 0] += given.ends[0]
@@ -289,10 +282,13 @@ def _residuals(
         gradient += balance.border[0] * given.load[0] + balance.border[1] * given.load[1]
         extent += system.softened(edge, given.load)
     if moves.has("axial_flexibility", "shear_flexibility"):
-        along = moves.scalar("axial_flexibility")[:, None] * (step.rod.edges * edge.along)
-        across = moves.scalar("shear_flexibility")[:, None] * (step.rod.edges * edge.across)
-        gradient -= edge.across * along - edge.along * across
-        extent += np.array((edge.cos * along - edge.sin * across, edge.sin * along + edge.cos * across))
+        sin, cos = edge.direction
+        stretch, shear = step.rod.edges * edge.force
+        along, across = (
+            moves.scalar(f"{name}_flexibility")[:, None] * by for name, by in (("axial", stretch), ("shear", shear))
+        )
+        gradient -= edge.force[1] * along - edge.force[0] * across
+        extent += np.array((cos * along - sin * across, sin * along + cos * across))
     gap = -extent.sum(axis=2)
     gap[0] += given.position
     if step.hold.force is not None:
@@ -319,10 +315,9 @@ def _derivatives(
 ) -> Derivatives:
     """The record at the vertices that the equilibrium shows."""
     h = step.rod.edges
-    right = h[1:-2] / (h[1:-2] + h[2:-1])
     size = h.size + 1
     theta, kappa, moment = np.zeros((3, dangles.shape[0], size))
-    theta[:, 2:-2] = dangles[:, 1:-2] + right * (dangles[:, 2:-1] - dangles[:, 1:-2])
+    theta[:, 2:-2] = dangles[:, 1:-2] + step.rod.right_share * (dangles[:, 2:-1] - dangles[:, 1:-2])
     theta[:, :2], theta[:, -2:] = dangles[:, :1], dangles[:, -1:]
     kappa[:, 1:-1] = dK
     moment[:, 1:-1] = dm
