@@ -273,8 +273,8 @@ def draw(paper: Paper) -> list[tuple[str, Drawing]]:
 
 
 def _size(name: str) -> tuple[float, float]:
-    """Width and height of a figure, px; those of two halves have them one above the other."""
-    return (400.0, 560.0 if name in ("fig4", "fig5", "fig6") else 300.0)
+    """Width and height of a figure, px: two halves stand one above the other, and a cable is longer than it is high."""
+    return (400.0, {"fig3": 150.0, "fig4": 560.0, "fig5": 560.0, "fig6": 560.0}.get(name, 300.0))
 
 
 def standalone(figure: Drawing) -> str:
