@@ -37,13 +37,11 @@ class MeasuredLaw:
     rest_covariance : (n,) 1/m
         Covariance of log(tangent) with the pre-curvature.
     gains : dict
-        Response of log(tangent) on the grid to the sources of error: what a comparison with another way through the
-        same data needs for the joint uncertainty. ``("curve", step)`` (n, p) per parameter of the curve and
-        ``("force", step)`` (n, 1) per N; then, per standard deviation of what is wrong on all photos alike (step -1),
-        the (n, 1) of `rod.balance.moment_points.CommonErrors` by name, ``("scale", -1)``; per standard deviation of
-        the errors that several forces have in common ``("common_force", -1)`` (n, e); and what a way alone knows:
-        ``("floor", step)`` of the balance equations, per standard deviation of the curvature that no photo
-        resolves, at each point; ``("length", -1)``, ``("zero", -1)`` and ``("along", step)`` of the inverse problem.
+        Response of log(tangent) on the grid to the sources of error, per standard deviation of independent errors: what
+        a comparison with another way through the same data needs for the joint uncertainty. By name and step, -1 for
+        what all photos have in common: ``("photo", step)`` (n, b) of the whitened midline (`rod.midline`), ``("force",
+        step)`` (n, 1), the axes of one photo ``("left_across", step)`` and all that `rod.balance.moment_points` and
+        `rod.inverse.fit_model` name alike, ``("common_force", -1)`` (n, e); and what a way alone knows.
     shortfall : (n, n)
         Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
     loaded_pre_curvature, loaded_pre_curvature_std : 1/m

@@ -32,6 +32,9 @@ from rod.measurement import MeasuredShape
 READINGS = 8
 """Points of the fitted law that are listed; the curve has them all."""
 
+POINTS = 6
+"""Of the points of a photo that the balance equations read, one in so many is drawn: some sixty."""
+
 
 @dataclass(frozen=True)
 class PhotoResidual:
@@ -171,8 +174,8 @@ def balance_part(way: BalanceGraph) -> BalancePart:
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
         curve=curve(way),
-        points_kappa_per_m=_list(np.concatenate([p.kappa for p in way.points])),
-        points_moment_Nm=_list(np.concatenate([p.moment for p in way.points])),
+        points_kappa_per_m=_list(np.concatenate([p.kappa[p.seen][::POINTS] for p in way.points])),
+        points_moment_Nm=_list(np.concatenate([p.moment[p.seen][::POINTS] for p in way.points])),
         pointwise=pointwise,
         checks=way.checks,
     )

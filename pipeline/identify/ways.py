@@ -50,7 +50,7 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
     """`identify` for a test that is measured already."""
     options = inverse_options(settings)
     inverse = estimate(test, options=options)
-    graph = balance(test, options=BalanceOptions(grid=settings.grid))
+    graph = balance(test, options=BalanceOptions(blocks=settings.blocks, grid=settings.grid))
     branches = _branches(test, options)
     found = Identification(
         test=test,

@@ -8,11 +8,10 @@ and the bending stiffness characteristic (tangent reading) is
 
 Strategy: the paper differentiates m and K along s and divides (Eq. 14); that graph is kept for comparison
 (`rod.balance.moment_points.pointwise_graph`), but it is 0/0 at mid-span and biased by noise. Here K is regressed on m,
-once over all photos and both halves. The moment is nearly free of error, so there is no attenuation; what error it has
-(force, bearing axes, scale, position) is carried into the covariance of the residual together with the joint covariance
-of the smooth curve. With that covariance the curvatures weigh as much as the positions behind them: no second
-derivative is taken. The compliance is a positive spline (`rod.compliance_law`), fitted in
-`rod.balance.moment_regression`.
+once over all photos and both halves, and no derivative of a photo is taken: K(m) along the photo, integrated twice, is
+held against the raw midline. The moment is nearly free of error, so there is no attenuation; what error it has (force,
+bearing axes, scale, position) is carried into the covariance of the residual together with that of the midline. The
+compliance is a positive spline (`rod.compliance_law`), fitted in `rod.balance.moment_regression`.
 
 Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; SI units.
 
@@ -40,6 +39,10 @@ from rod.measured_law import Array, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
 
+CONTRADICTION = 2.0
+"""Root mean square of whitened residuals beyond which photos and forces contradict each other."""
+
+
 class BalanceOutcome(Enum):
     """How the balance way ended; the value is advice to the reader."""
 
@@ -64,10 +67,8 @@ class BalanceOptions:
 
     Attributes
     ----------
-    points : int
-        Points per photo: more than a curvature spline has parameters; further ones hold no new information.
-    floor : relative
-        Curvature that no photo resolves, over the range met: the error of the smooth curve's own spline.
+    blocks : int
+        Independent data of one photo at most, see `rod.midline`.
     grid : int
         Points of the reported curve.
     level : float
@@ -76,8 +77,7 @@ class BalanceOptions:
         Bound of the Gauss-Newton method; four or five are usual.
     """
 
-    points: int = 60
-    floor: float = 2e-4
+    blocks: int = 160
     grid: int = 61
     level: float = 0.01
     iterations: int = 25
@@ -96,8 +96,8 @@ class BalanceGraph:
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
     checks : dict
-        See `rod.balance.moment_regression.assumption_checks`; ``misfit_floor_per_m`` is the curvature within which the
-        photos obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
+        See `rod.balance.moment_regression.assumption_checks`; ``noise_factor`` is the factor on the noise within
+        which photos and forces obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
     """
 
     outcome: BalanceOutcome
@@ -127,51 +127,43 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
         With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
     """
     options = options or BalanceOptions()
-    data = moment_points(test, points=options.points)
+    data = moment_points(test, blocks=options.blocks)
     if not any(points.force != 0.0 for points in data):
         return BalanceGraph(BalanceOutcome.NO_PHOTO, points=data)
-    kappa, m = np.concatenate([d.kappa for d in data]), np.concatenate([d.moment for d in data])
+    kappa, m = (np.concatenate([getattr(d, name)[d.seen] for d in data]) for name in ("kappa", "moment"))
     slope, intercept = (float(v) for v in np.polyfit(m, kappa, 1))
     if not slope > 0.0:
         return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
     basis = moment_basis(float(m.min()), float(m.max()), unit=slope)
-    floor = options.floor * slope * basis.span
     beside = test.axis_parallax_std * test.camera_foot_std
     common = CommonErrors(test.scale_std, test.axis_std, test.axis_std, beside, test.axis_parallax_std)
-    model = MomentModel(data, basis, common, floor, force_errors=test.common_force_errors)
+    model = MomentModel(data, basis, common, force_errors=test.common_force_errors)
     rest = next((d for d in data if d.force == 0.0), None)
-    start = intercept if rest is None else float(rest.kappa.mean())
-    at_rest = 1.0 if rest is None else uniform_at_rest(rest, floor)
-    model = replace(model, varying=at_rest < options.level)
-    fitted = _regress_in_spite_of_misfit(model, start, options)
-    if fitted is None:
+    start = intercept if rest is None else float(rest.kappa[rest.seen].mean())
+    at_rest = 1.0 if rest is None else uniform_at_rest(rest, basis.law(np.zeros(basis.size)))
+    found = _regress_in_spite_of_misfit(replace(model, varying=at_rest < options.level), start, options)
+    if found is None:
         return BalanceGraph(BalanceOutcome.STALLED, points=data)
-    blurred, found = fitted
-    checks = assumption_checks(replace(found.model, floor=model.floor), found) | {"misfit_floor_per_m": blurred.floor}
+    checks = assumption_checks(replace(found.model, blur=1.0), found) | {"noise_factor": found.model.blur}
     if rest is not None:
         checks["uniform_at_rest_p"] = at_rest
-    return _graph(blurred, found, checks, options.grid)
+    return _graph(found.model, found, checks, options.grid)
 
 
-def _regress_in_spite_of_misfit(
-    model: MomentModel, start: float, options: BalanceOptions
-) -> tuple[MomentModel, Regression] | None:
-    """Regression; where the photos contradict the one curve beyond their noise, with the contradiction as noise.
+def _regress_in_spite_of_misfit(model: MomentModel, start: float, options: BalanceOptions) -> Regression | None:
+    """Regression; where photos and forces contradict the one curve beyond their noise, the contradiction is noise.
 
-    The floor of the curvature is raised until the residuals agree with it, so the band holds the contradiction, which
-    is reported by the checks. 4 per degree of freedom is far above what noise alone does with more than 20 of them.
+    4 per degree of freedom is far above what noise alone does with more than a hundred of them.
     """
-    photos_noise = model.floor
     for _ in range(8):
         found = regress(model, pre_curvature=start, iterations=options.iterations)
+        misfit = CONTRADICTION
         if found is not None:
             chi2 = sum(float(row.value @ row.value) for row in found.rows)
-            # A raised floor is noise in every row, not only in those that the photo's noise fills.
-            all_rows = model.floor > photos_noise
-            rows = sum(float(row.value.size) if all_rows else row.informative for row in found.rows)
-            if chi2 <= 4.0 * max(rows - model.size, 1.0):
-                return found.model, found
-        model = replace(model, floor=4.0 * model.floor)
+            misfit = float(np.sqrt(chi2 / max(sum(row.value.size for row in found.rows) - model.size, 1)))
+            if misfit <= CONTRADICTION:
+                return found
+        model = replace(model, blur=max(misfit, CONTRADICTION) * model.blur)
     return None
 
 
@@ -179,7 +171,7 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     """Read moment, tangent and secant off the compliance on a grid of curvature, with bands by propagation."""
     curve, p = found.curve, model.size
     K0, errors = float(found.unknowns[p]), model.errors(found.unknowns)
-    met = np.concatenate([d.true_moment(errors) for d in model.data])
+    met = np.concatenate([d.true_moment(errors)[d.seen] for d in model.data])
     # the abscissa was laid along the regression before: beyond it, by a little at most, nothing is known of the law
     ends = np.clip([met.min(), met.max()], curve.basis.moments[0], curve.basis.moments[-1])
     low, high = K0 + curve.bend(ends)
@@ -227,7 +219,6 @@ def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source,
         response = -by_log @ found.posterior.covariance @ model.columns(data, row).T
         for name, columns in row.by_source.items():
             gains[name, data.step.step] = response @ row.whitener @ columns
-        gains["floor", data.step.step] = model.floor * response @ row.whitener
     return gains
 
 
@@ -236,8 +227,8 @@ def _moved_by_forces(model: MomentModel, found: Regression) -> Array:
     moved = np.zeros((found.unknowns.size, len(model.force_errors)))
     for data, row in zip(model.data, found.rows, strict=True):
         by_force = row.whitener @ row.by_source["force"][:, 0]
-        newtons = [errors.get(data.step.step, 0.0) for errors in model.force_errors]
-        moved -= np.outer(found.posterior.covariance @ (model.columns(data, row).T @ by_force), newtons)
+        shares = [errors.get(data.step.step, 0.0) / (model.blur * data.force_std or 1.0) for errors in model.force_errors]
+        moved -= np.outer(found.posterior.covariance @ (model.columns(data, row).T @ by_force), shares)
     return moved
 
 

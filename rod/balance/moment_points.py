@@ -1,10 +1,18 @@
-"""Curvature against moment on each photo, and what moves those points: the data of the balance way.
+"""What one photo says of the law K(m): its moment ``m(s) = P y(s)`` and the positions that a curvature leads to.
 
-One photo becomes up to `points` places along the seen cable with K(s) from the smooth curve and ``m(s) = P y(s)``
-(Eq. 13). The residual against a compliance curve, ``rho = K - K0 - bend(m)``, is moved by the parameters of the
-smooth curve (through K and y together), by the force, and by what all photos have in common: their scale, the errors
-of the bearing axes across the chord, and that the axes are seen above the cable (`CommonErrors`). What each photo adds
-to the errors of the axes is part of the covariance of its curve: it shifts and turns the whole chord frame.
+Along the seen cable the moment is known from the photo alone (Eq. 13). A law and K0 make of it a curvature K(s), and
+that, integrated twice from axis to axis, a midline. It is held against the raw midline of the photo, not the curvature
+against that of a smooth curve: what smoothing rounds off, and how its error runs along the cable, need not be known.
+The smooth curve R(s) with tangent t, normal n and curvature K_c is what positions are counted from. To first order in
+K - K_c the cable lies along the normal at
+
+    u(s) = n(s) . left + turn t(s) . (R(s) - R(0)) - int_0^s (K - K_c)(s') t(s) . (R(s) - R(s')) ds'
+
+with ``left`` the left axis as counted from R(0); the turn at the left axis is free, and at the right one u is given.
+
+The residual is moved by the noise of the midline (directly, and through y and the moment), by the force, by the errors
+of both axes on this photo, and by what all photos have in common: their scale, the errors of the bearing axes across
+the chord, and that the axes are seen above the cable (`CommonErrors`).
 
 Axes and signs: chord frame of `rod.measurement`; SI units.
 """
@@ -16,11 +24,27 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from rod.compliance_law import ComplianceLaw
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
+from rod.midline import Midline, midline
 
 Array = NDArray[np.float64]
+
+CELLS = 400
+"""Of the integral along the cable: where the law has a kink, it is in error by a third of a photo's noise."""
+
+LEAST_SECTIONS = 8
+"""Raw midline points that make a shape."""
+
+TURN = 0.3
+"""Standard deviation of the turn at the left axis, rad: far more than any smooth curve is off by."""
+
+NO_ERROR = 1e-9
+"""Of the length: independent error of a position that keeps the covariance regular where axes are without error."""
+
+AXES = ("left_along", "left_across", "right_along", "right_across")
 
 
 class CommonErrors(NamedTuple):
@@ -40,38 +64,61 @@ class CommonErrors(NamedTuple):
 
 @dataclass(frozen=True)
 class MomentPoints:
-    """Points of one photo.
+    """One photo: n points from axis to axis, and r positions, the blocks of the midline and last the right axis.
 
     Attributes
     ----------
     step : MeasuredStep
-    length : m
-        Traced length of the curve, axis to axis.
     s : (n,) m
     kappa : (n,) 1/m
+        Of the smooth curve.
     y : (n,) m
+        Of the midline.
+    seen : (n,) bool
+        Where no cover hides the cable.
     along : (n,)
         Place on the chord, x / chord.
     centre : m
         y of the picture's centre; zero where that is not known.
     force, force_std : N
         Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
-    by_curve_kappa : (n, p) 1/m, by_curve_y : (n, p) m
-        Derivatives of curvature and y with respect to the curve's parameters, covariance `curve_covariance` (p, p).
+    photo : Midline
+    offset : (r,) m
+        Of the positions from the smooth curve's, which starts at the left axis.
+    by_curvature : (r, n) m^2
+        Derivative of the residual by a curvature of the law.
+    y_by_photo : (n, r - 1)
+        Derivative of y by the blocks of the midline.
+    by_axes : (r, 4)
+        Derivative of the residual by what is added to measured places to count them from the true axes (`AXES`), where
+        it does not act through the moment.
+    by_turn : (r, 1) m
+        Derivative by the turn at the left axis, per rad.
+    axis_std : m
+        Of each coordinate of an axis on this photo.
     """
 
     step: MeasuredStep
-    length: float
     s: Array
     kappa: Array
     y: Array
+    seen: NDArray[np.bool_]
     along: Array
     centre: float
     force: float
     force_std: float
-    by_curve_kappa: Array
-    by_curve_y: Array
-    curve_covariance: Array
+    photo: Midline
+    offset: Array
+    by_curvature: Array
+    y_by_photo: Array
+    by_axes: Array
+    by_turn: Array
+    axis_std: float
+
+    @property
+    def length(self) -> float:
+        """Traced length of the curve, axis to axis, m."""
+        return float(self.s[-1])
 
     @property
     def moment(self) -> Array:
@@ -80,65 +127,99 @@ class MomentPoints:
 
     def true_moment(self, errors: CommonErrors) -> Array:
         """Bending moment P y with the common errors taken back, (n,) N m."""
-        lift = errors.left_across * (1.0 - self.along) + errors.right_across * self.along
-        return self.force * (self.y * (1.0 + errors.scale) + lift + errors.foot_across - errors.parallax * self.centre)
+        return self.force * (self.y * (1.0 + errors.scale) + self.y_by_common[:, 1:] @ np.array(errors[1:]))
+
+    @property
+    def y_by_common(self) -> Array:
+        """Derivative of the true y by the common errors, (n, 5)."""
+        one = np.ones_like(self.y)
+        return np.column_stack([self.y, 1.0 - self.along, self.along, one, -self.centre * one])
+
+    @property
+    def by_common(self) -> Array:
+        """Derivative of the residual by the common errors but the scale where they do not act through y, (r, 4)."""
+        left, right = self.by_axes[:, 1], self.by_axes[:, 3]
+        return np.column_stack([left, right, left + right, -self.centre * (left + right)])
 
 
 @dataclass(frozen=True)
 class Residual:
-    """Residual of one photo against a compliance curve, whitened, and its derivatives (all rows whitened).
+    """Residual of one photo against a law, whitened, and its derivatives (all rows whitened).
 
     `whitener` turns a change of the raw residual into whitened rows. ``by_source`` holds the raw derivatives with
-    respect to the sources of error ``curve`` (n, p) and ``force`` (n, 1). ``informative`` is the number
-    of rows whose noise is the photo's: a curve of p parameters fills only p of n rows, the others hold the floor.
+    respect to the sources of error, each per standard deviation: ``photo`` (r, r - 1), ``force`` (r, 1), `AXES`.
     """
 
     value: Array
     jacobian: Array
     whitener: Array
     by_source: dict[str, Array]
-    informative: float
 
 
-def moment_points(test: MeasuredTest, *, points: int = 60) -> tuple[MomentPoints, ...]:
-    """Points of every step that has a photo, in the order of the test."""
+def moment_points(test: MeasuredTest, *, blocks: int = 160) -> tuple[MomentPoints, ...]:
+    """Points of every step that has a photo, in the order of the test; `blocks` as in `rod.midline.midline`."""
     return tuple(
-        _points_of(step, step.shape, points)
+        _points_of(step, step.shape, midline(step.shape, blocks=blocks))
         for step in test.steps
-        if step.shape is not None and np.count_nonzero(step.shape.seen) >= 8
+        if step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
     )
 
 
-def _points_of(step: MeasuredStep, shape: MeasuredShape, points: int) -> MomentPoints:
-    seen = np.flatnonzero(shape.seen)
-    keep = np.unique(np.round(np.linspace(0, seen.size - 1, min(points, seen.size))).astype(int))
-    at = seen[keep]
+def _points_of(step: MeasuredStep, shape: MeasuredShape, photo: Midline) -> MomentPoints:
     mounted = step.branch == "mounted"
     chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0])) if step.chord is None else step.chord
+    s = np.linspace(shape.s[0], shape.s[-1], CELLS + 1)
+    theta, kappa = (np.interp(s, shape.s, v) for v in (shape.theta, shape.kappa))
+    curve = np.column_stack(
+        [
+            CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))(s),
+            CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))(s),
+        ]
+    )
+    at, where, angle = np.append(photo.s, s[-1]), np.vstack([photo.on_curve, curve[-1:]]), np.append(photo.theta, theta[-1])
+    tangent, normal = np.column_stack([np.cos(angle), np.sin(angle)]), np.column_stack([-np.sin(angle), np.cos(angle)])
+    # trapezium rule; the integrand vanishes where the integral ends
+    width = np.gradient(s) * np.where((s == s[0]) | (s == s[-1]), 0.5, 1.0)
+    lever = np.einsum("ik,ijk->ij", tangent, where[:, None] - curve[None])
+    by_curvature = np.where(s[None] < at[:, None], lever, 0.0) * width
+    begin, end = -curve[0], np.array([chord, 0.0]) - curve[-1]
+    ends = float(np.array([-np.sin(theta[0]), np.cos(theta[0])]) @ begin), float(normal[-1] @ end)
+    last = np.eye(at.size)[:, -1:]
+    y_by_photo = np.cos(theta)[:, None] * _between(s, np.concatenate([s[:1], photo.s, s[-1:]]))
+    moved = np.concatenate([ends[:1], photo.offset, ends[1:]])
     return MomentPoints(
         step=step,
-        length=float(shape.s[-1]),
-        s=shape.s[at],
-        kappa=shape.kappa[at],
-        y=shape.y[at],
-        along=shape.x[at] / chord,
+        s=s,
+        kappa=kappa,
+        y=curve[:, 1] + y_by_photo @ moved,
+        seen=np.interp(s, shape.s, shape.seen.astype(float)) > 0.5,
+        along=curve[:, 0] / chord,
         centre=0.0 if step.picture_centre is None else step.picture_centre[1],
         force=0.0 if mounted else step.force,
         force_std=0.0 if mounted else step.force_std,
-        by_curve_kappa=shape.basis_kappa[at],
-        by_curve_y=np.cos(shape.theta[at])[:, None] * shape.basis_normal[at],
-        curve_covariance=shape.covariance,
+        photo=photo,
+        offset=np.append(photo.offset, ends[1]) - normal @ begin - by_curvature @ kappa,
+        by_curvature=by_curvature,
+        y_by_photo=y_by_photo[:, 1:-1],
+        by_axes=np.hstack([normal, -last * normal]),
+        by_turn=np.sum(tangent * (where - curve[0]), axis=1)[:, None],
+        axis_std=(step.chord_std or 0.0) / np.sqrt(2.0),
     )
+
+
+def _between(s: Array, nodes: Array) -> Array:
+    """Linear interpolation from values at increasing nodes (k,) to s (n,), as a matrix (n, k)."""
+    return np.stack([np.interp(s, nodes, unit) for unit in np.eye(nodes.size)], axis=1)
 
 
 def residual(
     data: MomentPoints,
-    curve: ComplianceLaw,
+    law: ComplianceLaw,
     pre_curvature: float,
     *,
     varying: Array,
     errors: CommonErrors,
-    floor: float,
+    blur: float = 1.0,
 ) -> Residual:
     """Whitened residual of one photo.
 
@@ -147,39 +228,37 @@ def residual(
     varying : (n,) 1/m
         K0(s) minus its mean.
     errors : CommonErrors
-    floor : 1/m
-        Standard deviation of the curvature that no photo resolves.
+    blur : float
+        Factor on all that is known of the noise.
 
     Returns
     -------
     Residual
         Columns of the jacobian: coefficients of log c (p), K0, then `CommonErrors` in their units.
     """
-    kappa, m = data.kappa / (1.0 + errors.scale), data.true_moment(errors)
-    c = curve.compliance(m)
-    rho = kappa - pre_curvature - varying - curve.bend(m)
-    stiff = (c * data.force)[:, None]
+    m, stretch = data.true_moment(errors), 1.0 + errors.scale
+    c = law.compliance(m)
+    kappa = stretch * (pre_curvature + varying + law.bend(m))
+    onto = stretch * data.by_curvature
+    bent = onto * (c * data.force)  # by y
+    value = data.offset + data.by_curvature @ kappa + data.by_common @ np.array(errors[1:])
+    photo = bent @ data.y_by_photo
+    photo[:-1] += np.eye(photo.shape[1])
+    left, right = bent @ (1.0 - data.along), bent @ data.along
+    axes = data.by_axes + np.column_stack([0.0 * left, left, 0.0 * left, right])
     by_source = {
-        "curve": data.by_curve_kappa - stiff * data.by_curve_y,
-        "force": -(c * data.y)[:, None],
-    }
-    covariance = by_source["curve"] @ data.curve_covariance @ by_source["curve"].T
-    covariance += data.force_std**2 * by_source["force"] @ by_source["force"].T
-    covariance[np.diag_indices_from(covariance)] += floor**2
+        "photo": blur * photo @ data.photo.factor,
+        "force": blur * data.force_std * (onto @ (c * data.y))[:, None],
+    } | {name: -blur * data.axis_std * column[:, None] for name, column in zip(AXES, axes.T, strict=True)}
+    noise = np.hstack([*by_source.values(), TURN * data.by_turn])
+    covariance = noise @ noise.T
+    covariance[np.diag_indices_from(covariance)] += NO_ERROR**2 * data.length**2
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-    columns = np.column_stack(
-        [
-            -curve.bend_by_coefficients(m),
-            -np.ones(m.size),
-            -(kappa + c * data.moment),
-            -stiff * (1.0 - data.along[:, None]),
-            -stiff * data.along[:, None],
-            -stiff,
-            stiff * data.centre,
-        ]
-    )
-    informative = m.size - floor**2 * float(np.sum(whitener**2))
-    return Residual(whitener @ rho, whitener @ columns, whitener, by_source, informative)
+    by_common = bent @ data.y_by_common
+    by_common[:, 0] += data.by_curvature @ (kappa / stretch)
+    by_common[:, 1:] += data.by_common
+    columns = np.column_stack([onto @ law.bend_by_coefficients(m), onto.sum(axis=1), by_common])
+    return Residual(whitener @ value, whitener @ columns, whitener, by_source)
 
 
 def pointwise_graph(step: MeasuredStep) -> tuple[Array, Array]:

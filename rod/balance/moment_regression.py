@@ -65,10 +65,10 @@ class MomentModel:
     basis : LawBasis
     common_std : CommonErrors
         Standard deviations of what is wrong on all photos alike.
-    floor : 1/m
-        Curvature that no photo resolves.
     varying : bool
         Whether K0(s) is free to vary.
+    blur : float
+        Factor on the noise of the photos and forces, above 1 where they contradict each other.
     force_errors : tuple of mappings of step number -> N
         See `rod.measurement.MeasuredTest`; they are in the bands and not in the fit.
     """
@@ -76,8 +76,8 @@ class MomentModel:
     data: tuple[MomentPoints, ...]
     basis: LawBasis
     common_std: CommonErrors
-    floor: float
     varying: bool = False
+    blur: float = 1.0
     force_errors: tuple[Mapping[int, float], ...] = ()
 
     def rows(self, unknowns: Array) -> tuple[ComplianceLaw, tuple[Residual, ...]]:
@@ -89,7 +89,7 @@ class MomentModel:
         )
         bow = self.bow(unknowns)
         return curve, tuple(
-            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, floor=self.floor)
+            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, blur=self.blur)
             for d in self.data
         )
 
@@ -113,7 +113,7 @@ class MomentModel:
 
     def columns(self, data: MomentPoints, row: Residual) -> Array:
         """Whitened jacobian of one photo with respect to all unknowns, (n, q)."""
-        columns = np.hstack([row.jacobian, -row.whitener @ bow_terms(data)])
+        columns = np.hstack([row.jacobian, row.whitener @ data.by_curvature @ bow_terms(data)])
         columns[:, self.common] *= np.array(self.common_std)
         return columns
 
@@ -122,7 +122,7 @@ class MomentModel:
         known = np.zeros(J.shape[1])
         known[self.common] = 1.0
         if not self.varying:  # a prior far sharper than any photo switches them off
-            known[self.common.stop :] = 1e6 / self.floor
+            known[self.common.stop :] = 1e6 * max(d.length for d in self.data)
         rows = np.diag(known)[known > 0.0]
         value, J = np.concatenate([value, rows @ unknowns]), np.vstack([J, rows])
         return averaged(value, J, unknowns, priors(self.basis, smooth=smooth))
@@ -180,11 +180,12 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
     value = np.concatenate([row.value for row in rows])
     response = model.posterior(found.unknowns, value, J).covariance
     value = value - J @ (response @ (J.T @ value))  # nothing where the model is the one that was fitted
-    bow = np.vstack([row.whitener @ bow_terms(d) for d, row in zip(model.data, rows, strict=True)])
+    bent = [row.whitener @ d.by_curvature for d, row in zip(model.data, rows, strict=True)]
+    bow = np.vstack([onto @ bow_terms(d) for d, onto in zip(model.data, bent, strict=True)])
     photo = np.zeros((value.size, len(rows)))
     ends = np.cumsum([0] + [row.value.size for row in rows])
-    for k, row in enumerate(rows):
-        photo[ends[k] : ends[k + 1], k] = row.whitener.sum(axis=1)
+    for k, onto in enumerate(bent):
+        photo[ends[k] : ends[k + 1], k] = onto.sum(axis=1)
 
     def score(columns: Array) -> Array:
         inside = columns.T @ J
@@ -204,17 +205,14 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
         "photos_p": p_value(score(photo)),
         "uniform_p": p_value(score(bow)),
         "chi2": float(value @ value),
-        "degrees_of_freedom": max(sum(row.informative for row in rows) - used, 0.0),
+        "degrees_of_freedom": max(float(value.size - len(rows)) - used, 0.0),
     }
 
 
-def uniform_at_rest(data: MomentPoints, floor: float) -> float:
+def uniform_at_rest(data: MomentPoints, law: ComplianceLaw) -> float:
     """Probability of a force-free photo as uneven as this one if the cable's curvature at rest is constant."""
-    covariance = data.by_curve_kappa @ data.curve_covariance @ data.by_curve_kappa.T
-    covariance[np.diag_indices_from(covariance)] += floor**2
-    columns = np.column_stack([np.ones(data.s.size), bow_terms(data)])
-    weighted = np.linalg.solve(covariance, columns)
-    information = columns.T @ weighted
-    estimate = np.linalg.solve(information, weighted.T @ data.kappa)[1:]
-    spread = np.linalg.inv(information)[1:, 1:]
-    return float(chdtrc(estimate.size, estimate @ np.linalg.solve(spread, estimate)))
+    row = residual(data, law, 0.0, varying=np.zeros(1), errors=CommonErrors(0.0))
+    columns = row.whitener @ data.by_curvature @ np.column_stack([np.ones(data.s.size), bow_terms(data)])
+    spread = np.linalg.inv(columns.T @ columns)
+    bow = -(spread @ (columns.T @ row.value))[1:]
+    return float(chdtrc(bow.size, bow @ np.linalg.solve(spread[1:, 1:], bow)))

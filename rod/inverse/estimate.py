@@ -199,31 +199,15 @@ def _moved_by_forces(model: FitModel, found: Evaluation, response: Array) -> Arr
     return moved
 
 
-def _source(name: str) -> Source | None:
-    """Source of error of a nuisance; None for what a photo adds across the chord, which is an error of its curve."""
-    part, _, step = name.partition("/")
-    if part.endswith("_across"):
-        return None if step else (part, -1)
-    return ("along", int(step or -1)) if part.endswith("_along") else (part, -1)
-
-
 def _gains(model: FitModel, found: Evaluation, response: Array) -> dict[Source, Array]:
     """Response of log(tangent) to every source of error; `response` (n, q) is its derivative by -J^T dr."""
     gains: dict[Source, Array] = {}
     for name in model.nuisances:
-        source = _source(name)
-        if source is not None:
-            # With the normal matrix A and a nuisance e of prior variance 1: A^-1 (A - 1) e - e = -A^-1 e.
-            column = -response[:, [model.index(name)]]
-            gains[source] = np.hstack([gains[source], column]) if source in gains else column
-    for fit in found.steps:
-        step = fit.data.step
-        if fit.force is not None:
-            J = found.jacobian[found.blocks[f"force/{step.step}"]]
-            gains["force", step.step] = -response @ J.T / step.force_std
-        if fit.data.midline is not None and step.shape is not None:
-            J, white = found.jacobian[found.blocks[f"shape/{step.step}"]], fit.data.midline.whitener
-            at = fit.data.midline.s
-            moved = np.column_stack([np.interp(at, step.shape.s, c) for c in step.shape.basis_normal.T])
-            gains["curve", step.step] = -response @ (J.T @ (white @ moved))
+        part, _, step = name.partition("/")
+        # With the normal matrix A and a nuisance e of prior variance 1: A^-1 (A - 1) e - e = -A^-1 e.
+        gains[part, int(step or -1)] = -response[:, [model.index(name)]]
+    for name, rows in found.blocks.items():
+        part, _, step = name.partition("/")
+        if part in ("shape", "force"):
+            gains["photo" if part == "shape" else part, int(step)] = -response @ found.jacobian[rows].T
     return gains

@@ -1,7 +1,7 @@
 """One evaluation of the inverse problem: simulate all steps, hold them against the data, with exact derivatives.
 
 Residuals, each divided by its standard deviation: distance of the midline from the simulated shape along the normal
-(whitened, `rod.inverse.whitening`), force measured minus simulated, and the prior of each nuisance. What is known of
+(whitened, `rod.midline`), force measured minus simulated, and the prior of each nuisance. What is known of
 the form of the law (`rod.law_prior`) comes in with the fit.
 
 The chord of a photo is imposed on the simulation as measured, the errors of the axes taken back:

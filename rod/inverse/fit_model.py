@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
 from rod.compliance_law import ComplianceLaw, LawBasis
-from rod.inverse.whitening import Midline, midline
+from rod.midline import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]

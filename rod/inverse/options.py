@@ -14,7 +14,7 @@ class InverseOptions:
     elements : int
         Of the simulated rod: its error at 100 is 1e-4 of the force, a thirtieth of a load cell's.
     blocks : int
-        Independent data of one photo at most, see `rod.inverse.whitening`.
+        Independent data of one photo at most, see `rod.midline`.
     grid : int
         Points of the reported curve.
     evaluations : int

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.inverse.whitening import Midline
+from rod.midline import Midline
 from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.inverse.evaluation import evaluate
 from rod.inverse.fit import fit
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
-from rod.inverse.whitening import block_covariance, midline
+from rod.midline import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
 

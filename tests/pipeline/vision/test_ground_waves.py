@@ -12,7 +12,7 @@ from pipeline.settings import Settings
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.series import trace_series
-from rod.inverse.whitening import block_covariance
+from rod.midline import block_covariance
 from rod.measurement import slow_covariance
 
 SCATTER, BRIEF = 5e-6, 5e-4

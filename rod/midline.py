@@ -34,21 +34,33 @@ class Midline:
     ----------
     s, x, y, theta : (b,) m, m, m, rad
         Centres of the blocks: arc length on the smooth curve, measured position, direction of the tangent.
+    offset : (b,) m
+        Of the measured position from the smooth curve, along its normal.
     sections : (b,)
         Number of sections in each block.
     covariance : (b, b) m^2
         Of the position along the normal.
+    factor : (b, b) m
+        Lower triangular; ``factor @ factor.T = covariance``.
     whitener : (b, b) 1/m
-        Lower triangular; ``whitener @ covariance @ whitener.T = 1``.
+        Its inverse; ``whitener @ covariance @ whitener.T = 1``.
     """
 
     s: Array
     x: Array
     y: Array
     theta: Array
+    offset: Array
     sections: NDArray[np.intp]
     covariance: Array
+    factor: Array
     whitener: Array
+
+    @property
+    def on_curve(self) -> Array:
+        """The same places on the smooth curve, (b, 2) m."""
+        normal = np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
+        return np.asarray(np.column_stack([self.x, self.y]) - self.offset[:, None] * normal)
 
 
 def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> Midline:
@@ -86,10 +98,9 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
     covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
-    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-    return Midline(
-        mean, x - offset * np.sin(theta), y + offset * np.cos(theta), theta, sections, covariance, np.tril(whitener)
-    )
+    x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
+    factor = np.linalg.cholesky(covariance)
+    return Midline(mean, x, y, theta, offset, sections, covariance, factor, np.tril(np.linalg.inv(factor)))
 
 
 def _on_curve(shape: MeasuredShape, at: Array, x: Array, y: Array) -> tuple[Array, Array]:
