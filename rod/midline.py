@@ -99,7 +99,7 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
     x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
-    factor = np.linalg.cholesky(covariance)
+    factor = np.asarray(np.linalg.cholesky(covariance), float)
     return Midline(mean, x, y, theta, offset, sections, covariance, factor, np.tril(np.linalg.inv(factor)))
 
 

@@ -12,6 +12,7 @@ LONGEST_FILE = 400
 # From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
 ROD = [
     ("measurement", "measured_law", "spline"),
+    ("midline",),
     ("characteristic", "compliance_law"),
     ("law_prior",),
     ("laws", "elastica", "section", "support"),
@@ -29,7 +30,7 @@ ROD = [
 ]
 INSIDE = {
     "rod.inverse": [
-        ("whitening", "options"),
+        ("options",),
         ("photo_residual",),
         ("fit_model",),
         ("evaluation",),

@@ -38,7 +38,6 @@ from rod.compliance_law import moment_basis
 from rod.measured_law import Array, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
-
 CONTRADICTION = 2.0
 """Root mean square of whitened residuals beyond which photos and forces contradict each other."""
 
@@ -96,8 +95,8 @@ class BalanceGraph:
     varying : (4,) 1/m
         Legendre coefficients 1 to 4 of K0(s) - K0; zeros unless a force-free photo shows them.
     checks : dict
-        See `rod.balance.moment_regression.assumption_checks`; ``noise_factor`` is the factor on the noise within
-        which photos and forces obey one curve; ``uniform_at_rest_p`` tests the force-free photo alone for a constant curvature.
+        See `rod.balance.moment_regression.assumption_checks`; ``noise_factor`` is the factor on the noise within which
+        photos and forces obey one curve; ``uniform_at_rest_p`` tests the force-free photo for a constant curvature.
     """
 
     outcome: BalanceOutcome
@@ -135,12 +134,12 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     if not slope > 0.0:
         return BalanceGraph(BalanceOutcome.NO_MOMENT, points=data)
     basis = moment_basis(float(m.min()), float(m.max()), unit=slope)
-    beside = test.axis_parallax_std * test.camera_foot_std
-    common = CommonErrors(test.scale_std, test.axis_std, test.axis_std, beside, test.axis_parallax_std)
+    axis, beside = test.axis_std, test.axis_parallax_std * test.camera_foot_std
+    common = CommonErrors(test.scale_std, axis, axis, axis, axis, beside, beside, test.axis_parallax_std)
     model = MomentModel(data, basis, common, force_errors=test.common_force_errors)
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa[rest.seen].mean())
-    at_rest = 1.0 if rest is None else uniform_at_rest(rest, basis.law(np.zeros(basis.size)))
+    at_rest = 1.0 if rest is None else uniform_at_rest(model, rest)
     found = _regress_in_spite_of_misfit(replace(model, varying=at_rest < options.level), start, options)
     if found is None:
         return BalanceGraph(BalanceOutcome.STALLED, points=data)
@@ -218,7 +217,7 @@ def _gains(model: MomentModel, found: Regression, by_log: Array) -> dict[Source,
     for data, row in zip(model.data, found.rows, strict=True):
         response = -by_log @ found.posterior.covariance @ model.columns(data, row).T
         for name, columns in row.by_source.items():
-            gains[name, data.step.step] = response @ row.whitener @ columns
+            gains[name, data.step.step] = response @ row.whitened(columns)
     return gains
 
 
@@ -226,8 +225,10 @@ def _moved_by_forces(model: MomentModel, found: Regression) -> Array:
     """Moves (q, e) of the unknowns by errors that several forces have in common."""
     moved = np.zeros((found.unknowns.size, len(model.force_errors)))
     for data, row in zip(model.data, found.rows, strict=True):
-        by_force = row.whitener @ row.by_source["force"][:, 0]
-        shares = [errors.get(data.step.step, 0.0) / (model.blur * data.force_std or 1.0) for errors in model.force_errors]
+        by_force = row.whitened(row.by_source["force"][:, 0])
+        shares = [
+            errors.get(data.step.step, 0.0) / (model.blur * data.force_std or 1.0) for errors in model.force_errors
+        ]
         moved -= np.outer(found.posterior.covariance @ (model.columns(data, row).T @ by_force), shares)
     return moved
 

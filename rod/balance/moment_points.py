@@ -6,9 +6,9 @@ against that of a smooth curve: what smoothing rounds off, and how its error run
 The smooth curve R(s) with tangent t, normal n and curvature K_c is what positions are counted from. To first order in
 K - K_c the cable lies along the normal at
 
-    u(s) = n(s) . left + turn t(s) . (R(s) - R(0)) - int_0^s (K - K_c)(s') t(s) . (R(s) - R(s')) ds'
+    u(s) = u(0) n(s) . n(0) + turn t(s) . (R(s) - R(0)) - int_0^s (K - K_c)(s') t(s) . (R(s) - R(s')) ds'
 
-with ``left`` the left axis as counted from R(0); the turn at the left axis is free, and at the right one u is given.
+where u is given at both axes, and the turn at the left one is free.
 
 The residual is moved by the noise of the midline (directly, and through y and the moment), by the force, by the errors
 of both axes on this photo, and by what all photos have in common: their scale, the errors of the bearing axes across
@@ -19,12 +19,15 @@ Axes and signs: chord frame of `rod.measurement`; SI units.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.linalg import solve_triangular
+from scipy.sparse import csr_array, diags_array
 
 from rod.compliance_law import ComplianceLaw
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
@@ -35,29 +38,34 @@ Array = NDArray[np.float64]
 CELLS = 400
 """Of the integral along the cable: where the law has a kink, it is in error by a third of a photo's noise."""
 
+HIDDEN = 20
+"""Pieces of an arc under a cover."""
+
 LEAST_SECTIONS = 8
 """Raw midline points that make a shape."""
 
 TURN = 0.3
 """Standard deviation of the turn at the left axis, rad: far more than any smooth curve is off by."""
 
-NO_ERROR = 1e-9
-"""Of the length: independent error of a position that keeps the covariance regular where axes are without error."""
+ROUNDED = 1e-6
+"""Of the length: error of a position by the integral along the cable, a twentieth of a good photo's."""
 
 AXES = ("left_along", "left_across", "right_along", "right_across")
 
 
 class CommonErrors(NamedTuple):
-    """What is wrong on all photos alike, in the signs of the chord frame.
+    """What is wrong on all photos alike, in the signs of the chord frame: what is added to a measured place.
 
-    ``true y = (1 + scale) y + left_across (1 - x/chord) + right_across x/chord + foot_across - parallax centre`` with
-    the y of the picture's centre (`rod.measurement`). ``scale`` and ``parallax`` are relative, the others in m. Along
-    the chord the axes move no moment.
+    ``scale`` is relative; that of the axes (`AXES`) and of the camera's foot in m; ``parallax``, relative, takes the
+    axes toward the foot, which lies at the picture's centre (`rod.measurement`).
     """
 
-    scale: float
+    scale: float = 0.0
+    left_along: float = 0.0
     left_across: float = 0.0
+    right_along: float = 0.0
     right_across: float = 0.0
+    foot_along: float = 0.0
     foot_across: float = 0.0
     parallax: float = 0.0
 
@@ -74,12 +82,12 @@ class MomentPoints:
         Of the smooth curve.
     y : (n,) m
         Of the midline.
-    seen : (n,) bool
-        Where no cover hides the cable.
+    free : (n,)
+        1 where the cable is seen; under a cover it ends at the axis, wherever that is found, and this at 0.
     along : (n,)
         Place on the chord, x / chord.
-    centre : m
-        y of the picture's centre; zero where that is not known.
+    axes_by_common : (4, 7)
+        Derivative of `AXES` by the common errors but the scale.
     force, force_std : N
         Zero in the mounted step: force-free by definition of the branch, whatever the load cell reads.
     photo : Midline
@@ -102,15 +110,15 @@ class MomentPoints:
     s: Array
     kappa: Array
     y: Array
-    seen: NDArray[np.bool_]
+    free: Array
     along: Array
-    centre: float
+    axes_by_common: Array
     force: float
     force_std: float
     photo: Midline
     offset: Array
     by_curvature: Array
-    y_by_photo: Array
+    y_by_photo: csr_array
     by_axes: Array
     by_turn: Array
     axis_std: float
@@ -118,7 +126,12 @@ class MomentPoints:
     @property
     def length(self) -> float:
         """Traced length of the curve, axis to axis, m."""
-        return float(self.s[-1])
+        return float(np.ptp(self.s))
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where the cable is seen, (n,)."""
+        return np.asarray(self.free == 1.0, bool)
 
     @property
     def moment(self) -> Array:
@@ -127,32 +140,27 @@ class MomentPoints:
 
     def true_moment(self, errors: CommonErrors) -> Array:
         """Bending moment P y with the common errors taken back, (n,) N m."""
-        return self.force * (self.y * (1.0 + errors.scale) + self.y_by_common[:, 1:] @ np.array(errors[1:]))
+        moved = self.y_by_axes @ (self.axes_by_common @ np.array(errors[1:]))
+        return np.asarray(self.force * (self.y * (1.0 + errors.scale) + moved))
 
     @property
-    def y_by_common(self) -> Array:
-        """Derivative of the true y by the common errors, (n, 5)."""
-        one = np.ones_like(self.y)
-        return np.column_stack([self.y, 1.0 - self.along, self.along, one, -self.centre * one])
-
-    @property
-    def by_common(self) -> Array:
-        """Derivative of the residual by the common errors but the scale where they do not act through y, (r, 4)."""
-        left, right = self.by_axes[:, 1], self.by_axes[:, 3]
-        return np.column_stack([left, right, left + right, -self.centre * (left + right)])
+    def y_by_axes(self) -> Array:
+        """Derivative of y by `AXES`, (n, 4)."""
+        none = np.zeros_like(self.y)
+        return np.column_stack([none, self.free * (1.0 - self.along), none, self.free * self.along])
 
 
 @dataclass(frozen=True)
 class Residual:
-    """Residual of one photo against a law, whitened, and its derivatives (all rows whitened).
+    """Residual of one photo against a law, whitened, and its derivatives (whitened rows).
 
-    `whitener` turns a change of the raw residual into whitened rows. ``by_source`` holds the raw derivatives with
+    `whitened` turns changes of the raw residual (r, k) into whitened rows. ``by_source`` holds the raw derivatives with
     respect to the sources of error, each per standard deviation: ``photo`` (r, r - 1), ``force`` (r, 1), `AXES`.
     """
 
     value: Array
     jacobian: Array
-    whitener: Array
+    whitened: Callable[[Array], Array]
     by_source: dict[str, Array]
 
 
@@ -168,48 +176,85 @@ def moment_points(test: MeasuredTest, *, blocks: int = 160) -> tuple[MomentPoint
 def _points_of(step: MeasuredStep, shape: MeasuredShape, photo: Midline) -> MomentPoints:
     mounted = step.branch == "mounted"
     chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0])) if step.chord is None else step.chord
-    s = np.linspace(shape.s[0], shape.s[-1], CELLS + 1)
-    theta, kappa = (np.interp(s, shape.s, v) for v in (shape.theta, shape.kappa))
-    curve = np.column_stack(
-        [
-            CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))(s),
-            CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))(s),
-        ]
-    )
-    at, where, angle = np.append(photo.s, s[-1]), np.vstack([photo.on_curve, curve[-1:]]), np.append(photo.theta, theta[-1])
-    tangent, normal = np.column_stack([np.cos(angle), np.sin(angle)]), np.column_stack([-np.sin(angle), np.cos(angle)])
+    cx, cy = step.picture_centre or (0.5 * chord, 0.0)
+    places, free = _tied(shape, chord)
+    s, curve, theta, kappa = places[:, 0], places[:, 1:3], places[:, 3], places[:, 4]
+    at, where = np.append(photo.s, s[-1]), np.vstack([photo.on_curve, curve[-1:]])
+    tangent, normal = _frame(np.append(photo.theta, theta[-1]))
     # trapezium rule; the integrand vanishes where the integral ends
-    width = np.gradient(s) * np.where((s == s[0]) | (s == s[-1]), 0.5, 1.0)
+    width = 0.5 * (np.diff(s, prepend=s[0]) + np.diff(s, append=s[-1]))
     lever = np.einsum("ik,ijk->ij", tangent, where[:, None] - curve[None])
     by_curvature = np.where(s[None] < at[:, None], lever, 0.0) * width
-    begin, end = -curve[0], np.array([chord, 0.0]) - curve[-1]
-    ends = float(np.array([-np.sin(theta[0]), np.cos(theta[0])]) @ begin), float(normal[-1] @ end)
+    first = _frame(theta[:1])[1][0]
+    start = np.outer(normal @ first, first)  # along itself a curve may begin anywhere
+    end = float(normal[-1] @ (np.array([chord, 0.0]) - curve[-1]))
     last = np.eye(at.size)[:, -1:]
-    y_by_photo = np.cos(theta)[:, None] * _between(s, np.concatenate([s[:1], photo.s, s[-1:]]))
-    moved = np.concatenate([ends[:1], photo.offset, ends[1:]])
+    y_by_photo = diags_array(free * np.cos(theta)) @ _between(s, photo.s)
     return MomentPoints(
         step=step,
         s=s,
         kappa=kappa,
-        y=curve[:, 1] + y_by_photo @ moved,
-        seen=np.interp(s, shape.s, shape.seen.astype(float)) > 0.5,
+        y=curve[:, 1] + y_by_photo @ photo.offset,
+        free=free,
         along=curve[:, 0] / chord,
-        centre=0.0 if step.picture_centre is None else step.picture_centre[1],
+        axes_by_common=np.hstack([np.eye(4), np.vstack([np.eye(2)] * 2), [[-cx], [-cy], [chord - cx], [-cy]]]),
         force=0.0 if mounted else step.force,
         force_std=0.0 if mounted else step.force_std,
         photo=photo,
-        offset=np.append(photo.offset, ends[1]) - normal @ begin - by_curvature @ kappa,
+        offset=np.append(photo.offset, end) + start @ curve[0] - by_curvature @ kappa,
         by_curvature=by_curvature,
-        y_by_photo=y_by_photo[:, 1:-1],
-        by_axes=np.hstack([normal, -last * normal]),
+        y_by_photo=y_by_photo,
+        by_axes=np.hstack([start, -last * normal]),
         by_turn=np.sum(tangent * (where - curve[0]), axis=1)[:, None],
         axis_std=(step.chord_std or 0.0) / np.sqrt(2.0),
     )
 
 
-def _between(s: Array, nodes: Array) -> Array:
-    """Linear interpolation from values at increasing nodes (k,) to s (n,), as a matrix (n, k)."""
-    return np.stack([np.interp(s, nodes, unit) for unit in np.eye(nodes.size)], axis=1)
+def _frame(theta: Array) -> tuple[Array, Array]:
+    """Tangents and normals (k, 2) of directions (k,)."""
+    cos, sin = np.cos(theta), np.sin(theta)
+    return np.column_stack([cos, sin]), np.column_stack([-sin, cos])
+
+
+def _tied(shape: MeasuredShape, chord: float) -> tuple[Array, Array]:
+    """The smooth curve (n, 5), s, x, y, theta and kappa, under covers arcs to the axes; and `MomentPoints.free` (n,).
+
+    A smooth curve may wind there as it likes. What positions are counted from must not be far from the cable.
+    """
+    first, last = np.flatnonzero(shape.seen)[[0, -1]]
+    s = np.linspace(shape.s[first], shape.s[last], CELLS + 1)
+    x = CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))(s)
+    y = CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))(s)
+    rows = np.column_stack([s, x, y, CubicSpline(shape.s, np.column_stack([shape.theta, shape.kappa]))(s)])
+    left = _arc(rows[0], np.zeros(2), -1.0)[::-1] if first > 0 else rows[:0]
+    right = _arc(rows[-1], np.array([chord, 0.0]), 1.0) if last < shape.s.size - 1 else rows[:0]
+    free = np.concatenate([np.linspace(0.0, 1.0, len(left)), np.ones(len(rows)), np.linspace(1.0, 0.0, len(right))])
+    return np.vstack([left, rows, right]), free
+
+
+def _arc(row: Array, axis: Array, way: float) -> Array:
+    """The arc (`HIDDEN` + 1, 5) from a place of a curve to an axis, forth (`way` 1) or back (-1) along the curve."""
+    s, x, y, theta, _ = row
+    heading = way * np.array([np.cos(theta), np.sin(theta)])
+    apart = axis - row[1:3]
+    turn = np.arctan2(heading[0] * apart[1] - heading[1] * apart[0], heading @ apart)
+    along = np.linspace(0.0, np.hypot(*apart) / np.sinc(turn / np.pi), HIDDEN + 1)
+    share = turn * np.linspace(0.0, 1.0, HIDDEN + 1)
+    straight, angle = way * along * np.sinc(share / np.pi), theta + share
+    kappa = np.full(along.size, -2.0 * way * turn / along[-1])
+    return np.column_stack(
+        [s + way * along, x + straight * np.cos(angle), y + straight * np.sin(angle), theta + 2.0 * share, kappa]
+    )
+
+
+def _between(s: Array, nodes: Array) -> csr_array:
+    """Linear interpolation from values at increasing nodes (k,) to s (n,), constant beyond, as a matrix (n, k)."""
+    at = np.clip(s, nodes[0], nodes[-1])
+    left = np.clip(np.searchsorted(nodes, at) - 1, 0, nodes.size - 2)
+    share = (at - nodes[left]) / np.diff(nodes)[left]
+    row = np.arange(s.size)
+    weights, places = np.concatenate([1.0 - share, share]), np.concatenate([left, left + 1])
+    return csr_array((weights, (np.concatenate([row, row]), places)), shape=(s.size, nodes.size))
 
 
 def residual(
@@ -241,24 +286,26 @@ def residual(
     kappa = stretch * (pre_curvature + varying + law.bend(m))
     onto = stretch * data.by_curvature
     bent = onto * (c * data.force)  # by y
-    value = data.offset + data.by_curvature @ kappa + data.by_common @ np.array(errors[1:])
-    photo = bent @ data.y_by_photo
+    axes = data.by_axes + bent @ data.y_by_axes
+    by_common = axes @ data.axes_by_common
+    value = data.offset + data.by_curvature @ kappa + data.by_axes @ (data.axes_by_common @ np.array(errors[1:]))
+    photo = np.asarray(bent @ data.y_by_photo)
     photo[:-1] += np.eye(photo.shape[1])
-    left, right = bent @ (1.0 - data.along), bent @ data.along
-    axes = data.by_axes + np.column_stack([0.0 * left, left, 0.0 * left, right])
     by_source = {
         "photo": blur * photo @ data.photo.factor,
         "force": blur * data.force_std * (onto @ (c * data.y))[:, None],
     } | {name: -blur * data.axis_std * column[:, None] for name, column in zip(AXES, axes.T, strict=True)}
     noise = np.hstack([*by_source.values(), TURN * data.by_turn])
     covariance = noise @ noise.T
-    covariance[np.diag_indices_from(covariance)] += NO_ERROR**2 * data.length**2
-    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-    by_common = bent @ data.y_by_common
-    by_common[:, 0] += data.by_curvature @ (kappa / stretch)
-    by_common[:, 1:] += data.by_common
-    columns = np.column_stack([onto @ law.bend_by_coefficients(m), onto.sum(axis=1), by_common])
-    return Residual(whitener @ value, whitener @ columns, whitener, by_source)
+    covariance[np.diag_indices_from(covariance)] += (ROUNDED * data.length) ** 2
+    factor = np.linalg.cholesky(covariance)
+
+    def whitened(columns: Array) -> Array:
+        return np.asarray(solve_triangular(factor, columns, lower=True, check_finite=False))
+
+    by_scale = bent @ data.y + data.by_curvature @ (kappa / stretch)
+    columns = np.column_stack([onto @ law.bend_by_coefficients(m), onto.sum(axis=1), by_scale, by_common])
+    return Residual(whitened(value), whitened(columns), whitened, by_source)
 
 
 def pointwise_graph(step: MeasuredStep) -> tuple[Array, Array]:

@@ -89,8 +89,7 @@ class MomentModel:
         )
         bow = self.bow(unknowns)
         return curve, tuple(
-            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, blur=self.blur)
-            for d in self.data
+            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, blur=self.blur) for d in self.data
         )
 
     @property
@@ -113,7 +112,7 @@ class MomentModel:
 
     def columns(self, data: MomentPoints, row: Residual) -> Array:
         """Whitened jacobian of one photo with respect to all unknowns, (n, q)."""
-        columns = np.hstack([row.jacobian, row.whitener @ data.by_curvature @ bow_terms(data)])
+        columns = np.hstack([row.jacobian, row.whitened(data.by_curvature @ bow_terms(data))])
         columns[:, self.common] *= np.array(self.common_std)
         return columns
 
@@ -130,7 +129,7 @@ class MomentModel:
 
 def bow_terms(data: MomentPoints) -> Array:
     """Legendre polynomials 1 to 4 of 2 s/L - 1 at the points of a photo, (n, 4)."""
-    t = 2.0 * data.s / data.length - 1.0
+    t = 2.0 * (data.s - data.s[0]) / data.length - 1.0
     return np.asarray(np.polynomial.legendre.legvander(t, BOW_TERMS)[:, 1:])
 
 
@@ -180,12 +179,11 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
     value = np.concatenate([row.value for row in rows])
     response = model.posterior(found.unknowns, value, J).covariance
     value = value - J @ (response @ (J.T @ value))  # nothing where the model is the one that was fitted
-    bent = [row.whitener @ d.by_curvature for d, row in zip(model.data, rows, strict=True)]
-    bow = np.vstack([onto @ bow_terms(d) for d, onto in zip(model.data, bent, strict=True)])
+    bow = np.vstack([row.whitened(d.by_curvature @ bow_terms(d)) for d, row in zip(model.data, rows, strict=True)])
     photo = np.zeros((value.size, len(rows)))
     ends = np.cumsum([0] + [row.value.size for row in rows])
-    for k, onto in enumerate(bent):
-        photo[ends[k] : ends[k + 1], k] = onto.sum(axis=1)
+    for k, (d, row) in enumerate(zip(model.data, rows, strict=True)):
+        photo[ends[k] : ends[k + 1], k] = row.whitened(d.by_curvature.sum(axis=1))
 
     def score(columns: Array) -> Array:
         inside = columns.T @ J
@@ -209,10 +207,13 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
     }
 
 
-def uniform_at_rest(data: MomentPoints, law: ComplianceLaw) -> float:
+def uniform_at_rest(model: MomentModel, data: MomentPoints) -> float:
     """Probability of a force-free photo as uneven as this one if the cable's curvature at rest is constant."""
-    row = residual(data, law, 0.0, varying=np.zeros(1), errors=CommonErrors(0.0))
-    columns = row.whitener @ data.by_curvature @ np.column_stack([np.ones(data.s.size), bow_terms(data)])
-    spread = np.linalg.inv(columns.T @ columns)
-    bow = -(spread @ (columns.T @ row.value))[1:]
-    return float(chdtrc(bow.size, bow @ np.linalg.solve(spread[1:, 1:], bow)))
+    law = model.basis.law(np.zeros(model.size))  # without a moment any will do
+    row = residual(data, law, 0.0, varying=np.zeros(1), errors=CommonErrors())
+    J = model.columns(data, row)[:, model.size :]  # K0, what all photos have in common, bow
+    known = np.zeros(J.shape[1])
+    known[1 : 1 + len(model.common_std)] = 1.0
+    spread = np.linalg.inv(J.T @ J + np.diag(known))[:, -BOW_TERMS:]
+    bow = spread.T @ (J.T @ row.value)
+    return float(chdtrc(bow.size, bow @ np.linalg.solve(spread[-BOW_TERMS:], bow)))

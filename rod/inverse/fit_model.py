@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
 from rod.compliance_law import ComplianceLaw, LawBasis
-from rod.midline import Midline, midline
 from rod.measurement import MeasuredStep, MeasuredTest
+from rod.midline import Midline, midline
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.midline import Midline
 from rod.measurement import MeasuredShape
+from rod.midline import Midline
 
 Array = NDArray[np.float64]
 

@@ -49,12 +49,12 @@ def test_result_scales_with_the_stiffness(stiffer):
 
 
 def test_secant_and_tangent_are_readings_of_one_moment_curve():
-    graph = law_of(measured())
+    graph = law_of(measured(), options=BalanceOptions(grid=241))
     K0 = graph.pre_curvature
     away = graph.kappa - K0 > 0.5
     assert np.allclose(graph.secant[away], graph.moment[away] / (graph.kappa[away] - K0), rtol=1e-12)
     slope = np.gradient(graph.moment, graph.kappa)[1:-1]
-    assert np.allclose(slope, graph.tangent[1:-1], rtol=1e-3)  # central differences over 61 points
+    assert np.allclose(slope, graph.tangent[1:-1], rtol=1e-3)  # central differences over 241 points
     assert graph.secant[0] == pytest.approx(graph.tangent[0], rel=1e-9)  # the limit, where the moment is zero
 
 
@@ -70,10 +70,11 @@ def test_band_is_true_to_the_gains():
     k, step = 2, test.steps[2]
     pushed = replace(step, force=step.force * 1.001)
     moved = law_of(replace(test, steps=(*test.steps[:k], pushed, *test.steps[k + 1 :])))
-    told = graph.gains["force", step.step][:, 0] * 1e-3 * step.force
+    told = graph.gains["force", step.step][:, 0] * 1e-3 * step.force / step.force_std
     seen = np.log(np.interp(graph.kappa, moved.kappa, moved.tangent) / graph.tangent)
     inner = slice(3, -3)
-    assert np.allclose(seen[inner], told[inner], atol=0.1 * np.abs(told).max())
+    # A gain holds the sizes of the priors; their own answer to the data is a fifth of it here, as by the inverse way.
+    assert np.allclose(seen[inner], told[inner], atol=0.25 * np.abs(told).max())
 
 
 def test_common_errors_move_the_estimate_as_told():
@@ -94,9 +95,10 @@ def test_common_errors_move_the_estimate_as_told():
     for moved, told in cases:
         found = law_of(moved)
         seen = np.log(np.interp(graph.kappa, found.kappa, found.tangent) / graph.tangent)
-        assert np.allclose(seen[3:-3], told[3:-3], atol=2e-4)
-    # Where all moments are small the lift of an axis counts most; with this standard deviation by half a percent.
-    assert np.abs(left[0]) > 3e-3
+        # the sizes of the priors answer too, and 0.4 mm of parallax is no small move: within a twentieth of the band
+        assert np.all(np.abs(seen - told)[3:-3] < 0.05 * (graph.tangent_std / graph.tangent)[3:-3])
+    # Where all moments are small the lift of an axis counts most.
+    assert np.abs(left[0]) > 5 * np.abs(left[10:]).max()
 
 
 def test_a_smooth_law_falls_short_by_nothing():
@@ -200,8 +202,8 @@ def test_mounted_step_is_force_free_whatever_the_load_cell_reads():
     assert np.array_equal(law_of(replace(test, steps=off)).tangent, law_of(test).tangent)
 
 
-def test_fewer_points_per_photo_change_nothing_beyond_the_band():
+def test_fewer_blocks_of_a_photo_change_nothing_beyond_the_band():
     test = measured()
-    one, two = law_of(test), law_of(test, options=BalanceOptions(points=40))
+    one, two = law_of(test), law_of(test, options=BalanceOptions(blocks=80))
     assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < one.tangent_std)
-    assert max(p.s.size for p in moment_points(test, points=40)) == 40
+    assert max(p.photo.s.size for p in moment_points(test, blocks=80)) == 80

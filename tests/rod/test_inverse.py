@@ -127,7 +127,7 @@ def test_gains_tell_how_a_force_moves_the_estimate():
     step = test.steps[2]
     pushed = replace(step, force=step.force * 1.002)
     moved = law_of(replace(test, steps=(*test.steps[:2], pushed, *test.steps[3:])), options=QUICK)
-    told = result.gains["force", 2][:, 0] * 2e-3 * step.force
+    told = result.gains["force", 2][:, 0] * 2e-3 * step.force / step.force_std
     seen = np.log(np.interp(result.kappa, moved.kappa, moved.tangent) / result.tangent)
     # A gain holds the sizes of the priors; their own answer to the data is a fifth of it here.
     assert np.allclose(seen[3:-3], told[3:-3], atol=0.25 * np.abs(told).max())

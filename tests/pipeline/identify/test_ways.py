@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.identify import identification_parts, identify_test, identify_without
-from pipeline.identify.agreement import difference_covariance, log_curve, rest_curvature, source_covariance
+from pipeline.identify.agreement import difference_covariance, log_curve, rest_curvature
 from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
 from pipeline.result import Result, SpecimenPart, from_json, to_json
 from rod.inverse import InverseOutcome
@@ -42,12 +42,10 @@ def test_both_ways_are_compared_on_the_range_both_visited(found):
     assert 0 < found.agreement.rms_relative <= found.agreement.max_relative
 
 
-def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
+def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found):
     """What the comparison sends through a way is all that its band holds, away from the ends of the range."""
     way = found.inverse
-    noise = sum(
-        gain @ source_covariance(measured, source, gain.shape[1]) @ gain.T for source, gain in way.law.gains.items()
-    )
+    noise = sum(gain @ gain.T for gain in way.law.gains.values())
     short = way.law.shortfall @ way.law_forms
     ratio = np.sqrt(np.diag(noise + short @ short.T) / np.diag(way.law.log_covariance))
     # The band averages over the prior's sizes, of which the sum takes one: that counts near K0, where the band is
@@ -55,13 +53,13 @@ def test_errors_of_the_data_and_of_the_form_add_up_to_the_band(found, measured):
     assert np.all((ratio[15:-1] > 0.75) & (ratio[15:-1] < 1.3))
 
 
-def test_what_both_ways_share_cancels_in_their_difference(found, measured):
+def test_what_both_ways_share_cancels_in_their_difference(found):
     one, two = found.inverse.law, found.balance.law
     grid = log_curve(one).common_grid(log_curve(two))
     no_form = tuple(np.zeros((law.kappa.size, 1)) for law in (one, two))
 
     def variances(first, second):
-        return np.diag(difference_covariance(measured, first, second, no_form, grid))
+        return np.diag(difference_covariance(first, second, no_form, grid))
 
     apart = variances(one, replace(two, gains={})) + variances(replace(one, gains={}), two)
     # Near the rest curvature the ways weigh the photos differently; in the other two thirds most is common.

@@ -12,8 +12,8 @@ from pipeline.settings import Settings
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.series import trace_series
-from rod.midline import block_covariance
 from rod.measurement import slow_covariance
+from rod.midline import block_covariance
 
 SCATTER, BRIEF = 5e-6, 5e-4
 OPTIONS = CurveSettings()
