@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.fit import Fit
@@ -41,7 +40,7 @@ def weighed(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion | None = None) ->
     for cause in range(len(suspicion.causes)):
         forms = suspicion.of(cause)
         if forms.size:
-            plain, rest = (float(logsumexp(values[forms]) - np.log(forms.size)) for values in added)
+            plain, rest = (float(np.logaddexp.reduce(values[forms]) - np.log(forms.size)) for values in added)
             further[cause] = plain, rest
     return Weighed(own, further)
 
