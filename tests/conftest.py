@@ -9,6 +9,7 @@ installs it; with ``CABLEBEND_BROWSER=required`` they fail instead.
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,10 @@ from pipeline.threads import one_thread
 # before any test loads numpy: threads of two workers wait for each other, and a diagnosis takes three times the
 # processor time; so the command does it, and so do its workers
 one_thread()
+
+# tests start the program a hundred times: each would compile three hundred files anew
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 SHARED = Path(os.environ.get("CABLEBEND_SHARED", Path(__file__).resolve().parents[2] / "shared")) / "data"
 BROWSER = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
