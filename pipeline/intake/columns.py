@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 
 from pipeline.errors import InputError
@@ -223,7 +222,6 @@ def factor_of(role: str, unit: str, path: Path, line: int | None) -> float:
     raise InputError(told, path=path, line=line)
 
 
-@lru_cache(maxsize=256)  # asked for each role
 def _split_unit(cell: str) -> tuple[str, str]:
     """Name and unit of a header cell; the unit is empty if none is given."""
     if found := UNIT_IN_NAME.fullmatch(cell):
@@ -249,7 +247,6 @@ def _bare(cell: str) -> str:
     return cell.strip("[]() ")
 
 
-@lru_cache(maxsize=256)
 def _plain(cell: str) -> str:
     """A name as it is compared: small letters, no punctuation, single blanks."""
     return " ".join(re.sub(r"[_.\-:#]+", " ", cell.casefold()).split())
