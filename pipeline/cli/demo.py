@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import chosen_options, chosen_settings, language_option, settings_options
-from pipeline.cli.speech import entry, table, told
-from pipeline.messages import Message
+from pipeline.cli.speech import entry, language, table, told
+from pipeline.messages import DECIMAL, Message
 
 if TYPE_CHECKING:
     from pipeline.result import Result, Visited
@@ -61,23 +61,26 @@ def demo(
 def echo_comparison(result: Result, truth: dict[str, Any]) -> None:
     """Print f_EI, K0 and forces, measured and true, with standard deviations and the difference in these."""
     heads = [told(Message(f"cli.demo-{name}")) for name in ("quantity", "measured", "truth", "off")]
-    rows = [(label, *_shown(value, std, true)) for label, value, std, true in compared(result, truth)]
+    rows = [(told(label), *_shown(value, std, true)) for label, value, std, true in compared(result, truth)]
     click.echo("\n".join(table([heads, *rows])))
 
 
-def compared(result: Result, truth: dict[str, Any]) -> list[tuple[str, float, float, float]]:
+def compared(result: Result, truth: dict[str, Any]) -> list[tuple[Message, float, float, float]]:
     """Label, measured value, standard deviation and truth of everything the demo knows."""
     from pipeline.result import curves
 
     ways = [way for way in curves(result).values() if way.method != "extended"]
     rows = [row for way in ways for row in _stiffness(way, truth)]
-    rows += [(f"K0, {way.method} [1/m]", way.pre_curvature, way.pre_curvature_std, truth["K0"]) for way in ways]
+    for way in ways:
+        label = Message("cli.demo-K0", way=way.method)
+        rows.append((label, way.pre_curvature, way.pre_curvature_std, truth["K0"]))
     for step, true in zip(result.steps, truth["steps"], strict=True):
-        rows.append((f"force, {1e3 * step.displacement_m:.2f} mm [N]", step.force_N, step.force_std_N, true["F"]))
+        label = Message("cli.demo-force", displacement_m=step.displacement_m)
+        rows.append((label, step.force_N, step.force_std_N, true["F"]))
     return rows
 
 
-def _stiffness(way: Visited, truth: dict[str, Any]) -> Iterator[tuple[str, float, float, float]]:
+def _stiffness(way: Visited, truth: dict[str, Any]) -> Iterator[tuple[Message, float, float, float]]:
     """f_EI (tangent) at a few curvatures of the visited range."""
     import numpy as np
 
@@ -85,7 +88,7 @@ def _stiffness(way: Visited, truth: dict[str, Any]) -> Iterator[tuple[str, float
     for at in np.unique(np.linspace(0, way.kappa.size - 1, COMPARED).round().astype(int)):
         kappa = way.kappa[at]
         true = float(np.interp(kappa - truth["K0"], law["excess_per_m"], law["tangent_Nm2"]))
-        label = f"f_EI({kappa:.2f} 1/m), {way.method} [mN m²]"
+        label = Message("cli.demo-stiffness", at_per_m=kappa, way=way.method)
         yield label, 1e3 * float(way.tangent[at]), 1e3 * float(way.tangent_std[at]), 1e3 * true
 
 
@@ -93,6 +96,7 @@ def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
     """Cells of a row: the measured value with its uncertainty, the truth to the same place, the difference in std."""
     from pipeline.rounding import fixed, rounded
 
-    text = rounded(value, std)
-    places = len(text.partition(" ")[0].partition(".")[2])
-    return text, fixed(true, places), f"{fixed((value - true) / std, 1)} σ" if std > 0.0 else ""
+    sign = DECIMAL[language()]
+    text = rounded(value, std, decimal=sign)
+    places = len(text.partition(" ")[0].partition(sign)[2])
+    return text, fixed(true, places, sign), f"{fixed((value - true) / std, 1, sign)} σ" if std > 0.0 else ""

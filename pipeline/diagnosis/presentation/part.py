@@ -19,7 +19,7 @@ from pipeline.diagnosis.presentation.leftover import described
 from pipeline.diagnosis.presentation.named import change_of_stiffness, extended_curve, hypotheses, named_causes
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
 from pipeline.diagnosis.words import could_have_been_seen, headline
-from pipeline.result import Curve, DiagnosisPart, NextExperiment
+from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
@@ -57,6 +57,7 @@ def present(
         leftover=leftover["message"],
     )
     photos, forces = left_out(bench)
+    spots = blind_spots(bench, seen, settings)
     return DiagnosisPart(
         verdict=word,
         headline=sentence,
@@ -65,8 +66,8 @@ def present(
         causes=causes,
         table=rows,
         gain=gain,
-        blind_spots=blind_spots(bench, seen, settings),
-        next_experiment=what_next(bench, conclusion, settings, unexplained=word == "unexplained"),
+        blind_spots=spots,
+        next_experiment=what_next(bench, conclusion, settings, spots=spots, unexplained=word == "unexplained"),
         extended=extended,
         extended_refuted=word == "unexplained"
         and not (accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)),
@@ -90,7 +91,12 @@ def left_out(bench: Workbench) -> tuple[list[int], list[int]]:
 
 
 def what_next(
-    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, unexplained: bool
+    bench: Workbench,
+    conclusion: Conclusion,
+    settings: DiagnosisSettings,
+    *,
+    spots: list[BlindSpot],
+    unexplained: bool,
 ) -> NextExperiment | None:
     """What separates the names that are confused; without any, what tells most about what these data cannot show.
 
@@ -107,4 +113,11 @@ def what_next(
         return NextExperiment(
             what="unload in the same steps, with photos", separates=["bearing_friction", "hysteresis", "plastic_set"]
         )
-    return NextExperiment(what="hang dead weights on the load cell", separates=["force_gain"])
+    gain = next((spot.stiffness_bias_at_plausible_size for spot in spots if spot.name == "force_gain"), None)
+    if gain is None:
+        return None
+    what = (
+        f"hang dead weights on the load cell: a usual error of its calibration changes f_EI by {100.0 * gain:.2g} %, "
+        "and nothing else shows it"
+    )
+    return NextExperiment(what=what, separates=["force_gain"])
