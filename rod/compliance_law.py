@@ -6,13 +6,14 @@ The compliance c = dK/dm is positive whatever its spline's coefficients a, so th
 
 with cubic B-splines over an abscissa xi from 0 to 1 that rises with the moment. A cable whose layers slip early loses
 its stiffness within a small part of the curvature but over a large part of the moment; one with a plateau of the moment
-does the opposite. Over the mean of both shares,
+does the opposite; one whose layers slip at once changes within little of both. Over the mean of three shares,
 
-    xi = (share of the moment + share of the bend K - K0) / 2,
+    xi = (share of the moment + share of the bend K - K0 + w share of the change of log c) / (2 + w),    w = T / (1 + T)
 
-neither happens within less than half of the interval. The bend is that of a law known before (`LawBasis.refreshed`);
-without one xi is the share of the moment. The law is one of the bend K - K0, so a cable that is set keeps it; beyond
-the moments of its basis the compliance is that of the nearer end.
+with T = int |d log c|, nothing of it happens within less than a third of the interval, and a law that hardly changes is
+one over moment and bend. All this is of a law known before (`refreshed`), and of its changes counts what is known of
+them; without one xi is the share of the moment. The law is one of the bend K - K0, so a cable that is set keeps it;
+beyond the moments of its basis the compliance is that of the nearer end.
 
 Units: moments in N m, compliance in 1/(N m^2), curvature in 1/m.
 
@@ -40,6 +41,9 @@ ends within a thirtieth of the range is smeared: 51 instead of 68 % of it lay in
 
 CELLS = 200
 """Of the integral of the compliance."""
+
+KNOWN = 4.0
+"""Standard deviations of a slope of log c of which half counts as known: waves that noise makes are nearly nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +93,12 @@ class LawBasis:
 
     def place(self, moment: ArrayLike) -> Array:
         """Abscissa xi of moments (n,), N m; that of the nearer end outside."""
-        m = np.clip(np.asarray(moment, float), self.moments[0], self.moments[-1])
-        return np.clip(CubicHermiteSpline(self.moments, self.xi[::2], 1.0 / self.pace[::2])(m), 0.0, 1.0)
+        return np.clip(self.abscissa(np.clip(np.asarray(moment, float), *self.moments[[0, -1]])), 0.0, 1.0)
+
+    @cached_property
+    def abscissa(self) -> CubicHermiteSpline:
+        """Xi over the moments of the basis."""
+        return CubicHermiteSpline(self.moments, self.xi[::2], 1.0 / self.pace[::2])
 
     def at(self, moment: ArrayLike) -> Array:
         """B-splines (n, p) at moments (n,) N m; those of the nearer end outside."""
@@ -119,18 +127,23 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
     return _basis(np.array([low, high]), np.array([0.0, 1.0]), lambda m: np.full(m.shape, span), unit=unit, size=size)
 
 
-def refreshed(law: ComplianceLaw, low: float, high: float) -> LawBasis:
-    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi the mean share of moment and bend of a law."""
+def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float) -> LawBasis:
+    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi along a law, known to a covariance (p, p)."""
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
     m = m[(m >= low) & (m <= high)]
     m = m[np.append(np.diff(m) > 1e-3 * (high - low) / CELLS, True)]  # rounding puts one moment in two places
     m[0] = low
     bend = law.bend(m)
-    share = 0.5 * ((m - low) / (high - low) + (bend - bend[0]) / (bend[-1] - bend[0]))
+    here, between = (law.known_slopes(covariance, at) for at in (m, 0.5 * (m[1:] + m[:-1])))
+    change = np.concatenate([[0.0], np.cumsum(np.diff(m) / 6.0 * (here[1:] + 4.0 * between + here[:-1]))])
+    weight = 1.0 / (1.0 + change[-1])
+    ranges, total = (high - low, bend[-1] - bend[0]), 2.0 + weight * change[-1]
+    share = ((m - low) / ranges[0] + (bend - bend[0]) / ranges[1] + weight * change) / total
 
     def pace(at: Array) -> Array:
-        return np.asarray(2.0 / (1.0 / (high - low) + law.compliance(at) / (bend[-1] - bend[0])))
+        change = weight * law.known_slopes(covariance, at)
+        return np.asarray(total / (1.0 / ranges[0] + law.compliance(at) / ranges[1] + change))
 
     return _basis(m, share, pace, unit=law.basis.unit, size=law.basis.size)
 
@@ -219,11 +232,19 @@ class ComplianceLaw:
     def log_slope(self, moment: ArrayLike) -> Array:
         """D log c / dm, (n,) 1/(N m); zero outside the moments of the basis."""
         m, b = np.asarray(moment, float), self.basis
-        place = b.place(m)
-        slope = np.asarray(b.spline(place, 1)) @ self.coefficients / np.interp(place, b.xi, b.pace)
+        slope = np.asarray(b.spline(b.place(m), 1)) @ self.coefficients * b.abscissa(m, 1)
         # the end of a range counts as inside, rounded as it may be
         outside = np.maximum(b.moments[0] - m, m - b.moments[-1])
         return np.where(outside <= 1e-9 * b.span, slope, 0.0)
+
+    def known_slopes(self, covariance: Array, moment: Array) -> Array:
+        """Size of d log c / dm (n,) 1/(N m) as far as it is known, see `KNOWN`; zero outside the moments of the basis."""
+        b = self.basis
+        by = np.asarray(b.spline(b.place(moment), 1))
+        square, doubt = (by @ self.coefficients) ** 2, KNOWN**2 * np.sum((by @ covariance) * by, axis=1)
+        size = square**1.5 / np.maximum(square + doubt, np.finfo(float).tiny)
+        inside = (moment >= b.moments[0]) & (moment <= b.moments[-1])
+        return np.where(inside, size * b.abscissa(moment, 1), 0.0)
 
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""

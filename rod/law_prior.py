@@ -146,17 +146,18 @@ class Posterior:
     information: Array
 
     @property
-    def law_covariance(self) -> Array:
-        """Covariance (p, p) of the one normal prior that would have made of the same data the same posterior.
+    def law_forms(self) -> Array:
+        """Forms (p, k) of the one normal prior that would have made of the same data the same posterior, one std each.
 
         Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says
-        nothing.
+        nothing, and there is no form.
         """
         p = len(self.information)
-        prior = np.linalg.inv(self.covariance[:p, :p]) - self.information
-        precisions, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
-        known = precisions > 1e-9 * precisions[-1]
-        return np.asarray((vectors[:, known] / precisions[known]) @ vectors[:, known].T)
+        variances, axes = np.linalg.eigh(self.covariance[:p, :p])
+        root = axes * np.sqrt(np.maximum(variances, 0.0))
+        told, turned = np.linalg.eigh(root.T @ self.information @ root)  # shares of the precision that are the data's
+        known = told < 1.0 - 1e-9
+        return np.asarray((root @ turned)[:, known] / np.sqrt(1.0 - told[known]))
 
 
 def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ...]) -> Posterior:

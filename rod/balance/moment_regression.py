@@ -141,7 +141,8 @@ def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -
         if found is None:
             return None
         met = np.concatenate([d.true_moment(model.errors(found.unknowns)) for d in model.data])
-        basis = refreshed(found.curve, float(met.min()), float(met.max()))
+        known = found.posterior.covariance[: model.size, : model.size]
+        basis = refreshed(found.curve, known, float(met.min()), float(met.max()))
         unknowns = np.concatenate([basis.projected(found.curve), found.unknowns[model.size :]])
         found = _settled(replace(model, basis=basis), unknowns, iterations, smooth=laid == LAYINGS - 1)
     return found

@@ -122,7 +122,6 @@ def read_off(
         covariance=np.pad(covariance, (0, 1)) + np.diag(np.eye(u.size + 1)[-1]),
     )
     splines = model.basis.at(moment)
-    values, vectors = np.linalg.eigh(posterior.law_covariance)
     rest = tuple(name for name in found.blocks if _is_rest(model, name))
     loaded = _without(model, found, rest) if rest else replace(posterior, mean=u)
     return Estimate(
@@ -136,7 +135,7 @@ def read_off(
             loaded_pre_curvature=float(loaded.mean[p]) / model.length,
             loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[p, p])) / model.length,
         ),
-        law_forms=splines @ vectors * np.sqrt(np.maximum(values, 0.0)),
+        law_forms=splines @ posterior.law_forms,
         model=model,
         evaluation=found if model.blur == (1.0, 1.0) else _as_stated(model, found),
         unknowns=u,

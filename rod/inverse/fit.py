@@ -136,7 +136,8 @@ def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations:
     """From a fit on with another noise, the abscissa of the law laid along the law found."""
     model, u = found.model, found.evaluation.unknowns
     if found.posterior is not None:
-        model, u = model.on(refreshed(model.law(u), *found.moments()), u)
+        known = found.posterior.covariance[: model.basis.size, : model.basis.size]
+        model, u = model.on(refreshed(model.law(u), known, *found.moments()), u)
     return _settle(replace(model, blur=noise), u, found.evaluation, within, evaluations, smooth=smooth)
 
 

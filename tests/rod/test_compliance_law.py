@@ -6,18 +6,23 @@ from scipy.integrate import quad
 from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
-from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, averaged, priors
+from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
 
 RNG = np.random.default_rng(3)
-STEEP = 2.0 * np.tanh((np.arange(COEFFICIENTS) - 12) / 2.0) + 0.2 * RNG.normal(size=COEFFICIENTS)
+RIPPLE = 0.2
+STEEP = 2.0 * np.tanh((np.arange(COEFFICIENTS) - 12) / 2.0) + RIPPLE * RNG.normal(size=COEFFICIENTS)
 """A fifty-fold fall within a sixth of the abscissa, and ripple on it."""
+
+AT = np.asarray(splines(COEFFICIENTS)(np.linspace(0.0, 1.0, 400)))
+KNOWN = np.zeros((COEFFICIENTS, COEFFICIENTS))
+"""Covariance of coefficients without doubt."""
 
 
 def laws():
     for low, high in ((0.0, 0.05), (-0.02, 0.05), (-0.03, 0.0)):
         first = moment_basis(low, high, unit=60.0).law(STEEP)
         yield first
-        second = refreshed(first, low, high)
+        second = refreshed(first, RIPPLE**2 * np.eye(COEFFICIENTS), low, high)  # what is known is the fall
         yield second.law(second.projected(first))
 
 
@@ -60,13 +65,24 @@ def test_derivatives_by_the_coefficients(law):
         assert np.allclose(by_log[:, i], slope, atol=1e-4 * np.abs(by_log).max())
 
 
-def test_a_law_laid_anew_is_the_same_law():
-    law = moment_basis(0.0, 0.05, unit=60.0).law(np.linspace(0.0, 3.0, COEFFICIENTS))
-    basis = refreshed(law, 0.0, 0.05)
+@pytest.mark.parametrize(("covariance", "weight"), [(KNOWN, 0.75), (KNOWN + 1e9 * np.eye(COEFFICIENTS), 0.0)])
+def test_a_law_laid_anew_is_the_same_law(covariance, weight):
+    """Log c rises by 3 along the moment: as far as that is known, the share of its change is that of the moment."""
+    law = moment_basis(0.0, 0.05, unit=60.0).law(np.linalg.lstsq(AT, 3.0 * np.linspace(0, 1, len(AT)), rcond=None)[0])
+    basis = refreshed(law, covariance, 0.0, 0.05)
     again = basis.law(basis.projected(law))
     assert np.allclose(again.bend(basis.moments), law.bend(basis.moments), atol=1e-4 * law.bend(0.05))
-    share = 0.5 * (basis.moments / 0.05 + law.bend(basis.moments) / law.bend(0.05))
-    assert np.allclose(basis.xi[::2], share, atol=1e-4)
+    moment, bend = basis.moments / 0.05, law.bend(basis.moments) / law.bend(0.05)
+    assert np.allclose(basis.xi[::2], (moment + bend + weight * moment) / (2.0 + weight), atol=1e-4)
+
+
+def test_a_slope_counts_as_far_as_it_is_known():
+    """A line of slope 3 over xi: half is left where the slope is four standard deviations."""
+    law = moment_basis(0.0, 0.05, unit=60.0).law(np.linalg.lstsq(AT, 3.0 * np.linspace(0, 1, len(AT)), rcond=None)[0])
+    std = np.sqrt(np.sum(np.asarray(splines(COEFFICIENTS)(law.basis.xi, 1)) ** 2, axis=1))
+    z = 3.0 / (1e-2 * std)
+    left = law.known_slopes(1e-4 * np.eye(COEFFICIENTS), 0.05 * law.basis.xi) / (3.0 / 0.05)
+    assert np.allclose(left, z**2 / (z**2 + 16.0), rtol=1e-6)
 
 
 def test_a_law_needs_moments():
@@ -183,3 +199,19 @@ def test_no_variance_is_negative_where_the_other_unknowns_imitate_the_law(streng
     J = np.block([[law + strength * others[:, :1], strength * others], [np.zeros((4, basis.size)), np.eye(4)]])
     found = averaged(np.r_[rng.normal(size=60), np.zeros(4)], J, np.zeros(basis.size + 4), priors(basis))
     assert np.all(np.diag(found.covariance) > 0.0)
+
+
+def test_forms_of_a_normal_prior_are_that_prior():
+    """Of a posterior by one normal prior its forms are those of the prior, whatever the data; the level has none."""
+    one = priors(moment_basis(0.0, 0.05, unit=60.0))[0]
+    precision = one.form / 2.0**2 + one.fixed
+    rows = RNG.normal(size=(40, COEFFICIENTS))
+    information = rows.T @ rows
+    covariance = np.linalg.inv(information + precision)
+    none = np.empty(0)
+    forms = Posterior(none, covariance, none, none, 0.0, information).law_forms
+    level = np.full((COEFFICIENTS, COEFFICIENTS), 1.0 / COEFFICIENTS)
+    apart = np.eye(COEFFICIENTS) - level
+    exact = np.linalg.pinv(precision, rcond=1e-10)
+    assert forms.shape[1] == COEFFICIENTS - 1
+    assert np.allclose(apart @ forms @ forms.T @ apart, apart @ exact @ apart, atol=1e-6 * exact.max())
