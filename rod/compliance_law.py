@@ -238,7 +238,7 @@ class ComplianceLaw:
         return np.where(outside <= 1e-9 * b.span, slope, 0.0)
 
     def known_slopes(self, covariance: Array, moment: Array) -> Array:
-        """Size of d log c / dm (n,) 1/(N m) as far as it is known, see `KNOWN`; zero outside the moments of the basis."""
+        """Size of d log c / dm (n,) 1/(N m) as far as it is known, see `KNOWN`; zero beyond the basis."""
         b = self.basis
         by = np.asarray(b.spline(b.place(moment), 1))
         square, doubt = (by @ self.coefficients) ** 2, KNOWN**2 * np.sum((by @ covariance) * by, axis=1)

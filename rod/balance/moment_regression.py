@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 BOW_TERMS = 4
 """Legendre terms of K0(s) - K0: a linear set from the spool, one and two bows, and a kink's rough place."""
 
-LAYINGS = 2
-"""Times that the abscissa is laid along the law found so far."""
+LAYINGS = 3
+"""Times that the abscissa is laid along the law found so far; each leaves a quarter of what the way there left."""
 
 
 @dataclass(frozen=True)
