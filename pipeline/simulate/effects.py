@@ -30,7 +30,10 @@ Values = tuple[float, ...]
 
 SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0 .. 10 1/m, as in the paper's Table 1
 ONE_SIDED = frozenset(
-    {"hysteresis", "plastic_set", "relaxation", "bearing_friction", "bearing_stiffness", "rigid_ends", "rig_compliance"}
+    {
+        *("hysteresis", "plastic_set", "relaxation", "bearing_friction", "bearing_stiffness", "rigid_ends"),
+        *("rig_compliance", "out_of_plane_bow"),
+    }
 )  # their sizes cannot be negative, as in the catalogue of causes
 POSSIBLE = {
     "stiffness_varying": (-1.0, 1.0, "a stiffness cannot be negative"),
@@ -38,6 +41,7 @@ POSSIBLE = {
     "force_gain": (-1.0, 10.0, "a load cell does not turn forces round"),
     "length_error": (-0.5, 1.0, "no length is mistaken for its half or double"),
     "scale_error": (-0.5, 1.0, "no scale is mistaken for its half or double"),
+    "stiffness_drift": (-0.1, 0.1, "a stiffness that changes by a tenth from step to step is another cable"),
 }
 """Between which their sizes lie (neither end included), and why."""
 
@@ -49,7 +53,8 @@ class Readings:
     """What the rig's instruments and the specimen's description get wrong.
 
     ``offset`` N, ``gain`` -, ``drift`` N/s; ``relaxation`` share of the force lost and ``relaxation_time`` s;
-    ``length`` and ``scale`` relative errors of the stated values.
+    ``length`` and ``scale`` relative errors of the stated values. ``stiffer``: share by which the cable itself, and
+    with it the force, grows from step to step; where nothing but the cable resists, its shape does not change.
     """
 
     offset: float = 0.0
@@ -59,6 +64,7 @@ class Readings:
     relaxation_time: float = 7.0
     length: float = 0.0
     scale: float = 0.0
+    stiffer: float = 0.0
 
     def shown(self, force: float, begin: float, time: Array) -> Array:
         """What the load cell shows (n,) N of a step's ``force``, ``time`` (n,) s after the hold began at ``begin``."""
@@ -68,11 +74,12 @@ class Readings:
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything an effect can change."""
+    """Everything an effect can change; ``bow`` (m): how far the largest bow stands up from the plane of the picture."""
 
     test: BendingTest
     readings: Readings
     camera: Camera
+    bow: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -239,6 +246,10 @@ def _lens(setup: Setup, values: Values) -> Setup:
     return replace(setup, camera=replace(setup.camera, k1=values[0]))
 
 
+def _bow(setup: Setup, values: Values) -> Setup:
+    return replace(setup, bow=values[0])
+
+
 _LOCAL = "and, for a local one, its place in lengths"
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
@@ -263,5 +274,7 @@ EFFECTS: dict[str, Effect] = {
         Effect("scale_error", "stated over true px/mm, minus 1", (1,), _on_readings("scale")),
         Effect("lens_distortion", "k1 at half the picture's diagonal", (1,), _lens),
         Effect("camera_tilt", "perspective terms along u and v, 1/m", (1, 2), _tilt),
+        Effect("out_of_plane_bow", "height of the largest bow over the plane, m", (1,), _bow),
+        Effect("stiffness_drift", "stiffer by this share from step to step", (1,), _on_readings("stiffer")),
     )
 }

@@ -10,6 +10,7 @@ from math import inf
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pipeline.simulate.experiment import Experiment, State
 from pipeline.vision.render import (
@@ -97,9 +98,9 @@ class Photography:
         )
         return camera.turned(self.quarter_turns)
 
-    def scene(self, experiment: Experiment, state: State, camera: Camera, number: int) -> Scene:
-        """The photo of one step."""
-        curve = Curve(state.s, state.x, state.y, state.theta, state.kappa)
+    def scene(self, experiment: Experiment, state: State, camera: Camera, number: int, *, lean: float = 0.0) -> Scene:
+        """The photo of one step; ``lean``: sine of the angle by which the cable's plane is turned about the chord."""
+        curve = _seen(state, lean)
         # Under a cover the cable goes on a little beyond the axis; without one it ends there.
         over = 0.0 if None in self.covers else 0.25 * min(c.diameter_m for c in self.covers if c is not None)
         place = (_left_axis(experiment, state), 0.0)
@@ -129,6 +130,18 @@ class Photography:
         rows = 7 if along != 7 else 6  # different counts tell the board's directions apart
         low = -0.5 * experiment.diameter_m
         return ChessBoard(along, rows, square, camera.look_at_m, (0.0, 0.0, turn), low)
+
+
+def _seen(state: State, lean: float) -> Curve:
+    """The curve in the picture: y is foreshortened, and with it arc length, direction and curvature."""
+    if not lean:
+        return Curve(state.s, state.x, state.y, state.theta, state.kappa)
+    flat = np.sqrt(1.0 - lean**2)
+    along, across = np.cos(state.theta), flat * np.sin(state.theta)
+    shorter = np.hypot(along, across)
+    s = CubicSpline(state.s, shorter).antiderivative()(state.s)
+    theta = state.theta + np.angle(np.exp(1j * (np.arctan2(across, along) - state.theta)))
+    return Curve(s, state.x, flat * state.y, theta, state.kappa * flat / shorter**3)
 
 
 def _left_axis(experiment: Experiment, state: State) -> float:

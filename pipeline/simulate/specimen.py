@@ -84,8 +84,9 @@ def write_specimen(
     (folder / "images").mkdir(parents=True, exist_ok=True)
     names = [f"images/step_{number:02d}{photography.suffix}" for number in range(len(states))]
     pictures = []
+    lean = _lean(setup, states)
     for number, (name, state) in enumerate(zip(names, states, strict=True)):
-        picture = render(photography.scene(experiment, state, setup.camera, number))
+        picture = render(photography.scene(experiment, state, setup.camera, number, lean=lean))
         _save(folder / name, picture.pixels, photography)
         pictures.append(_Traced(picture))
     if photography.scale == "board":
@@ -97,6 +98,22 @@ def write_specimen(
     truth_file = truth_file or folder.parent / f"{folder.name}.truth.json"
     truth_file.write_text(json.dumps(truth, indent=1), encoding="utf-8")
     return Written(folder, truth_file, truth)
+
+
+def _lean(setup: Setup, states: tuple[State, ...]) -> float:
+    """Sine of the angle by which the plane of the cable is turned about the chord.
+
+    Raises
+    ------
+    ValueError
+        If the bow cannot stand so high.
+    """
+    bow = max(float(np.max(np.abs(state.y))) for state in states)
+    if not setup.bow < bow:
+        raise ValueError(
+            f"out_of_plane_bow of {setup.bow:g} m is higher than the largest bow of the cable, {bow:.3g} m: give less"
+        )
+    return setup.bow / bow
 
 
 class _Traced:
@@ -130,7 +147,7 @@ def _force_log(
     digits = max(5, 3 - int(np.floor(np.log10(noise)))) if noise > 0 else 9
     for number, (state, branch) in enumerate(zip(states, experiment.branches, strict=True)):
         begin = number * experiment.period_s
-        force = readings.shown(state.force, begin, times)
+        force = readings.shown((1.0 + readings.stiffer * number) * state.force, begin, times)
         shown.append(float(force[-1]))
         force = force + noise * rng.standard_normal(times.size)
         for k, (time, value) in enumerate(zip(times, force, strict=True)):

@@ -54,6 +54,8 @@ CATALOGUE = [
     "scale_error",
     "lens_distortion",
     "camera_tilt",
+    "out_of_plane_bow",
+    "stiffness_drift",
 ]
 
 
@@ -133,8 +135,9 @@ def test_nonlinear_stiffness_takes_ordinates_and_one_is_a_constant() -> None:
         ({"force_gain": 0.02}, lambda F, t, begin: F * 1.02),
         ({"force_drift": 1e-4}, lambda F, t, begin: F + 1e-4 * (begin + t)),
         ({"relaxation": (0.05, 6.0)}, lambda F, t, begin: F * (1 - 0.05 * (1 - np.exp(-t / 6.0)))),
+        ({"stiffness_drift": -0.01}, lambda F, t, begin: F * (1 - 0.01 * begin / 60.0)),
     ],
-    ids=["offset", "gain", "drift", "relaxation"],
+    ids=["offset", "gain", "drift", "relaxation", "stiffness"],
 )
 def test_load_cell_shows(tmp_path: Path, effect: dict, shown: object) -> None:
     written = small(tmp_path / "a", effect)
@@ -170,6 +173,20 @@ def test_camera_effects_move_the_pixels_and_nothing_else(tmp_path: Path) -> None
         # 101 truth points are splined from the rod's 401 vertices, before or after the lens: 1e-6 px.
         assert np.array(b["px"]) == pytest.approx(middle + p * gain, abs=1e-5)
         assert np.array(c["px"]) == pytest.approx(middle + p / (1 + p @ [[0.1], [0.2]] / scale), abs=1e-5)
+
+
+def test_a_bow_that_leaves_the_plane_is_seen_foreshortened(tmp_path: Path) -> None:
+    plain, leaning = small(tmp_path / "a", {}).truth, small(tmp_path / "b", {"out_of_plane_bow": 0.01}).truth
+    top = max(np.max(np.array(step["xy_mm"])[:, 1]) for step in plain["steps"])
+    share = np.sqrt(1.0 - (10.0 / top) ** 2)
+    for a, b in zip(plain["steps"], leaning["steps"], strict=True):
+        assert a["F"] == b["F"] and a["xy_mm"] == b["xy_mm"]
+        u, v = np.array(a["px"]).T
+        # the chord lies along u, the axes at one v; tracing the spline of the nodes is right to 1e-4 px
+        assert np.array(b["px"])[:, 0] == pytest.approx(u, abs=1e-3)
+        assert np.array(b["px"])[:, 1] - v[0] == pytest.approx(share * (v - v[0]), abs=1e-3)
+    with pytest.raises(ValueError, match="higher than the largest bow"):
+        small(tmp_path / "c", {"out_of_plane_bow": 0.1})
 
 
 def test_folder_holds_what_a_measured_one_holds(tmp_path: Path) -> None:

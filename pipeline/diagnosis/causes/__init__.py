@@ -6,9 +6,10 @@ it is one.
 
 from __future__ import annotations
 
+from pipeline.diagnosis.causes.bow import OutOfPlaneBow
 from pipeline.diagnosis.causes.camera import CameraTilt, LensDistortion, ScaleError
 from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.causes.law import Hysteresis, NonlinearStiffness, PlasticSet
+from pipeline.diagnosis.causes.law import Hysteresis, NonlinearStiffness, PlasticSet, StiffnessDrift
 from pipeline.diagnosis.causes.load_cell import ForceDrift, ForceGain, ForceOffset, Relaxation
 from pipeline.diagnosis.causes.profile import PreCurvatureVarying, StiffnessVarying
 from pipeline.diagnosis.causes.rig import (
@@ -43,6 +44,8 @@ CATALOGUE: tuple[Cause, ...] = (
     ScaleError(),
     LensDistortion(),
     CameraTilt(),
+    OutOfPlaneBow(),
+    StiffnessDrift(),
 )
 
 SUSPECTS: tuple[Cause, ...] = tuple(cause for cause in CATALOGUE if not isinstance(cause, NonlinearStiffness))

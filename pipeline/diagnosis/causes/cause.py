@@ -33,6 +33,8 @@ class Variant:
     trace : float
         Multiple of the usual amount (`search.direction`) at which its trace in the data is computed: one that grows
         otherwise than in proportion looks elsewhere when it is large.
+    power : float
+        Power of the amount with which its trace grows.
     known : float
         Multiple of the usual amount that is the standard deviation of what is known of the amount beforehand; infinite
         where nothing is.
@@ -46,6 +48,7 @@ class Variant:
     width_range: tuple[float, float] = (0.0, 1.0)
     setting: str = ""
     trace: float = 1.0
+    power: float = 1.0
     known: float = np.inf
 
     @property

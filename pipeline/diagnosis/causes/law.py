@@ -3,6 +3,9 @@
 nonlinear_stiffness  another control point: f_EI has a form the spline of the base model cannot follow
 hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached; the law moves along or stays (see `rod.section`)
+stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
+
+Where nothing but the cable resists, moments multiplied alike multiply the force and leave the shapes as they were.
 """
 
 from __future__ import annotations
@@ -10,11 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.cause import UNLOADING, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model
+from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
+
+Array = NDArray[np.float64]
 
 LAW = "nonlinear_stiffness"
 """Name of the cause that is no second one beside another: a further control point of the law is a finer base."""
@@ -144,3 +150,63 @@ class PlasticSet:
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let ``amount`` of the largest excess curvature stay."""
         return replace(model, bending=replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5))
+
+
+@dataclass(frozen=True)
+class StiffnessDrift:
+    """``stiffness_drift``: the stiffness changes from step to step."""
+
+    name: str = "stiffness_drift"
+    unit: str = "-"
+    sign: int = 0
+    combines: bool = False
+    additive: bool = False
+    limited: bool = True
+    seat: str = "cable"
+    needs: str = "steps enough that a law of any form does not take it over, best an unloading branch"
+    summary: str = "The cable grows stiffer or softer while the test runs, as it warms up, cools down or ages."
+    sign_means: str = "positive: stiffer by this share from one step to the next, on average over the test"
+    apart: str = (
+        "All forces change by one factor, the shapes by nothing. A drift of the load cell adds the same force at every "
+        "load, also to the force-free cable."
+    )
+    remedy: str = "Keep cable and room at one temperature, wait before the test, and log the temperature at every step."
+    settled_by: str = "the first steps once more at the end of the test"
+
+    def plausible(self, facts: Facts) -> float:
+        """Five percent over the test: a plastic sheath that warms up by one or two kelvin."""
+        return 0.05 / max(len(facts.branch) - 1, 1)
+
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Steady, settling (``width`` above 0) or speeding up; from step to step, or in the holds (``at`` 1) too."""
+        form = Variant("from step to step", tuned=("width",), width_range=(-4.0, 4.0))
+        if len(facts.branch) < 3:
+            return ()
+        return (form, replace(form, label="steadily, also in the holds", at=1.0)) if facts.timed else (form,)
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Multiply the forces of step k by ``1 + amount g(k)``."""
+        count = len(facts.branch)
+        begin = np.arange(count, dtype=float)
+        pace = (count - 1) / facts.clock[-1] if variant.at > 0.5 else 0.0  # steps per second
+        if pace:
+            begin = pace * facts.clock
+        photo = 1.0 + amount * _passed(begin + pace * facts.photo_time, count, variant.width)
+        held = [
+            1.0 + amount * _passed(first + pace * times, count, variant.width)
+            for first, times in zip(begin, facts.hold_times, strict=True)
+        ]
+
+        def observer(prediction: Prediction, facts: Facts) -> Prediction:
+            samples = tuple(factor * force for factor, force in zip(held, prediction.samples, strict=True))
+            return replace(prediction, force=photo * prediction.force, samples=samples)
+
+        return model.observed(observer)
+
+
+def _passed(steps: Array, count: int, settling: float) -> Array:
+    """Change (n,) after so many steps, from 0 to ``count - 1``: linear, or like 1 - exp(-settling share)."""
+    share = steps / (count - 1)
+    if abs(settling) < 1e-6:
+        return np.asarray((count - 1) * share)
+    return np.asarray((count - 1) * np.expm1(-settling * share) / np.expm1(-settling))

@@ -45,12 +45,15 @@ class Addition:
         Linear estimate of each, in the unit of its cause.
     columns : (N, terms)
         Their whitened traces per unit of amount.
+    trace : float
+        Share of the plausible size at which traces were computed.
     """
 
     base: Fit
     terms: tuple[Term, ...]
     amounts: tuple[float, ...]
     columns: Array
+    trace: float
 
     @property
     def extension(self) -> Extension:
@@ -63,7 +66,10 @@ class Addition:
         facts, parts = self.base.extension.facts, [vector]
         for term, amount in zip(self.terms, self.amounts, strict=True):
             limit = SANE * term.cause.plausible(facts)
-            value = float(np.clip(share * amount, -limit, limit))
+            traced = self.trace * term.variant.trace * term.cause.plausible(facts)
+            # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
+            bent = np.sign(share * amount) * traced * abs(share * amount / traced) ** (1.0 / term.variant.power)
+            value = float(np.clip(bent, -limit, limit))
             parts.append(term.numbers(max(value, 0.0) if term.cause.sign > 0 else value))
         return np.concatenate(parts)
 
@@ -108,7 +114,7 @@ def fit_terms(
         terms = tuple(Term(term.cause, replace(term.variant, tuned=())) for term in terms)
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
-    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
+    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)], settings.trace)
     best: Fit | None = None
     for start in (linear_start(observation, added), *_other_valleys(added)):
         found = fit_from(observation, added.extension, start, base, settings, hopeless=hopeless)

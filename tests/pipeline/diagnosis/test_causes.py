@@ -20,6 +20,7 @@ CONTRACT = {
     "nonlinear_stiffness", "pre_curvature_varying", "stiffness_varying", "hysteresis", "plastic_set", "relaxation",
     "bearing_friction", "bearing_stiffness", "rigid_ends", "rig_compliance", "displacement_offset", "length_error",
     "force_offset", "force_drift", "force_gain", "in_plane_load", "scale_error", "lens_distortion", "camera_tilt",
+    "out_of_plane_bow", "stiffness_drift",
 }  # fmt: skip
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 
