@@ -70,6 +70,8 @@ class BendingTest:
         Growth of K0 with the largest curvature reached.
     law_stays : bool
         Whether the law stays at its curvature while K0 grows; else it moves along (see `rod.section`).
+    set_threshold : 1/m
+        Bend from rest beyond which K0 grows.
     zero : "natural", "loaded", "length" or m
         Distance of the axes at displacement zero.
     displacement_offset : m
@@ -91,6 +93,7 @@ class BendingTest:
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
     law_stays: bool = False
+    set_threshold: float = 0.0
     zero: Literal["natural", "loaded", "length"] | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
@@ -108,7 +111,8 @@ class BendingTest:
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
         profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
-        section = Section(self.characteristic, K0, profile, self.friction, self.plastic_rate, self.law_stays)
+        grows = self.plastic_rate, self.law_stays, self.set_threshold
+        section = Section(self.characteristic, K0, profile, self.friction, *grows)
         return Rod(
             self.length,
             elements,

@@ -25,6 +25,7 @@ name                     what changes                                           
 ``hysteresis``           half width of the internal friction                                     N m
 ``stick_curvature``      its curvature change to slip                                            1/m
 ``plastic_set``          growth of K0 with the largest curvature                                 1/m per 1/m
+``set_threshold``        bend from rest beyond which K0 grows                                    1/m
 ``axial_flexibility``    1/EA; ``shear_flexibility`` 1/GA                                        1/N
 =======================  ======================================================================  =============
 
@@ -155,6 +156,7 @@ _SCALARS = (
     "hysteresis",
     "stick_curvature",
     "plastic_set",
+    "set_threshold",
     "axial_flexibility",
     "shear_flexibility",
     *(f"{name}_{side}" for name in _BOTH_ENDS for side in ("left", "right")),
@@ -245,6 +247,7 @@ def _numbers(test: BendingTest) -> dict[str, float]:
         "load_x": test.load[0],
         "load_y": test.load[1],
         "plastic_set": test.plastic_rate,
+        "set_threshold": test.set_threshold,
     }
     for side, support in (("left", test.left), ("right", test.right)):
         numbers |= {

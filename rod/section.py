@@ -6,10 +6,11 @@ From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and t
 
 * Internal friction (wires that rub): parallel elasto-plastic elements (Prandtl-Ishlinskii). Element e sticks over a
   curvature change c_e and slips at the moment M_e; z_e is its relaxed curvature, its memory. At the start z_e = K0.
-* Plastic set p = rate * max(reached, K - K0), where ``reached`` is the largest excess K - K0 so far: the cable is free
-  of moment at K0 + p. The law m_law(K, K0) moves along with its rest, m_law(K - p, K0), as that of a cable that has
-  been bent to another shape; or it stays at its curvature (``law_stays``), m_law(K, K0) - m_law(K0 + p, K0), as that of
-  a cable whose stiffness belongs to the shape it has. For a law of constant stiffness both are the same.
+* Plastic set p = rate * (max(reached, K - K0) - threshold), where ``reached`` is the largest excess K - K0 so far, the
+  threshold at least: the cable is free of moment at K0 + p. The law m_law(K, K0) moves along with its rest,
+  m_law(K - p, K0), as that of a cable that has been bent to another shape; or it stays at its curvature
+  (``law_stays``), m_law(K, K0) - m_law(K0 + p, K0), as that of a cable whose stiffness belongs to the shape it has. For
+  a law of constant stiffness both are the same.
 
 Within one displacement step the response is a function of K alone with the memory of the step's start: an increment is
 a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
@@ -126,6 +127,8 @@ class Section:
         Growth of K0 with the largest curvature reached, 1/m per 1/m.
     law_stays : bool
         Whether the law stays at its curvature while K0 grows.
+    set_threshold : 1/m
+        Bend from rest beyond which a set begins.
     """
 
     law: MomentCurve
@@ -134,6 +137,7 @@ class Section:
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
     law_stays: bool = False
+    set_threshold: float = 0.0
 
     def rest(self) -> Array:
         """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
@@ -143,11 +147,13 @@ class Section:
     def virgin(self) -> tuple[Array, Array]:
         """``relaxed`` (friction elements, n) and ``reached`` (n,) of the mounted cable, 1/m."""
         elements = 0 if self.friction is None else self.friction.stick.size
-        return np.repeat(self.pre_curvature[None], elements, axis=0), np.zeros_like(self.pre_curvature)
+        reached = np.full_like(self.pre_curvature, self.set_threshold)
+        return np.repeat(self.pre_curvature[None], elements, axis=0), reached
 
     def set_at(self, K: Array, memory: Memory) -> Array:
         """Plastic set p that goes with curvature K, (n,) 1/m."""
-        return np.asarray(self.plastic_rate * np.maximum(memory.reached, K - self.pre_curvature))
+        largest = np.maximum(memory.reached, K - self.pre_curvature)
+        return np.asarray(self.plastic_rate * (largest - self.set_threshold))
 
     def rest_curvature(self, K: Array, memory: Memory) -> Array:
         """Pre-curvature with the set that goes with curvature K, (n,) 1/m."""
@@ -217,7 +223,7 @@ class Section:
         """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
         # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
         turn = np.minimum(K, self.pre_curvature + memory.reached) if self.plastic_rate else K
-        energy = self._law_energy(turn, self.plastic_rate * memory.reached)
+        energy = self._law_energy(turn, self.plastic_rate * (memory.reached - self.set_threshold))
         if self.plastic_rate:
             nodes, weights = np.polynomial.legendre.leggauss(12)
             k = turn + 0.5 * (K - turn) * (nodes[:, None] + 1.0)

@@ -116,7 +116,7 @@ def derivatives(
     elements = 0 if test.friction is None else test.friction.stick.size
     past = _Past(
         np.repeat(moves.pre_curvature[None], elements, axis=0),
-        np.zeros_like(moves.pre_curvature),
+        np.repeat(moves.scalar("set_threshold")[:, None], moves.pre_curvature.shape[1], axis=1),
         rest.angles[:, 0],
         rest.angles[:, -1],
     )
@@ -217,8 +217,9 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
     set_move = moves.none[:, None]
     if section.plastic_rate or moves.has("plastic_set"):
         K0 = section.pre_curvature
-        excess = np.maximum(memory.reached, K - K0)
+        excess = np.maximum(memory.reached, K - K0) - section.set_threshold
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
+        grown = grown - moves.scalar("set_threshold")[:, None]
         set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
         reads = section.read(K, section.set_at(K, memory))
     moment: Array | float = 0.0

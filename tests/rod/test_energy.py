@@ -152,6 +152,7 @@ FRICTIONAL = {
     "internal friction": {"friction": InternalFriction(1e-3, 1.5)},
     "bearing friction": {"left": Support(friction_moment=6e-4), "right": Support(friction_moment=3e-4)},
     "plastic set": {"plastic_rate": 0.1},
+    "plastic set beyond a threshold": {"plastic_rate": 0.1, "set_threshold": 1.5},
     "plastic set beside a law that stays": {"plastic_rate": 0.1, "law_stays": True},
 }
 

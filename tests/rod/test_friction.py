@@ -69,6 +69,9 @@ def test_plastic_set_moves_the_rest_curvature_by_rate_times_excess() -> None:
     m = history(section(plastic_rate=rate), np.r_[forth, back])
     assert m[:2] == pytest.approx(1e-3 * (1.0 - rate) * (forth - 2.0), rel=1e-12)
     assert m[2:] == pytest.approx(1e-3 * (back - (2.0 + rate * 4.0)), rel=1e-12, abs=1e-15)  # zero at the new rest
+    late = history(replace(section(plastic_rate=rate), set_threshold=1.5), np.r_[forth, back])
+    assert late[0] == pytest.approx(1e-3, rel=1e-12)  # below the threshold nothing stays
+    assert late[1:] == pytest.approx(1e-3 * (np.r_[6.0, back] - (2.0 + rate * 2.5)), rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize("abscissa", ["curvature", "excess"])

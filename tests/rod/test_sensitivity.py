@@ -31,6 +31,7 @@ EVERYTHING = BendingTest(
     right=Support(stiffness=1e-3, friction_moment=2e-4, rigid_length=3e-3),
     friction=InternalFriction(1e-3, 1.5),
     plastic_rate=0.05,
+    set_threshold=0.3,
     axial_stiffness=5e3,
     shear_stiffness=3e3,
     displacement_offset=1e-4,
@@ -90,6 +91,7 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
         3e-4,
     ),
     "plastic_set": (lambda t, h: replace(t, plastic_rate=t.plastic_rate + h), 3e-5),
+    "set_threshold": (lambda t, h: replace(t, set_threshold=t.set_threshold + h), 3e-4),
     "axial_flexibility": (lambda t, h: replace(t, axial_stiffness=1.0 / (1.0 / t.axial_stiffness + h)), 3e-7),
     "shear_flexibility": (lambda t, h: replace(t, shear_stiffness=1.0 / (1.0 / t.shear_stiffness + h)), 3e-6),
 }

@@ -144,12 +144,20 @@ class PlasticSet:
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """The law moves along with the new rest, or (``at`` 1) stays at its curvature."""
-        return Variant("with a law that moves along"), Variant("with a law that stays", at=1.0)
+        """The law moves along with the new rest, or (``at`` 1) stays; from the first bend on, or beyond ``width``."""
+        threshold = 0.3 * facts.curvature_scale
+        late = Variant(width=threshold, tuned=("width",), width_range=(0.0, 3.0 * threshold))
+        return tuple(
+            replace(form, label=label, at=at)
+            for form in (Variant(), late)
+            for label, at in (("with a law that moves along", 0.0), ("with a law that stays", 1.0))
+        )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Let ``amount`` of the largest excess curvature stay."""
-        return replace(model, bending=replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5))
+        """Let ``amount`` of the largest excess curvature beyond the threshold stay."""
+        threshold = max(variant.width, 0.0)
+        grows = replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5, set_threshold=threshold)
+        return replace(model, bending=grows)
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,25 @@ def log_sum(logs: Array) -> Array:
     return np.asarray(top + np.log(np.exp(logs - top).sum(axis=0)))
 
 
+class Moments(NamedTuple):
+    """What the error models say of a fit's own unknowns: how likely each is (G,), moves (G, p), covariances (G, p, p).
+
+    ``rest`` (G,): whether an error model holds something else.
+    """
+
+    log_weight: Array
+    move: Array
+    covariance: Array
+    rest: NDArray[np.bool_]
+
+
+def moments(grid: ErrorGrid, fitted: Fit) -> Moments:
+    """Mean and covariance of a fit's unknowns under every error model."""
+    solved, size = _solved(grid, fitted, np.zeros((len(fitted.residual), 0))), fitted.extension.size
+    weight = solved.flat + _amounts(fitted, solved) + solved.products.log_prior
+    return Moments(weight, solved.move[:, :size], solved.inverse[:, :size, :size], solved.products.rest)
+
+
 def _total(logs: Array) -> Array:
     """Log of the sum over the error models (G, ...); minus infinity where a grid has none of a kind."""
     return log_sum(logs) if len(logs) else np.full(logs.shape[1:], -np.inf)

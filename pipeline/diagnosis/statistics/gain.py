@@ -8,9 +8,10 @@ and both predict what was left out. Misfits are weighed by the predictive covari
 so that what neither model could know (a law beyond the curvatures met) counts for neither. Reported is the share of the
 excess misfit that the extension removes,
 
-    (chi2_base - chi2_ext) / (chi2_base - N),
+    1 - (chi2_ext - N) / (chi2_base - N),
 
-with an interval by parametric bootstrap, and root mean squares in N and m for people.
+which lies between 0 and 1: an extension that comes below the noise has removed all, one that does worse nothing. It has
+an interval by parametric bootstrap, and root mean squares in N and m for people stand beside it.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     excess = float(before @ before) - count
     if excess <= SIGNIFICANT * np.sqrt(2.0 * count):
         return None
-    removed = (float(before @ before) - float(after @ after)) / excess
+    removed = float(np.clip((float(before @ before) - float(after @ after)) / excess, 0.0, 1.0))
     # what the extension takes away is the signal; noise is drawn anew, as large as what it leaves
     signal = before - after
     level = np.sqrt(max(1.0, float(after @ after) / count))
@@ -82,7 +83,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     along = level * rng.standard_normal(draws)
     gained = size**2 + 2.0 * size * along
     base_chi2 = gained + along**2 + level**2 * rng.chisquare(max(count - 1, 1), draws)
-    share = gained / np.maximum(base_chi2 - count, 0.5 * excess)
+    share = np.clip(gained / np.maximum(base_chi2 - count, 0.5 * excess), 0.0, 1.0)
     low, high = np.quantile(share, [0.025, 0.975])
     return HeldOut(removed, (float(min(low, removed)), float(max(high, removed))), excess)
 
