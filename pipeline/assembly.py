@@ -26,11 +26,13 @@ from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, S
 from pipeline.result import (
     DiagnosisPart,
     FindingPart,
+    InversePart,
     PhotoPart,
     PreviewPart,
     Result,
     ScalePart,
     SpecimenPart,
+    Widening,
     leading,
 )
 from pipeline.settings import Settings
@@ -85,6 +87,7 @@ def assemble(
         The command that reproduces the result.
     """
     parts = identification_parts(identification)
+    inverse = parts.inverse if diagnosis is None else with_all_believed(parts.inverse, diagnosis.widening)
     measured = parts.inverse.converged or parts.balance.curve is not None
     result = Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
@@ -97,7 +100,7 @@ def assemble(
         ),
         photos=photo_parts(specimen, traces, parts),
         steps=parts.steps,
-        inverse=parts.inverse,
+        inverse=inverse,
         balance=parts.balance,
         agreement=parts.agreement,
         diagnosis=diagnosis,
@@ -105,6 +108,15 @@ def assemble(
         provenance=provenance(specimen, settings, command),
     )
     return result.model_copy(update={"answer_": result.answer.stored(), "headline": str(headline(result))})
+
+
+def with_all_believed(part: InversePart, widening: Widening | None) -> InversePart:
+    """The curve of way one, where it is the answer, with all that the diagnosis believes in its band."""
+    if widening is None or part.curve is None or part.pre_curvature_std_per_m is None:
+        return part
+    more = float(np.linalg.norm(widening.pre_curvature_factor_per_m))
+    rest = float(np.hypot(part.pre_curvature_std_per_m, more))
+    return part.model_copy(update={"curve": widening.of(part.curve), "pre_curvature_std_per_m": rest})
 
 
 def _gathered(

@@ -37,6 +37,7 @@ from pipeline.result.parts import (
     ScalePart,
     SpecimenPart,
     StepPart,
+    Widening,
 )
 from pipeline.result.visited import Visited, visited
 from pipeline.result.whole import Result
@@ -69,6 +70,7 @@ __all__ = [
     "SpecimenPart",
     "StepPart",
     "Visited",
+    "Widening",
     "curves",
     "from_json",
     "leading",

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from pipeline.result.lists import Floats, Number
-from pipeline.result.parts import Curve, Part
+from pipeline.result.parts import Curve, Part, Widening
 
 
 class CauseForm(Part):
@@ -157,6 +157,9 @@ class DiagnosisPart(Part):
     extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
     extended_refuted: bool = Field(
         False, description="whether the data refute the extended model, so that its curve is no answer"
+    )
+    widening: Widening | None = Field(
+        None, description="what weak effects and something else add to the band of the curve that answers"
     )
     leftover: dict[str, Any] | None = Field(
         None,

@@ -9,7 +9,9 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.integrate import cumulative_trapezoid
 
 from pipeline.messages import UNREADABLE, Message
 from pipeline.records import Level
@@ -153,6 +155,41 @@ class Curve(Part):
         along = set(Curve.model_fields) - {factor, "pre_curvature_factor_per_m"}
         check_one_length(self, tuple(sorted(along)), (factor,))
         return self
+
+
+class Widening(Part):
+    """What all that is believed adds to the band of the curve that answers, beyond what its own way tells."""
+
+    kappa_per_m: Floats = Field(description="curvature, increasing, 1/m")
+    tangent_factor: list[Floats] = Field(
+        description="F (n, r), relative: F F^T is the covariance of the logarithm of tangent_Nm2 that is added"
+    )
+    pre_curvature_factor_per_m: Floats = Field(description="g (r,) in 1/m: the same for the pre-curvature")
+
+    def of(self, curve: Curve) -> Curve:
+        """A curve with the wider band.
+
+        At fixed curvature an error df of the tangent and dK0 of the pre-curvature are an error of the moment of
+        ``-f(K0) dK0 + integral of df``.
+        """
+        kappa, tangent = np.array(curve.kappa_per_m), np.array(curve.tangent_Nm2)
+        relative = [np.interp(kappa, self.kappa_per_m, column) for column in np.array(self.tangent_factor).T]
+        by_f = tangent[:, None] * np.column_stack(relative)
+        by_rest = np.array(self.pre_curvature_factor_per_m)
+        by_m = cumulative_trapezoid(by_f, kappa, axis=0, initial=0) - tangent[0] * by_rest
+        tangent_std, moment_std = (
+            np.hypot(std, np.linalg.norm(more, axis=1))
+            for std, more in ((curve.tangent_std_Nm2, by_f), (curve.moment_std_Nm, by_m))
+        )
+        bend = np.array(curve.moment_Nm) / curve.secant_Nm2
+        far = bend > 1e-3 * bend.max()  # at rest the secant is the tangent, and so is its band
+        secant_std = np.where(far, moment_std / np.where(far, bend, 1.0), tangent_std)
+        whole = {"tangent_std_Nm2": tangent_std, "moment_std_Nm": moment_std, "secant_std_Nm2": secant_std}
+        update: dict[str, Any] = {name: values.tolist() for name, values in whole.items()}
+        if curve.tangent_factor_Nm2:
+            update["tangent_factor_Nm2"] = np.hstack([curve.tangent_factor_Nm2, by_f]).tolist()
+            update["pre_curvature_factor_per_m"] = [*curve.pre_curvature_factor_per_m, *by_rest.tolist()]
+        return curve.model_copy(update=update)
 
 
 class KnotPart(Part):

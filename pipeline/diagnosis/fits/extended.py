@@ -12,6 +12,7 @@ Where several causes explain the same data, the distance between their curves wi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,38 @@ def visited(fitted: Fit) -> tuple[float, float]:
     """
     kappa = fitted.extension.base.pre_curvature(fitted.vector) + fitted.excess
     return float(kappa.min()), float(kappa.max())
+
+
+class Stated(NamedTuple):
+    """log f_EI at curvatures and, last, K0 (1/m) of a fitted model: values (n + 1,), derivatives (n + 1, p)."""
+
+    values: Array
+    rows: Array
+
+
+def stated(fitted: Fit, kappa: Array) -> Stated:
+    """f_EI of a fitted model at curvatures (n,) 1/m; as little as a thousandth of the largest where it falls lower."""
+    law, K0 = law_of(fitted), fitted.extension.base.pre_curvature(fitted.vector)
+    tangent = law.tangent(kappa, K0)
+    tangent = np.maximum(tangent, 1e-3 * np.max(tangent))
+    rows = np.zeros((len(kappa) + 1, fitted.extension.size))
+    rows[:-1] = _by_parameters(fitted, law, kappa)[0] / tangent[:, None]
+    if (bend := fitted.extension.base.pre_curvature_index) is not None:
+        rows[-1, bend] = 1.0
+    return Stated(np.append(np.log(tangent), K0), rows)
+
+
+def _by_parameters(fitted: Fit, law: Characteristic, K: Array) -> tuple[Array, Array]:
+    """Derivatives (n, p) of f_EI and of the moment at curvatures (n,)."""
+    base = fitted.extension.base
+    K0, own = base.pre_curvature(fitted.vector), base.law_directions(fitted.vector, law.knots)
+    by_tangent, by_moment = np.zeros((2, len(K), fitted.extension.size))
+    by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own  # the parameters are logarithms
+    by_moment[:, : own.shape[1]] = law.moment_by_parameters(K, K0) @ own
+    if (bend := base.pre_curvature_index) is not None:
+        by_tangent[:, bend] = -_slope(law, K, K0)
+        by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
+    return by_tangent, by_moment
 
 
 def curve(
@@ -59,13 +92,8 @@ def curve(
     law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
     low, high = visited(fitted)
     K = np.linspace(max(low, K0), high, points)
-    own = base.law_directions(fitted.vector, law.knots)  # the parameters are logarithms
-    by_tangent, by_moment = np.zeros((2, points, fitted.extension.size))
-    by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own
-    by_moment[:, : own.shape[1]] = law.moment_by_parameters(K, K0) @ own
-    if (bend := base.pre_curvature_index) is not None:
-        by_tangent[:, bend] = -_slope(law, K, K0)
-        by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
+    by_tangent, by_moment = _by_parameters(fitted, law, K)
+    bend = base.pre_curvature_index
     used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
     by_rest = np.zeros(fitted.extension.size)

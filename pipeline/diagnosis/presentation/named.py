@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
+from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change, visited
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
-from pipeline.result import CausePart, Curve, HypothesisPart
+from pipeline.diagnosis.posterior.mixture import widening
+from pipeline.result import CausePart, Curve, HypothesisPart, Widening
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
@@ -69,15 +73,21 @@ TOLD = 1e-6
 """Probability below which a hypothesis is not told; all of these together change no digit that is shown."""
 
 
-def extended_curve(again: Identified, conclusion: Conclusion, settings: DiagnosisSettings) -> Curve:
-    """f_EI of the extended model, with what the data cannot tell in its band: the law's smoothness, and the class."""
-    rivals = [(one.fitted, chance) for one, chance in conclusion.rivals]
-    return curve(
-        again.fitted,
-        points=settings.curve_points,
-        covariance=again.covariance,
-        rivals=[*rivals, *again.rivals],
-    )
+def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
+    """f_EI of the extended model, with the law's smoothness in its band."""
+    points, rivals = settings.curve_points, again.rivals
+    return curve(again.fitted, points=points, covariance=again.covariance, rivals=rivals)
+
+
+def all_believed(bench: Workbench, conclusion: Conclusion, answer: Fit) -> Widening:
+    """What all hypotheses add to the band of a fit that answers."""
+    low, high = visited(answer)
+    kappa = np.linspace(max(low, answer.extension.base.pre_curvature(answer.vector)), high, READ)
+    return widening(conclusion.grid, conclusion.posterior, bench.base, bench.suspicion, answer, kappa)
+
+
+READ = 31
+"""Curvatures at which hypotheses are compared: f_EI is smooth between its 12 control points."""
 
 
 def change_of_stiffness(

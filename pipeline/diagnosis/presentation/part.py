@@ -16,7 +16,13 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.plans.next_experiment import next_experiment
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.diagnosis.presentation.leftover import described
-from pipeline.diagnosis.presentation.named import change_of_stiffness, extended_curve, hypotheses, named_causes
+from pipeline.diagnosis.presentation.named import (
+    all_believed,
+    change_of_stiffness,
+    extended_curve,
+    hypotheses,
+    named_causes,
+)
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
 from pipeline.diagnosis.words import could_have_been_seen, headline
 from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
@@ -38,7 +44,7 @@ def present(
             for error in bench.test.common_force_errors
         ]
         again = identified_again(bench.observation, accepted.fitted, settings, force_errors=errors)
-    extended = None if again is None else extended_curve(again, conclusion, settings)
+    extended = None if again is None else extended_curve(again, settings)
     causes = named_causes(bench, conclusion, again, extended)
     word = verdict(
         found=accepted is not None,
@@ -46,6 +52,13 @@ def present(
         classes=conclusion.classes,
         powerless=len(seen) < settings.powerless * len(rows),
     )
+    refuted = word == "unexplained" and not (
+        accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)
+    )
+    answering = bench.base if accepted is None or extended is None or refuted else accepted.fitted
+    wider = all_believed(bench, conclusion, answering)
+    if extended is not None and answering is not bench.base:
+        extended = wider.of(extended)
     leftover = described(bench, conclusion)
     believed, none = hypotheses(bench, conclusion)
     sentence = headline(
@@ -69,8 +82,8 @@ def present(
         blind_spots=spots,
         next_experiment=what_next(bench, conclusion, settings, spots=spots, unexplained=word == "unexplained"),
         extended=extended,
-        extended_refuted=word == "unexplained"
-        and not (accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)),
+        extended_refuted=refuted,
+        widening=wider if answering is bench.base else None,
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,

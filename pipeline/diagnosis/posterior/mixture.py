@@ -1,0 +1,136 @@
+"""How far f_EI and K0 may lie from a fit by all that is believed: the mixture over hypotheses and error models.
+
+Every hypothesis that was refitted, with and without something else, is under every error model (`evidence`) a normal
+distribution of log f_EI at curvatures K_i and of K0: about that fit, with the error model's own mean and covariance. A
+cause that was weighed by the linear model alone moves the base model's unknowns by -(J^+ c) a, with its amount a and
+variance given each size beforehand. So effects too weak to be named, names that cannot be told apart, and what no cause
+makes are in the band, each as far as it is believed.
+
+The band is the narrowest symmetric one about the fit that answers which holds 95 % of the mixture at every curvature.
+What it has beyond the band of that fit alone is told as factors, correlated along the curvature like the mixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp, ndtr
+
+from pipeline.diagnosis.fits.extended import Stated, stated
+from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.evidence import SIZES, moments
+from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
+from pipeline.result import Widening
+
+Array = NDArray[np.float64]
+
+NEGLIGIBLE = 0.002
+"""Probability of a hypothesis or an error model that is left out; the band lets 5 % lie outside."""
+
+COLUMNS = 4
+"""Factors that carry the correlation along the curvature; log f_EI goes by few and smooth ones."""
+
+NORMAL = 1.96
+
+
+class _Parts(NamedTuple):
+    """Components: weight (c,), mean (c, n + 1) beside the answer and factors of the covariance (c, n + 1, p)."""
+
+    weight: Array
+    mean: Array
+    root: Array
+
+
+def widening(
+    grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, answer: Fit, kappa: Array
+) -> Widening:
+    """What all hypotheses add to the band of ``answer``, the fit whose f_EI is stated, at curvatures (n,)."""
+    centre = stated(answer, kappa)
+    parts = [*_refits(grid, posterior, base, centre, kappa), _unfitted(posterior, base, suspicion, centre, kappa)]
+    weight = np.concatenate([part.weight for part in parts])
+    mean = np.vstack([part.mean for part in parts])
+    variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
+    band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
+    own = np.einsum("np,pq,nq->n", centre.rows, answer.covariance, centre.rows)
+    extra = np.sqrt(np.maximum(band**2 - own, 0.0))
+    covariance = sum(_covariance(part) for part in parts)
+    return _told(kappa, extra, np.asarray(covariance) / weight.sum())
+
+
+def _refits(grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Stated, kappa: Array) -> Iterator[_Parts]:
+    """Components of the base model and of every refit, for the error models that count."""
+    chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
+    for one in posterior.believed:
+        fitted = one.found.fitted if one.found else base
+        if one.probability > NEGLIGIBLE and (one.found or not one.causes):
+            chances.setdefault(id(fitted), (fitted, {}))[1][one.something_else] = one.probability
+    for fitted, chance in chances.values():
+        here, found = stated(fitted, kappa), moments(grid if True in chance else grid.plain, fitted)
+        for rest, probability in chance.items():
+            own = found.rest == rest
+            share = np.exp(found.log_weight[own] - logsumexp(found.log_weight[own]))
+            kept = np.flatnonzero(own)[share > NEGLIGIBLE]
+            root = here.rows @ np.linalg.cholesky(found.covariance[kept])
+            mean = here.values - centre.values + found.move[kept] @ here.rows.T
+            yield _Parts(probability * share[share > NEGLIGIBLE], mean, root)
+
+
+def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Stated, kappa: Array) -> _Parts:
+    """Components of causes that the linear model alone weighed, each in its loudest form and any size beforehand."""
+    here, scores = stated(base, kappa), suspicion.scores
+    size = np.linalg.norm(base.jacobian, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    pseudo = np.linalg.pinv(base.jacobian / size, rcond=1e-7) / size[:, None]
+    own = here.rows @ np.linalg.cholesky(base.covariance)
+    weight, mean, root = [], [], []
+    for one in posterior.believed:
+        if one.found or len(one.causes) != 1 or one.something_else or one.probability < NEGLIGIBLE:
+            continue
+        best = suspicion.best(one.causes[0])
+        if best is None or not np.isfinite(scores.std[best]):
+            continue
+        cause = suspicion.causes[one.causes[0]]
+        along = -here.rows @ (pseudo @ suspicion.columns[:, best])
+        flat, variance = float(scores.estimate[best]), float(scores.std[best]) ** 2
+        known = (SIZES * cause.plausible(base.extension.facts)) ** 2
+        amount, left = flat * known / (known + variance), variance * known / (known + variance)
+        log = -0.5 * (flat**2 / (known + variance) + np.log(known + variance))
+        log += log_ndtr(cause.sign * amount / np.sqrt(left)) if cause.sign else 0.0
+        weight.append(one.probability * np.exp(log - logsumexp(log)))
+        mean.append(here.values - centre.values + amount[:, None] * along)
+        root.append(np.dstack([np.broadcast_to(own, (len(known), *own.shape)), np.sqrt(left)[:, None] * along]))
+    if not weight:
+        return _Parts(np.zeros(0), np.zeros((0, len(kappa) + 1)), np.zeros((0, len(kappa) + 1, 1)))
+    return _Parts(np.concatenate(weight), np.vstack(mean), np.vstack(root))
+
+
+def _half_width(weight: Array, mean: Array, std: Array) -> Array:
+    """Half of the narrowest symmetric interval about zero (n,) that holds 95 % of a mixture (c,), by bisection."""
+    low, high = np.zeros(mean.shape[1]), np.max(np.abs(mean) + 6.0 * std, axis=0)
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        inside = weight @ (ndtr((middle - mean) / std) - ndtr((-middle - mean) / std))
+        low, high = np.where(inside < LEVEL, middle, low), np.where(inside < LEVEL, high, middle)
+    return np.asarray(high)
+
+
+def _covariance(part: _Parts) -> Array:
+    """Sum over components (n + 1, n + 1) of weight times second moment about the answer."""
+    spread = np.einsum("c,cip,cjp->ij", part.weight, part.root, part.root, optimize=True)
+    return np.asarray(spread + np.einsum("c,ci,cj->ij", part.weight, part.mean, part.mean, optimize=True))
+
+
+def _told(kappa: Array, extra: Array, covariance: Array) -> Widening:
+    """Factors whose rows are as long as ``extra`` (n + 1,) says and turn like the covariance (n + 1, n + 1)."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(std, std))
+    rows = vectors[:, -COLUMNS:] * np.sqrt(np.maximum(values[-COLUMNS:], 0.0))
+    factor = extra[:, None] * rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    return Widening(
+        kappa_per_m=kappa.tolist(), tangent_factor=factor[:-1].tolist(), pre_curvature_factor_per_m=factor[-1].tolist()
+    )

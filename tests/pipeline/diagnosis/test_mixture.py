@@ -1,0 +1,65 @@
+"""The band that holds all that is believed: against drawn mixtures, curves by hand, and a cable that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.effects import LARGEST, PROTOCOLS
+from fixtures.hidden import hidden_test
+from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.posterior.mixture import _half_width
+from pipeline.identify.parts import curve
+from pipeline.identify.ways import identify_test
+from pipeline.result import Curve, Widening
+from pipeline.settings.identify import IdentifySettings
+
+
+def test_half_width_holds_95_percent_of_what_is_drawn():
+    rng = np.random.default_rng(3)
+    weight, mean, std = np.array([0.7, 0.2, 0.1]), np.array([[0.0], [2.0], [-5.0]]), np.array([[1.0], [0.5], [2.0]])
+    which = rng.choice(3, 400_000, p=weight)
+    drawn = mean[which, 0] + std[which, 0] * rng.standard_normal(which.size)
+    # the quantile of 400,000 draws is known to one percent here
+    assert _half_width(weight, mean, std)[0] == pytest.approx(np.quantile(np.abs(drawn), 0.95), rel=0.01)
+    assert _half_width(np.ones(1), np.zeros((1, 1)), np.ones((1, 1)))[0] == pytest.approx(1.96, abs=1e-3)
+
+
+def test_a_wider_band_is_that_of_curves_that_are_moved():
+    """Every column is one way in which f_EI and K0 are off together: the law is moved so, its moment integrated."""
+    K, K0, low = np.linspace(2.0, 8.0, 601), 2.0, 1e-3
+    f = 0.01 * (1.0 + 0.3 * np.cos(K))
+    m = np.r_[0.0, np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(K))]
+    none = np.zeros(K.size)
+    plain = Curve(
+        kappa_per_m=K.tolist(), moment_Nm=m.tolist(), moment_std_Nm=none.tolist(), tangent_Nm2=f.tolist(),
+        tangent_std_Nm2=none.tolist(), secant_Nm2=np.r_[f[0], m[1:] / (K[1:] - K0)].tolist(),
+        secant_std_Nm2=none.tolist(), supported=[True] * K.size,
+    )  # fmt: skip
+    column, rest = low * np.sin(K), 0.02
+    wide = Widening(kappa_per_m=K.tolist(), tangent_factor=column[:, None].tolist(), pre_curvature_factor_per_m=[rest])
+    found = wide.of(plain)
+    moved = f * (1.0 + column)
+    by_hand = np.r_[0.0, np.cumsum(0.5 * (moved[1:] + moved[:-1]) * np.diff(K))] - f[0] * rest - m
+    assert np.allclose(found.tangent_std_Nm2, np.abs(f * column), rtol=1e-9)
+    assert np.allclose(found.moment_std_Nm, np.abs(by_hand), rtol=1e-6, atol=1e-9 * m[-1])
+
+
+@pytest.mark.parametrize("varies", [False, True])
+def test_the_band_grows_with_what_no_cause_makes(varies):
+    """Friction of the bearings that differs from step to step bends f_EI: the band of the fit alone leaves it out."""
+    factors = (1.0, 0.7, 1.5, 0.8, 1.2, 0.6, 1.4) if varies else ()
+    cable = Cable(bearing_friction=1.2e-3 * varies, friction_varies=factors)
+    test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=41)
+    found = identify_test(test, IdentifySettings())
+    part, _ = diagnose(test, found)
+    answer = part.extended if part.widening is None else part.widening.of(curve(found.inverse))
+    K, f, std = (np.array(row) for row in (answer.kappa_per_m, answer.tangent_Nm2, answer.tangent_std_Nm2))
+    truth = cable.law(K - cable.K0)[1]
+    assert np.mean(np.abs(f - truth) <= 1.96 * std) > 0.9
+    if varies:
+        assert part.verdict == "unexplained"
+    else:
+        # what is believed beside the base model of a specimen without effect adds less than the noise itself
+        assert part.verdict == "adequate" and np.median(std / curve(found.inverse).tangent_std_Nm2) < 1.5
