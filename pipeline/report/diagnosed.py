@@ -11,7 +11,7 @@ from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import residual_map, titled
 from pipeline.report.words import Words
-from pipeline.result import CauseRow, DiagnosisPart, ResidualMap, Result
+from pipeline.result import CauseRow, DiagnosisPart, NextExperiment, ResidualMap, Result
 from pipeline.settings import ReportSettings
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
@@ -76,18 +76,21 @@ def diagnosis_view(
             for spot in part.blind_spots
         ],
         next_what=words.said(following.what).sentence if following else "",
-        next_separates=_separates(following.separates, words) if following else "",
+        next_separates=_separates(following, words) if following else "",
         leftover=_leftover(part, words),
         figures=_figures(result, part, words, settings) if figures else {},
     )
 
 
-def _separates(names: list[str], words: Words) -> str:
-    """What an experiment separates, or settles if it is one cause alone."""
-    if not names:
-        return ""
-    key = "next_separates" if len(names) > 1 else "next_settled"
-    return words(key, names=", ".join(words.cause(name) for name in names))
+def _separates(experiment: NextExperiment, words: Words) -> str:
+    """What an experiment separates, or settles if it is one cause alone, and how well beside plain repetition."""
+    said, names = [], ", ".join(words.cause(name) for name in experiment.separates)
+    if names:
+        said.append(words("next_separates" if len(experiment.separates) > 1 else "next_settled", names=names))
+    if experiment.sigma is not None and experiment.repeated_sigma is not None:
+        sigma, repeated = (words.number(value, 2) for value in (experiment.sigma, experiment.repeated_sigma))
+        said.append(words("next_sigma", sigma=sigma, repeated=repeated))
+    return " ".join(said)
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:

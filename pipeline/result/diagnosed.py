@@ -99,6 +99,10 @@ class NextExperiment(Part):
 
     what: str = Field(description="to do, in words")
     separates: list[str] = Field(description="causes that it tells apart")
+    sigma: Number | None = Field(
+        None, description="how far it is expected to take them apart, standard deviations; null if not computed"
+    )
+    repeated_sigma: Number | None = Field(None, description="the same for plain repetition of the test")
 
 
 class ResidualMap(Part):

@@ -2,8 +2,10 @@
 
 For each protocol that was not made yet the most probable explanation is simulated without noise, each rival is fitted
 to that to first order, and what remains of the rival's misfit (in sigma) says how far the protocol takes the two apart:
-unload in the same steps; photograph the force-free cable; turn the cable end for end and repeat. Where none does, one
-of the rivals is settled by itself (a spirit level, dead weights).
+photograph the force-free cable; unload in the same steps; come back to displacement zero; turn the cable end for end.
+Every protocol is held against plain repetition, whose twice as many data give the square root of two by themselves.
+Where none is expected to separate the rivals, one of them may be settled by itself (a spirit level, dead weights); else
+it is said that nothing here separates them.
 """
 
 from __future__ import annotations
@@ -28,10 +30,11 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """A further measurement: in words, its circumstances, and whether the cable is turned end for end in it."""
+    """A further measurement: in words, its circumstances, whether the test is made again, and turned end for end."""
 
     what: str
     facts: Facts
+    again: bool = False
     turned: bool = False
 
 
@@ -51,7 +54,11 @@ def protocols(facts: Facts) -> list[Protocol]:
         found.append(
             Protocol("unload in the same steps, with photos", more_steps(facts, back, ["unloading"] * len(back)))
         )
-    found.append(Protocol("turn the cable end for end and repeat the test", facts, turned=True))
+    elif facts.displacement[-1] > 0.0:
+        there = more_steps(facts, [0.0], ["unloading"])
+        found.append(Protocol("come back to displacement zero and photograph the cable there", there))
+    found.append(Protocol("repeat the same test", facts, again=True))
+    found.append(Protocol("turn the cable end for end and repeat the test", facts, again=True, turned=True))
     return found
 
 
@@ -75,25 +82,36 @@ def next_experiment(
     common = set(probable.causes).intersection(*(rival.causes for rival in rivals))
     differing = list(dict.fromkeys(cause for e in every for cause in e.causes if cause not in common))
     names = [causes[cause].name for cause in differing]
-    best: tuple[float, Protocol] | None = None
-    for protocol in protocols(bench.facts):
-        apart = min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
-        if apart >= settings.separated:
-            return NextExperiment(what=protocol.what, separates=names)
-        if best is None or apart > best[0]:
-            best = (apart, protocol)
-    rivals_outside = (causes[cause] for cause in differing if causes[cause].seat != "cable")
-    outside = [cause for cause in rivals_outside if still_open(cause, bench)]
-    if outside:
-        return NextExperiment(what=f"{outside[0].settled_by} ({outside[0].name})", separates=names)
-    assert best is not None
-    return NextExperiment(what=best[1].what, separates=names)
+    apart = {
+        protocol.what: min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
+        for protocol in protocols(bench.facts)
+    }
+    repeated = apart["repeat the same test"]
+    # what is no better than the same once more is no experiment of its own
+    better = {what: sigma for what, sigma in apart.items() if sigma == repeated or sigma > repeated + BETTER}
+    enough = [what for what, sigma in better.items() if sigma >= settings.separated]
+    differ = (causes[cause] for cause in differing if causes[cause].seat != "cable")
+    outside = [f"{cause.settled_by} ({cause.name})" for cause in differ if still_open(cause, bench)]
+    if not enough and outside:
+        return NextExperiment(what=outside[0], separates=names, repeated_sigma=repeated)
+    what = enough[0] if enough else max(better, key=lambda name: better[name])
+    if better[what] < TELLS:
+        return NextExperiment(what=NOTHING, separates=[], sigma=better[what], repeated_sigma=repeated)
+    return NextExperiment(what=what, separates=names, sigma=better[what], repeated_sigma=repeated)
+
+
+NOTHING = "no measurement on this rig is expected to separate these causes"
+
+BETTER, TELLS = 1.0, 2.0
+"""Sigma: a protocol counts as better than repetition if it takes the rivals apart by one more, and as telling anything
+from two on."""
 
 
 def _separation(bench: Workbench, probable: Fit, rival: Fit, protocol: Protocol, settings: DiagnosisSettings) -> float:
     """Sigma between two explanations if the protocol were made and the rival refitted, to first order."""
     precision = precision_of(bench.test, bench.observation.force_std)
-    blocks = [(bench.facts, False), (protocol.facts, True)] if protocol.turned else [(protocol.facts, False)]
+    blocks = [(bench.facts, False)] if protocol.again else []
+    blocks.append((protocol.facts, protocol.turned))
     values, columns = [], []
     for facts, turned in blocks:
         truth = replace(probable.extension, facts=facts, turned=turned)

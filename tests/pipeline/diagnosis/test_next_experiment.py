@@ -1,0 +1,48 @@
+"""The next experiment: better than the same test once more, or settled by itself, or none."""
+
+from __future__ import annotations
+
+import pytest
+
+from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
+from fixtures.hidden import hidden_test
+from fixtures.scores import SETTINGS
+from pipeline.diagnosis.causes import SUSPECTS
+from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.plans.next_experiment import BETTER, next_experiment, protocols
+
+NAMES = [cause.name for cause in SUSPECTS]
+
+
+def refits(protocol, amount, names, hidden):
+    cable, reading = HIDE[hidden](amount, Form())
+    test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=3, reading=reading)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots)
+    found = [refit_one(bench.observation, bench.base, bench.suspicion, NAMES.index(n), SETTINGS) for n in names]
+    return bench, found
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_nobody_is_told_to_do_what_was_done(protocol):
+    bench, _ = refits(protocol, 0.0, (), "force_offset")
+    told = [one.what for one in protocols(bench.facts)]
+    assert ("unload in the same steps, with photos" in told) == (protocol != "loop")
+    assert any("force-free" in what for what in told) == (protocol == "three")
+
+
+def test_unloading_beats_repetition_for_friction_and_its_twin():
+    bench, (friction, bend) = refits("six", 0.004, ("bearing_friction", "pre_curvature_varying"), "bearing_friction")
+    found = next_experiment(bench, friction, [bend], SETTINGS)
+    assert found.what == "unload in the same steps, with photos"
+    assert set(found.separates) == {"bearing_friction", "pre_curvature_varying"}
+    assert found.sigma >= SETTINGS.separated and found.sigma > found.repeated_sigma + BETTER
+
+
+def test_repetition_is_what_it_is_held_against():
+    """Twice the data take two explanations farther apart by themselves; what does no better is not proposed."""
+    bench, (offset, drift) = refits("loop", 0.03, ("force_offset", "force_drift"), "force_offset")
+    once = next_experiment(bench, offset, [drift], SETTINGS)
+    assert once.repeated_sigma > SETTINGS.separated  # two that these data tell apart already
+    assert once.what == "repeat the same test" or once.sigma > once.repeated_sigma + BETTER
