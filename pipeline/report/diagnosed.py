@@ -105,6 +105,10 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
         line, known = f"{words.cause(cause.name)}: {estimate} ({share}){tail}", catalogue.get(cause.name)
+        for twin in cause.twins:
+            chance = words.number(100.0 * twin.probability, SHARE_DIGITS)
+            said = {"name": words.cause(twin.name), "share": chance, "settled": words.said(twin.settled_by)}
+            line += f"; {words('fits_too', **said)}"
         named.append(NamedCause(line, known.summary, known.remedy) if known else NamedCause(line))
     return named
 
@@ -119,8 +123,7 @@ def _gain(part: DiagnosisPart, words: Words) -> list[str]:
         unit = words.unit(symbol, *values)
         return f"{words.number(unit.factor * values[0])} → {unit.plain(values[1])}"
 
-    # by chance the model may remove more than there was beyond the noise
-    percent = [words.number(100.0 * min(v, 1.0)) for v in (gain.heldout_excess_removed, *gain.ci95)]
+    percent = [words.number(100.0 * v) for v in (gain.heldout_excess_removed, *gain.ci95)]
     return [
         words("gain_text", share=percent[0], low=percent[1], high=percent[2]),
         words("gain_rmse", force=pair(gain.force_rmse_N, "N"), shape=pair(gain.shape_rmse_m, "m")),
@@ -148,11 +151,18 @@ def _row(row: CauseRow, words: Words) -> list[str]:
         words.fixed(row.z, 1) if seen else NOTHING,
         words.probability(row.p_adjusted) if seen else NOTHING,
         words.unit(row.unit, row.estimate, row.std).text(row.estimate, row.std) if seen else NOTHING,
-        NOTHING if least is None else words.unit(row.unit, least).plain(least, SHARE_DIGITS),
+        NOTHING if least is None else _range(least, row.detectable_in_any_form, row.unit, words),
         percent(row.surviving_fraction),
         percent(row.heldout_excess_removed),
         percent(row.stiffness_shift),
     ]
+
+
+def _range(least: float, most: float | None, unit: str, words: Words) -> str:
+    """Amounts from which a cause shows: in its clearest form, and whatever form it has if that is known."""
+    scale = words.unit(unit, least)
+    low, high = scale.plain(least, SHARE_DIGITS), scale.plain(max(most or least, least), SHARE_DIGITS)
+    return words("from_on", low=low) if most is None else low if low == high else f"{low} – {high}"
 
 
 def _leftover(part: DiagnosisPart, words: Words) -> list[str]:

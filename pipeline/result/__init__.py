@@ -20,6 +20,7 @@ from pipeline.result.diagnosed import (
     HypothesisPart,
     NextExperiment,
     ResidualMap,
+    TwinPart,
 )
 from pipeline.result.files import from_json, read_result, schema, to_json
 from pipeline.result.parts import (
@@ -69,6 +70,7 @@ __all__ = [
     "ScalePart",
     "SpecimenPart",
     "StepPart",
+    "TwinPart",
     "Visited",
     "Widening",
     "curves",

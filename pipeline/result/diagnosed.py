@@ -27,6 +27,14 @@ class CauseForm(Part):
     )
 
 
+class TwinPart(Part):
+    """A cause that stands instead of the one that was named: improbable, or of its class."""
+
+    name: str = Field(description="of the cause")
+    probability: Number = Field(description="of the cause, given the data")
+    settled_by: str = Field(description="measurement that would show it")
+
+
 class CausePart(Part):
     """A named cause with its class of twins, probability and estimate."""
 
@@ -39,6 +47,7 @@ class CausePart(Part):
     std: Number = Field(description="of the amount, in its unit")
     unit: str = Field(description="of the amount; - is a plain number")
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
+    twins: list[TwinPart] = Field([], description="other causes that leave no more than noise, whether likely or not")
 
 
 class HypothesisPart(Part):
@@ -59,7 +68,10 @@ class CauseRow(Part):
     std: Number = Field(description="of the amount, in its unit")
     unit: str = Field(description="of the amount; - is a plain number")
     minimal_detectable: Number | None = Field(
-        None, description="smallest amount that these data would show, in its unit; null if never"
+        None, description="smallest amount that these data would show in its clearest form, in its unit; null if never"
+    )
+    detectable_in_any_form: Number | None = Field(
+        None, description="smallest amount that they would show whatever form it has; null if some form never shows"
     )
     surviving_fraction: Number = Field(description="share of its trace that f_EI, K0, scale and length cannot take up")
     nearest_twin: str = Field("", description="cause with the most similar trace")

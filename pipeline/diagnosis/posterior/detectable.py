@@ -41,6 +41,36 @@ def sigma_needed(plausible: float, *, forms: int, causes: int, sign: int, power:
     return float(brentq(short, 0.0, LOUDEST)) + float(ndtri(power))
 
 
+def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float) -> dict[int, float]:
+    """Smallest amount of every form of a cause (direction -> amount) that is found with the given power.
+
+    By the trace of each form as it was computed; infinite where the data do not show it, or only at more than
+    a rig can have. A trace computed at a large amount says little of the smallest one that is seen, unless it is known
+    how it grows.
+    """
+    terms, scores, kind = suspicion.terms, suspicion.scores, suspicion.causes[cause]
+    plausible, own, found = kind.plausible(fitted.extension.facts), suspicion.of(cause), {}
+    for k in map(int, own):
+        variant, norm = terms[k].variant, float(scores.norm[k])
+        if variant.trace != 1.0 and variant.power == 1.0:
+            continue
+        forms, causes = len(own), len(set(suspicion.owner.tolist()))
+        needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=kind.sign, power=power)
+        at = trace * variant.trace * plausible
+        amount = at * (needed / (norm * at)) ** (1.0 / variant.power) if norm > 0.0 else np.inf
+        found[k] = float(amount) if amount <= POSSIBLE * plausible else np.inf
+    return found
+
+
+POSSIBLE = 30.0
+"""Plausible sizes: no rig has more of a cause."""
+
+
+def in_any_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float) -> float:
+    """Smallest amount of a cause that is found whatever form it has; infinite if some form never is."""
+    return max(in_each_form(fitted, suspicion, cause, power=power, trace=trace).values(), default=np.inf)
+
+
 def detectable_amount(
     observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float
 ) -> float:
@@ -49,25 +79,23 @@ def detectable_amount(
     A trace that grows otherwise than in proportion (stiff ends: with the square) is computed anew at the amount found,
     by fixed-point steps in the logarithm; three reach a few per cent.
     """
-    # a trace computed at a large amount says little of the smallest one that is seen
-    own = np.array([k for k in suspicion.of(cause) if suspicion.terms[k].variant.trace == 1.0], dtype=int)
-    if own.size == 0 or not np.any(suspicion.scores.norm[own] > 0.0):
+    each = in_each_form(fitted, suspicion, cause, power=power, trace=trace)
+    if not each:
         return float("inf")
-    best = int(own[np.argmax(suspicion.scores.norm[own])])
+    # forms that all lack a trace at their usual size may have one at a larger
+    best = min(each, key=lambda k: (each[k], -suspicion.scores.norm[k]))
+    variant, norm = suspicion.terms[best].variant, float(suspicion.scores.norm[best])
+    if norm <= 0.0 or variant.power != 1.0:
+        return each[best]
     plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
-    needed = sigma_needed(
-        plausible * float(suspicion.scores.norm[best]),
-        forms=len(suspicion.of(cause)),
-        causes=len(set(suspicion.owner.tolist())),
-        sign=suspicion.causes[cause].sign,
-        power=power,
-    )
-    amount = needed / float(suspicion.scores.norm[best])
-    at = trace * plausible
+    forms, causes = len(suspicion.of(cause)), len(set(suspicion.owner.tolist()))
+    sign = suspicion.causes[cause].sign
+    needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=sign, power=power)
+    amount, at = needed / norm, trace * plausible
     basis = span(fitted.jacobian)
     for _ in range(3):
-        if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > 30.0 * plausible:
-            column = direction(observation, fitted, suspicion.terms[best], amount=min(amount, 30.0 * plausible))
+        if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > POSSIBLE * plausible:
+            column = direction(observation, fitted, suspicion.terms[best], amount=min(amount, POSSIBLE * plausible))
             norm = float(np.linalg.norm(column - basis @ (basis.T @ column)))
             if norm <= 0.0 or not np.isfinite(norm):
                 break

@@ -11,18 +11,22 @@ from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.mixture import widening
-from pipeline.result import CausePart, Curve, HypothesisPart, Widening
+from pipeline.result import CausePart, Curve, HypothesisPart, TwinPart, Widening
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def named_causes(
-    bench: Workbench, conclusion: Conclusion, again: Identified | None, extended: Curve | None
+    bench: Workbench,
+    conclusion: Conclusion,
+    again: Identified | None,
+    extended: Curve | None,
+    settings: DiagnosisSettings,
 ) -> list[CausePart]:
     """One entry for each cause that was found, with its class of names, and its forms in the extended model.
 
     Where forms add up, the size is that of the extended model, whose std allows for other forms than were found.
     """
-    parts = _classes(bench, conclusion)
+    parts = _classes(bench, conclusion, settings)
     if again is None or extended is None:
         return parts
     columns = len(extended.tangent_factor_Nm2[0])
@@ -34,12 +38,12 @@ def named_causes(
     return found
 
 
-def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
+def _classes(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> list[CausePart]:
     """The causes of the accepted explanation, each with whatever the data allow in its place."""
     accepted = conclusion.accepted
     if accepted is None:
         return []
-    catalogue = bench.suspicion.causes
+    catalogue, twins = bench.suspicion.causes, _twins(bench, conclusion, settings)
     parts = []
     for cause, names in zip(accepted.causes, conclusion.classes, strict=True):
         kind = catalogue[cause]
@@ -52,9 +56,23 @@ def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
                 estimate=amount,
                 std=std,
                 unit=kind.unit,
+                twins=[twin for twin in twins if twin.name != kind.name],
             )
         )
     return parts
+
+
+def _twins(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> list[TwinPart]:
+    """Other single causes that leave no more than noise, the likeliest first; none where two causes were found."""
+    believed, accepted = conclusion.posterior, conclusion.accepted
+    if conclusion.alien or accepted is None or len(accepted.causes) > 1:
+        return []
+    fits = [one.causes[0] for one in conclusion.singles if one.fitted.reduced_chi2 < settings.fits]
+    found = [(believed.of(k), bench.suspicion.causes[k]) for k in dict.fromkeys(fits) if k not in accepted.causes]
+    return [
+        TwinPart(name=cause.name, probability=chance, settled_by=cause.settled_by)
+        for chance, cause in sorted(found, key=lambda pair: -pair[0])
+    ]
 
 
 def hypotheses(bench: Workbench, conclusion: Conclusion) -> tuple[list[HypothesisPart], float]:

@@ -45,7 +45,7 @@ def present(
         ]
         again = identified_again(bench.observation, accepted.fitted, settings, force_errors=errors)
     extended = None if again is None else extended_curve(again, settings)
-    causes = named_causes(bench, conclusion, again, extended)
+    causes = named_causes(bench, conclusion, again, extended, settings)
     word = verdict(
         found=accepted is not None,
         alien=conclusion.alien,

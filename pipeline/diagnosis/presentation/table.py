@@ -15,7 +15,7 @@ from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import stiffness_change, stiffness_change_linear
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.posterior.detectable import detectable_amount
+from pipeline.diagnosis.posterior.detectable import detectable_amount, in_any_form
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.statistics.score import adjusted_p
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
@@ -44,6 +44,7 @@ def table(
         detectable = detectable_amount(
             bench.observation, bench.base, suspicion, index, power=settings.power, trace=settings.trace
         )
+        whatever = in_any_form(bench.base, suspicion, index, power=settings.power, trace=settings.trace)
         accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
         rows.append(
             CauseRow(
@@ -54,6 +55,7 @@ def table(
                 std=size.std if size.std < UNKNOWN * cause.plausible(bench.facts) else 0.0,
                 unit=cause.unit,
                 minimal_detectable=detectable if np.isfinite(detectable) else None,
+                detectable_in_any_form=whatever if np.isfinite(whatever) else None,
                 surviving_fraction=float(scores.surviving[loudest]),
                 nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
                 twin_cosine=float(closeness[index]),

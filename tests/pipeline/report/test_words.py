@@ -39,7 +39,7 @@ def test_every_word_is_used():
 
 def test_every_cause_of_the_contract_has_a_name():
     assert GERMAN_CAUSES.keys() == {"pre_curvature", *(cause.name for cause in CATALOGUE)}
-    assert len(GERMAN_CAUSES) == 20
+    assert len(GERMAN_CAUSES) == 22
     assert Words().cause("pre_curvature_varying") == "varying pre-curvature"
     assert Words().cause("bearing_friction") == "bearing friction"
     assert Words("de").cause("hysteresis") == "Hysterese"
