@@ -75,7 +75,7 @@ INSIDE = {
     "pipeline.diagnosis.posterior": [
         ("explanation", "error_grid", "words"),
         ("evidence", "hypotheses"),
-        ("weigh", "detectable"),
+        ("weigh", "detectable", "mixture"),
     ],
     "pipeline.diagnosis.explanations": [
         ("candidates", "refit", "effort"),

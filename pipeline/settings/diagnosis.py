@@ -96,18 +96,6 @@ class DiagnosisSettings(BaseModel):
         0.10, description="share of the excess misfit a named model may leave; more is `unexplained`"
     )
 
-    extension_share: float = Field(
-        0.75,
-        description="share of the excess misfit of held-out steps that the extension of an unexplained specimen must"
-        " remove for its f_EI to be the answer: with less, that of five specimens was 1.4 to 50 % off and the plain one"
-        " 0.4 to 5 %; with more, that of three was 0.5 to 4 % off and the plain one 4 to 30 %",
-    )
-    extension_leaves: float = Field(
-        16.0,
-        description="reduced chi-square that such an extension may leave (4 sigma rms): with 240 and 850, f_EI of two"
-        " specimens was 56 and 690 % off and the plain one 27 %; the better ones leave 1 to 6",
-    )
-
     same_level: float = Field(
         0.01, description="share of the travel; loading and unloading steps closer than this are left out together"
     )

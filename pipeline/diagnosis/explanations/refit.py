@@ -66,7 +66,7 @@ class Addition:
         facts, parts = self.base.extension.facts, [vector]
         for term, amount in zip(self.terms, self.amounts, strict=True):
             limit = SANE * term.cause.plausible(facts)
-            traced = self.trace * term.variant.trace * term.cause.plausible(facts)
+            traced = self.trace * abs(term.variant.trace) * term.cause.plausible(facts)
             # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
             bent = np.sign(share * amount) * traced * abs(share * amount / traced) ** (1.0 / term.variant.power)
             value = float(np.clip(bent, -limit, limit))

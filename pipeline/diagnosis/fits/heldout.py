@@ -1,8 +1,4 @@
-"""Gain on held-out steps, computed: whole levels are left out, both models refitted, and asked for the rest.
-
-What the gain decides stands here too: whether it speaks for the extended model where that cause does not explain
-everything.
-"""
+"""Gain on held-out steps, computed: whole levels are left out, both models refitted, and asked for the rest."""
 
 from __future__ import annotations
 
@@ -46,16 +42,6 @@ def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) 
         force_rmse_N=(force[0], force[1]),
         shape_rmse_m=(shape[0], shape[1]),
     )
-
-
-def answers(gain: GainPart | None, reduced_chi2: float, settings: DiagnosisSettings) -> bool:
-    """Whether f_EI of an extension that leaves something unexplained is the better one all the same.
-
-    It must remove most of the misfit of steps held out, and what it leaves must not be many times the noise: of a
-    misfit of hundreds of sigma a wrong cause removes most as well, and bends f_EI for it.
-    """
-    removed = gain is not None and gain.heldout_excess_removed >= settings.extension_share
-    return removed and reduced_chi2 <= settings.extension_leaves
 
 
 def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_], settings: DiagnosisSettings) -> Fit:

@@ -6,8 +6,8 @@ cause that was weighed by the linear model alone moves the base model's unknowns
 variance given each size beforehand. So effects too weak to be named, names that cannot be told apart, and what no cause
 makes are in the band, each as far as it is believed.
 
-The band is the narrowest symmetric one about the fit that answers which holds 95 % of the mixture at every curvature.
-What it has beyond the band of that fit alone is told as factors, correlated along the curvature like the mixture.
+The band is the narrowest symmetric one about the curve that answers which holds 95 % of the mixture at every curvature.
+What it has beyond that curve's own band is told as factors, correlated along the curvature like the mixture.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr
 
-from pipeline.diagnosis.fits.extended import Stated, stated
+from pipeline.diagnosis.fits.extended import stated
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import SIZES, moments
 from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
-from pipeline.result import Widening
+from pipeline.result import Curve, Widening, visited
 
 Array = NDArray[np.float64]
 
@@ -46,43 +46,74 @@ class _Parts(NamedTuple):
     root: Array
 
 
+class Centre(NamedTuple):
+    """What is stated: log f_EI at curvatures (n,) 1/m and, last, K0 (n + 1,), with its own standard deviations."""
+
+    kappa: Array
+    values: Array
+    std: Array
+
+
+def centre_of(curve: Curve) -> Centre:
+    """A curve of f_EI where a cable was bent to, at as many curvatures as tell it."""
+    seen = visited("extended", curve)
+    assert seen is not None, "a curve of a fit has two points at least"
+    at = np.unique(np.linspace(0, len(seen.kappa) - 1, READ).astype(int))
+    tangent = np.maximum(seen.tangent, 1e-3 * float(np.max(seen.tangent)))[at]
+    values = np.append(np.log(tangent), seen.pre_curvature)
+    return Centre(seen.kappa[at], values, np.append(seen.tangent_std[at] / tangent, seen.pre_curvature_std))
+
+
+READ = 31
+"""Curvatures at which hypotheses are compared: f_EI is smooth between its 12 control points."""
+
+
 def widening(
-    grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, answer: Fit, kappa: Array
+    grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, *, own: Fit | None = None
 ) -> Widening:
-    """What all hypotheses add to the band of ``answer``, the fit whose f_EI is stated, at curvatures (n,)."""
-    centre = stated(answer, kappa)
-    parts = [*_refits(grid, posterior, base, centre, kappa), _unfitted(posterior, base, suspicion, centre, kappa)]
+    """What all hypotheses add to the band of a curve.
+
+    ``own``: the refit whose law, identified again, the curve is; it lies about the curve itself.
+    """
+    kappa = centre.kappa
+    offset = np.zeros(len(centre.values)) if own is None else centre.values - stated(own, kappa).values
+    shifted = {id(own): offset}
+    parts = [
+        *_refits(grid, posterior, base, centre, shifted),
+        _unfitted(posterior, base, suspicion, centre),
+    ]
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
     band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
-    own = np.einsum("np,pq,nq->n", centre.rows, answer.covariance, centre.rows)
-    extra = np.sqrt(np.maximum(band**2 - own, 0.0))
+    extra = np.sqrt(np.maximum(band**2 - centre.std**2, 0.0))
     covariance = sum(_covariance(part) for part in parts)
     return _told(kappa, extra, np.asarray(covariance) / weight.sum())
 
 
-def _refits(grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Stated, kappa: Array) -> Iterator[_Parts]:
-    """Components of the base model and of every refit, for the error models that count."""
+def _refits(
+    grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifted: dict[int, Array]
+) -> Iterator[_Parts]:
+    """Components of the base model and of every refit, for the error models that count; some lie beside their fit."""
     chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
     for one in posterior.believed:
         fitted = one.found.fitted if one.found else base
         if one.probability > NEGLIGIBLE and (one.found or not one.causes):
             chances.setdefault(id(fitted), (fitted, {}))[1][one.something_else] = one.probability
     for fitted, chance in chances.values():
-        here, found = stated(fitted, kappa), moments(grid if True in chance else grid.plain, fitted)
+        here, found = stated(fitted, centre.kappa), moments(grid if True in chance else grid.plain, fitted)
         for rest, probability in chance.items():
             own = found.rest == rest
             share = np.exp(found.log_weight[own] - logsumexp(found.log_weight[own]))
             kept = np.flatnonzero(own)[share > NEGLIGIBLE]
             root = here.rows @ np.linalg.cholesky(found.covariance[kept])
-            mean = here.values - centre.values + found.move[kept] @ here.rows.T
+            mean = here.values + shifted.get(id(fitted), 0.0) - centre.values + found.move[kept] @ here.rows.T
             yield _Parts(probability * share[share > NEGLIGIBLE], mean, root)
 
 
-def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Stated, kappa: Array) -> _Parts:
+def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre) -> _Parts:
     """Components of causes that the linear model alone weighed, each in its loudest form and any size beforehand."""
-    here, scores = stated(base, kappa), suspicion.scores
+    here, scores = stated(base, centre.kappa), suspicion.scores
     size = np.linalg.norm(base.jacobian, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     pseudo = np.linalg.pinv(base.jacobian / size, rcond=1e-7) / size[:, None]
@@ -105,7 +136,7 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Sta
         mean.append(here.values - centre.values + amount[:, None] * along)
         root.append(np.dstack([np.broadcast_to(own, (len(known), *own.shape)), np.sqrt(left)[:, None] * along]))
     if not weight:
-        return _Parts(np.zeros(0), np.zeros((0, len(kappa) + 1)), np.zeros((0, len(kappa) + 1, 1)))
+        return _Parts(np.zeros(0), np.zeros((0, len(centre.values))), np.zeros((0, len(centre.values), 1)))
     return _Parts(np.concatenate(weight), np.vstack(mean), np.vstack(root))
 
 

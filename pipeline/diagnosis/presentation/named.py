@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change, visited
+from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
-from pipeline.diagnosis.posterior.mixture import widening
+from pipeline.diagnosis.posterior.mixture import centre_of, widening
 from pipeline.result import CausePart, Curve, HypothesisPart, TwinPart, Widening
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -97,15 +97,14 @@ def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
     return curve(again.fitted, points=points, covariance=again.covariance, rivals=rivals)
 
 
-def all_believed(bench: Workbench, conclusion: Conclusion, answer: Fit) -> Widening:
-    """What all hypotheses add to the band of a fit that answers."""
-    low, high = visited(answer)
-    kappa = np.linspace(max(low, answer.extension.base.pre_curvature(answer.vector)), high, READ)
-    return widening(conclusion.grid, conclusion.posterior, bench.base, bench.suspicion, answer, kappa)
+def all_believed(bench: Workbench, conclusion: Conclusion, curve: Curve, own: Fit | None = None) -> Widening:
+    """What all hypotheses add to the band of a curve; ``own``: the refit whose law, identified again, it is."""
+    return widening(conclusion.grid, conclusion.posterior, bench.base, bench.suspicion, centre_of(curve), own=own)
 
 
-READ = 31
-"""Curvatures at which hypotheses are compared: f_EI is smooth between its 12 control points."""
+def known_to(curve: Curve) -> float:
+    """How well a curve is known: median relative standard deviation of its f_EI."""
+    return float(np.median(np.array(curve.tangent_std_Nm2) / np.array(curve.tangent_Nm2)))
 
 
 def change_of_stiffness(

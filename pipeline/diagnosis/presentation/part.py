@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.fits.heldout import answers, measured_gain
+from pipeline.diagnosis.fits.extended import curve
+from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -21,6 +22,7 @@ from pipeline.diagnosis.presentation.named import (
     change_of_stiffness,
     extended_curve,
     hypotheses,
+    known_to,
     named_causes,
 )
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
@@ -52,13 +54,13 @@ def present(
         classes=conclusion.classes,
         powerless=len(seen) < settings.powerless * len(rows),
     )
-    refuted = word == "unexplained" and not (
-        accepted is not None and answers(gain, accepted.fitted.reduced_chi2, settings)
-    )
-    answering = bench.base if accepted is None or extended is None or refuted else accepted.fitted
-    wider = all_believed(bench, conclusion, answering)
-    if extended is not None and answering is not bench.base:
-        extended = wider.of(extended)
+    plain = identified or curve(bench.base, points=settings.curve_points)
+    # the answer is the curve that all that is believed leaves the narrower band, with that band
+    wider = None if extended is not None and word != "unexplained" else all_believed(bench, conclusion, plain)
+    refuted = False
+    if extended is not None and accepted is not None:
+        extended = all_believed(bench, conclusion, extended, accepted.fitted).of(extended)
+        refuted = wider is not None and known_to(wider.of(plain)) < known_to(extended)
     leftover = described(bench, conclusion)
     believed, none = hypotheses(bench, conclusion)
     sentence = headline(
@@ -83,7 +85,7 @@ def present(
         next_experiment=what_next(bench, conclusion, settings, spots=spots, unexplained=word == "unexplained"),
         extended=extended,
         extended_refuted=refuted,
-        widening=wider if answering is bench.base else None,
+        widening=wider if extended is None or refuted else None,
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
