@@ -144,12 +144,15 @@ class PlasticSet:
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """The law moves along with the new rest, or (``at`` 1) stays; from the first bend on, or beyond ``width``."""
+        """The law moves along with the new rest, or (``at`` 1) stays; from the first bend on, or beyond ``width``.
+
+        On loading alone a threshold is part of the law: a law of any form follows it.
+        """
         threshold = 0.3 * facts.curvature_scale
         late = Variant(width=threshold, tuned=("width",), width_range=(0.0, 3.0 * threshold))
         return tuple(
             replace(form, label=label, at=at)
-            for form in (Variant(), late)
+            for form in ((Variant(), late) if facts.returns else (Variant(),))
             for label, at in (("with a law that moves along", 0.0), ("with a law that stays", 1.0))
         )
 

@@ -47,21 +47,19 @@ class _Parts(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """What is stated: log f_EI at curvatures (n,) 1/m and, last, K0 (n + 1,), with its own standard deviations."""
+    """What is stated: log f_EI at curvatures (n,) 1/m and, last, K0 (n + 1,)."""
 
     kappa: Array
     values: Array
-    std: Array
 
 
 def centre_of(curve: Curve) -> Centre:
     """A curve of f_EI where a cable was bent to, at as many curvatures as tell it."""
     seen = visited("extended", curve)
-    assert seen is not None, "a curve of a fit has two points at least"
+    assert seen is not None  # a curve of a fit has two points at least
     at = np.unique(np.linspace(0, len(seen.kappa) - 1, READ).astype(int))
     tangent = np.maximum(seen.tangent, 1e-3 * float(np.max(seen.tangent)))[at]
-    values = np.append(np.log(tangent), seen.pre_curvature)
-    return Centre(seen.kappa[at], values, np.append(seen.tangent_std[at] / tangent, seen.pre_curvature_std))
+    return Centre(seen.kappa[at], np.append(np.log(tangent), seen.pre_curvature))
 
 
 READ = 31
@@ -73,26 +71,30 @@ def widening(
 ) -> Widening:
     """What all hypotheses add to the band of a curve.
 
-    ``own``: the refit whose law, identified again, the curve is; it lies about the curve itself.
+    ``own``: the refit whose law, identified again, the curve is; it lies about the curve itself. Without one the curve
+    is that of the base model without something else, fitted by way one.
     """
-    kappa = centre.kappa
-    offset = np.zeros(len(centre.values)) if own is None else centre.values - stated(own, kappa).values
-    shifted = {id(own): offset}
+    kappa, nearest = centre.kappa, own or base
+    here = stated(nearest, kappa)
+    offset = centre.values - here.values
+    shifts = {(id(nearest), False): offset} | ({} if own is None else {(id(own), True): offset})
     parts = [
-        *_refits(grid, posterior, base, centre, shifted),
-        _unfitted(posterior, base, suspicion, centre),
+        *_refits(grid, posterior, base, centre, shifts),
+        _unfitted(posterior, base, suspicion, centre, offset if own is None else np.zeros_like(offset)),
     ]
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
     band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
-    extra = np.sqrt(np.maximum(band**2 - centre.std**2, 0.0))
+    # the curve's own band stands for what the same data, as exact as stated, leave unknown of its law
+    known = np.einsum("np,pq,nq->n", here.rows, nearest.covariance, here.rows)
+    extra = np.sqrt(np.maximum(band**2 - known, 0.0))
     covariance = sum(_covariance(part) for part in parts)
     return _told(kappa, extra, np.asarray(covariance) / weight.sum())
 
 
 def _refits(
-    grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifted: dict[int, Array]
+    grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifts: dict[tuple[int, bool], Array]
 ) -> Iterator[_Parts]:
     """Components of the base model and of every refit, for the error models that count; some lie beside their fit."""
     chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
@@ -107,11 +109,11 @@ def _refits(
             share = np.exp(found.log_weight[own] - logsumexp(found.log_weight[own]))
             kept = np.flatnonzero(own)[share > NEGLIGIBLE]
             root = here.rows @ np.linalg.cholesky(found.covariance[kept])
-            mean = here.values + shifted.get(id(fitted), 0.0) - centre.values + found.move[kept] @ here.rows.T
+            mean = here.values + shifts.get((id(fitted), rest), 0.0) - centre.values + found.move[kept] @ here.rows.T
             yield _Parts(probability * share[share > NEGLIGIBLE], mean, root)
 
 
-def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre) -> _Parts:
+def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, shift: Array) -> _Parts:
     """Components of causes that the linear model alone weighed, each in its loudest form and any size beforehand."""
     here, scores = stated(base, centre.kappa), suspicion.scores
     size = np.linalg.norm(base.jacobian, axis=0)
@@ -123,8 +125,8 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Cen
         if one.found or len(one.causes) != 1 or one.something_else or one.probability < NEGLIGIBLE:
             continue
         best = suspicion.best(one.causes[0])
-        if best is None or not np.isfinite(scores.std[best]):
-            continue
+        if best is None or not scores.norm[best] > 0.0:
+            continue  # of what these data do not show at all the size is a mere belief: a blind spot, told as such
         cause = suspicion.causes[one.causes[0]]
         along = -here.rows @ (pseudo @ suspicion.columns[:, best])
         flat, variance = float(scores.estimate[best]), float(scores.std[best]) ** 2
@@ -133,7 +135,7 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Cen
         log = -0.5 * (flat**2 / (known + variance) + np.log(known + variance))
         log += log_ndtr(cause.sign * amount / np.sqrt(left)) if cause.sign else 0.0
         weight.append(one.probability * np.exp(log - logsumexp(log)))
-        mean.append(here.values - centre.values + amount[:, None] * along)
+        mean.append(here.values + shift - centre.values + amount[:, None] * along)
         root.append(np.dstack([np.broadcast_to(own, (len(known), *own.shape)), np.sqrt(left)[:, None] * along]))
     if not weight:
         return _Parts(np.zeros(0), np.zeros((0, len(centre.values))), np.zeros((0, len(centre.values), 1)))
