@@ -134,7 +134,7 @@ def test_twins_of_three_loading_steps_are_one_class(name, times):
 def test_nothing_is_named_where_nothing_is_hidden(protocol, seed):
     law = {11: Cable(), 12: Cable(EI0=0.03, EI1=0.005, kc=5.0, K0=1.2), 13: Cable(EI0=2e-4, EI1=1.5e-4, kc=3.0, K0=2.5)}
     conclusion = conclude(bench_of(hidden_test(law[seed], PROTOCOLS[protocol], largest=LARGEST, seed=seed)), SETTINGS)
-    assert conclusion.singles == [] and conclusion.accepted is None and not conclusion.alien
+    assert conclusion.singles == [] and conclusion.accepted is None and not conclusion.unmodelled
 
 
 def test_force_gain_is_never_seen_and_said_to_be_invisible():
@@ -168,7 +168,7 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
     test = hidden_test(cable, SIX, largest=LARGEST, seed=15)
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
     found = conclude(bench, SETTINGS)
-    assert [causes[k].name for k in found.accepted.causes] == ["in_plane_load"] and not found.alien
+    assert [causes[k].name for k in found.accepted.causes] == ["in_plane_load"] and not found.unmodelled
     fitted = found.accepted.fitted
     for place, term in enumerate(fitted.extension.terms):
         amount, std = fitted.amount(place)

@@ -93,7 +93,9 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
     search = searched(bench, settings)
     first = conclusion_of(bench, search, settings)
     chance, std = _scatter(bench, first)
-    if first.alien or chance < 0.5:  # scatter is among the error models: where something else is likelier, it is none
+    if (
+        first.unmodelled or chance < 0.5
+    ):  # scatter is among the error models: where something else is likelier, it is none
         return faults, bench, first
     scattered = with_scatter(faults, std)
     again = prepare(scattered, settings, knots=settings.knots)
@@ -104,7 +106,7 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
         exact = with_exact_displacements(bench.observation, bench.base, second.accepted.fitted, settings)
         search.add([explanation_of(second.accepted.causes, bench.base, exact)] if exact else [])
         first = conclusion_of(bench, search, settings)
-        if not first.alien and _scatter(bench, first)[0] < 0.5:
+        if not first.unmodelled and _scatter(bench, first)[0] < 0.5:
             return faults, bench, first
     return scattered, again, second
 

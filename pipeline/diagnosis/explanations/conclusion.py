@@ -29,7 +29,7 @@ class Conclusion:
         What the model is extended by: the likeliest cause or pair; where something else is likelier, the nearest one.
     classes : tuple of tuple of int
         For each of its causes the names that may stand in its place, itself first.
-    alien : bool
+    unmodelled : bool
         Whether something is likelier that no cause of the catalogue makes.
     curtailed : bool
         Whether the search for causes was ended before its end.
@@ -39,7 +39,7 @@ class Conclusion:
     grid: ErrorGrid
     accepted: Explanation | None
     classes: tuple[tuple[int, ...], ...]
-    alien: bool
+    unmodelled: bool
     curtailed: bool = False
 
     @property
@@ -48,12 +48,10 @@ class Conclusion:
         return [one.found for one in self.posterior.explanations(count=1) if one.found is not None]
 
     @property
-    def rivals(self) -> list[tuple[Explanation, float]]:
-        """Other refits that these data cannot tell from the accepted one, with their probability among all of them."""
-        named = [one for one in self.posterior.credible() if one.found is not None]
-        whole = sum(one.probability for one in named)
+    def rivals(self) -> list[Explanation]:
+        """Other refits that these data cannot tell from the accepted one."""
         own = None if self.accepted is None else set(self.accepted.causes)
-        return [(one.found, one.probability / whole) for one in named if one.found and set(one.causes) != own]
+        return [one.found for one in self.posterior.credible() if one.found and set(one.causes) != own]
 
 
 def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings) -> Conclusion:
@@ -61,17 +59,17 @@ def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings)
     believed = search.posterior
     word = believed.word
     if word == "base":
-        return Conclusion(believed, search.grid, None, (), alien=False, curtailed=search.curtailed)
-    alien = word == "rest"
+        return Conclusion(believed, search.grid, None, (), unmodelled=False, curtailed=search.curtailed)
+    unmodelled = word == "rest"
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
     refits = believed.explanations()
-    first = next((one for one in refits if len(one.causes) == count or alien), None)
+    first = next((one for one in refits if len(one.causes) == count or unmodelled), None)
     accepted = None if first is None or first.found is None else in_deeper_valley(bench, first.found, settings)
-    if accepted is None or alien:
+    if accepted is None or unmodelled:
         alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)
-        return Conclusion(believed, search.grid, accepted, alone, alien=True, curtailed=search.curtailed)
+        return Conclusion(believed, search.grid, accepted, alone, unmodelled=True, curtailed=search.curtailed)
     classes = _classes(bench, believed, accepted)
-    return Conclusion(believed, search.grid, accepted, classes, alien=False, curtailed=search.curtailed)
+    return Conclusion(believed, search.grid, accepted, classes, unmodelled=False, curtailed=search.curtailed)
 
 
 def in_deeper_valley(bench: Workbench, found: Explanation, settings: DiagnosisSettings) -> Explanation:

@@ -6,12 +6,11 @@ covariance of the fit, correlations between control points and K0 included:
     df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
 
 Amounts and forms of the causes in the model are errors like these: all share one factor of their joint covariance.
-Where several causes explain the same data, the distance between their curves widens the band.
+What else is believed widens the band later (`pipeline.diagnosis.posterior.mixture`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +21,6 @@ from pipeline.result import CauseForm, Curve
 from rod.characteristic import Characteristic
 
 Array = NDArray[np.float64]
-
-WITHIN = 1.0 / 1.96
-"""Standard deviations per distance at which a curve lies just inside the 95 % band."""
 
 
 def visited(fitted: Fit) -> tuple[float, float]:
@@ -68,13 +64,7 @@ def _by_parameters(fitted: Fit, law: Characteristic, K: Array) -> tuple[Array, A
     return by_tangent, by_moment
 
 
-def curve(
-    fitted: Fit,
-    *,
-    points: int,
-    covariance: Array | None = None,
-    rivals: Sequence[tuple[Fit, float]] = (),
-) -> Curve:
+def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: Fit | None = None) -> Curve:
     """f_EI and m of a fitted model on its visited range.
 
     Parameters
@@ -83,10 +73,8 @@ def curve(
     points : int
     covariance : (p, p) or None
         Of the vector, where that is known better than from the linearised fit alone.
-    rivals : sequence of (Fit, weight)
-        Other explanations of the same data. How far their f_EI lies from this one is part of the band: the variance of
-        a mixture, ``sum_k p_k (f_k - f)^2`` beside the covariance of the fit, and enough of it that each of them lies
-        inside the 95 % band, since none of them can be ruled out.
+    other : Fit or None
+        Another answer to the same data: how far its f_EI lies from this one is one standard deviation more.
     """
     base = fitted.extension.base
     law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
@@ -100,12 +88,11 @@ def curve(
     if bend is not None:
         by_rest[bend] = 1.0
     apart_f, apart_m, apart_rest = [by_tangent[:, used] @ root], [by_moment[:, used] @ root], [by_rest[used] @ root]
-    for rival, chance in rivals:
-        other, rest = law_of(rival), rival.extension.base.pre_curvature(rival.vector)
-        weight = max(np.sqrt(chance), WITHIN)
-        apart_f.append(weight * (other.tangent(K, rest) - tangent)[:, None])
-        apart_m.append(weight * (other.moment(K, rest) - moment)[:, None])
-        apart_rest.append(np.array([weight * (rest - K0)]))
+    if other is not None:
+        there, rest = law_of(other), other.extension.base.pre_curvature(other.vector)
+        apart_f.append((there.tangent(K, rest) - tangent)[:, None])
+        apart_m.append((there.moment(K, rest) - moment)[:, None])
+        apart_rest.append(np.array([rest - K0]))
     factor = np.hstack(apart_f)
     tangent_std, moment_std = (np.linalg.norm(columns, axis=1) for columns in (factor, np.hstack(apart_m)))
     excess = K - K0
@@ -135,7 +122,7 @@ def law_of(fitted: Fit) -> Characteristic:
 def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = None) -> list[CauseForm]:
     """The forms of a cause as they stand in a fitted model, with their share in the factor of its `curve`.
 
-    ``columns`` is the number of columns of that factor: the rivals' come last, and move the amounts of no cause.
+    ``columns`` is the number of columns of that factor: others come last, and move the amounts of no cause.
     """
     used, root = _root(fitted, covariance)
     found = []

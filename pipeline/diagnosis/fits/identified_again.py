@@ -50,15 +50,15 @@ class Identified:
         At the mean over the priors of the law.
     covariance : (p, p)
         Of the vector of ``fitted``, the spread over the priors included.
-    rivals : tuple of (Fit, weight)
-        Other answers that the data allow, as `extended.curve` takes them; their vector alone counts.
+    other : Fit or None
+        Another answer that the data allow, as `extended.curve` takes it; its vector alone counts.
     sizes : dict of name -> (size, std)
         Of the causes whose forms add up: the sum of the forms, and how well it is known if the forms may be any.
     """
 
     fitted: Fit
     covariance: Array
-    rivals: tuple[tuple[Fit, float], ...] = ()
+    other: Fit | None = None
     sizes: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -132,8 +132,8 @@ def _with_other_forms(observation: Observation, again: Identified, settings: Dia
         return again
     law = len(fitted.extension.base.names)
     mean = _averaged(observation, fitted, beside=beside).mean
-    # amounts and forms stay: a linear move may leave their range, and the law is all that a rival is asked for
-    rival = replace(fitted, vector=np.concatenate([mean[:law], fitted.vector[law:]]))
+    # amounts and forms stay: a linear move may leave their range, and the law is all that it is asked for
+    other = replace(fitted, vector=np.concatenate([mean[:law], fitted.vector[law:]]))
     covariance = _averaged(observation, fitted, beside=SPREAD * beside).covariance
     sizes = {}
     for name in dict.fromkeys(causes):
@@ -143,7 +143,7 @@ def _with_other_forms(observation: Observation, again: Identified, settings: Dia
         total[own] = 1.0
         total[fitted.extension.size :] = SPREAD * abs(size) * (np.array(causes) == name)
         sizes[name] = (size, float(np.sqrt(total @ covariance @ total)))
-    return replace(again, rivals=((rival, 1.0),), sizes=sizes)
+    return replace(again, other=other, sizes=sizes)
 
 
 def _amounts_of(fitted: Fit, name: str) -> list[int]:

@@ -7,21 +7,21 @@ from typing import Literal
 Verdict = Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"]
 
 
-def verdict(*, found: bool, alien: bool, classes: tuple[tuple[int, ...], ...], powerless: bool) -> Verdict:
+def verdict(*, found: bool, unmodelled: bool, classes: tuple[tuple[int, ...], ...], powerless: bool) -> Verdict:
     """The word of contract.md.
 
     Parameters
     ----------
     found : bool
         A cause, or something else, is likelier than the base model.
-    alien : bool
+    unmodelled : bool
         Something else is.
     classes : tuple of tuple of int
         Names in the place of each cause.
     powerless : bool
         Effects of plausible size would not have been seen either.
     """
-    if alien:
+    if unmodelled:
         return "unexplained"
     if not found:
         return "underpowered" if powerless else "adequate"

@@ -65,7 +65,7 @@ def _classes(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettin
 def _twins(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> list[TwinPart]:
     """Other single causes that leave no more than noise, the likeliest first; none where two causes were found."""
     believed, accepted = conclusion.posterior, conclusion.accepted
-    if conclusion.alien or accepted is None or len(accepted.causes) > 1:
+    if conclusion.unmodelled or accepted is None or len(accepted.causes) > 1:
         return []
     fits = [one.causes[0] for one in conclusion.singles if one.fitted.reduced_chi2 < settings.fits]
     found = [(believed.of(k), bench.suspicion.causes[k]) for k in dict.fromkeys(fits) if k not in accepted.causes]
@@ -93,8 +93,7 @@ TOLD = 1e-6
 
 def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
     """f_EI of the extended model, with the law's smoothness in its band."""
-    points, rivals = settings.curve_points, again.rivals
-    return curve(again.fitted, points=points, covariance=again.covariance, rivals=rivals)
+    return curve(again.fitted, points=settings.curve_points, covariance=again.covariance, other=again.other)
 
 
 def all_believed(bench: Workbench, conclusion: Conclusion, curve: Curve, own: Fit | None = None) -> Widening:

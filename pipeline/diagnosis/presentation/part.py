@@ -50,7 +50,7 @@ def present(
     causes = named_causes(bench, conclusion, again, extended, settings)
     word = verdict(
         found=accepted is not None,
-        alien=conclusion.alien,
+        unmodelled=conclusion.unmodelled,
         classes=conclusion.classes,
         powerless=len(seen) < settings.powerless * len(rows),
     )
@@ -119,7 +119,7 @@ def what_next(
     was never unloaded hides whole causes, and the force calibration is unseen always.
     """
     if conclusion.accepted is not None and conclusion.rivals and not unexplained:
-        return next_experiment(bench, conclusion.accepted, [one for one, _ in conclusion.rivals], settings)
+        return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
     if unexplained:
         turned = "turn the cable end for end and repeat the test"
         unload = "repeat the test with the cable turned end for end, and unload"

@@ -127,15 +127,15 @@ def test_rows_left_out_of_a_refit_do_not_matter(plain):
     assert np.all(found[1].residual[:rows][plain.observation.rows.step == 3] > 40.0)
 
 
-def test_the_band_of_a_class_holds_the_distance_of_its_members(plain):
+def test_the_band_holds_the_distance_to_another_answer(plain):
     count = len(plain.base.extension.base.knots)
     other = replace(
         plain.base, vector=plain.base.vector + np.r_[np.full(count, 0.03), np.zeros(len(plain.base.vector) - count)]
     )
     alone = curve(plain.base, points=21)
-    shared = curve(plain.base, points=21, rivals=[(other, 0.4)])
+    shared = curve(plain.base, points=21, other=other)
     apart = np.expm1(0.03) * np.array(alone.tangent_Nm2)
-    expected = np.hypot(alone.tangent_std_Nm2, np.sqrt(0.4) * apart)
+    expected = np.hypot(alone.tangent_std_Nm2, apart)
     assert shared.tangent_Nm2 == alone.tangent_Nm2
     assert shared.tangent_std_Nm2 == pytest.approx(expected, rel=1e-6)
     assert shared.moment_std_Nm[-1] > alone.moment_std_Nm[-1]

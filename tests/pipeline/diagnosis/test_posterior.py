@@ -168,12 +168,12 @@ def test_words():
     found = posterior(hypotheses, [0, 1])
     assert found.word == "causes" and [one.causes for one in found.credible()] == [(0,), (1,)]
     assert posterior([Hypothesis((), 0.0, 4.0), Hypothesis((0,), 1.0, -9.0)], [0]).word == "rest"
-    assert verdict(found=True, alien=False, classes=((0, 1),), powerless=False) == "class"
-    assert verdict(found=True, alien=False, classes=((0,),), powerless=False) == "named"
-    assert verdict(found=True, alien=False, classes=((0,), (1,)), powerless=False) == "two_causes"
-    assert verdict(found=True, alien=True, classes=((0,),), powerless=False) == "unexplained"
-    assert verdict(found=False, alien=False, classes=(), powerless=True) == "underpowered"
-    assert verdict(found=False, alien=False, classes=(), powerless=False) == "adequate"
+    assert verdict(found=True, unmodelled=False, classes=((0, 1),), powerless=False) == "class"
+    assert verdict(found=True, unmodelled=False, classes=((0,),), powerless=False) == "named"
+    assert verdict(found=True, unmodelled=False, classes=((0,), (1,)), powerless=False) == "two_causes"
+    assert verdict(found=True, unmodelled=True, classes=((0,),), powerless=False) == "unexplained"
+    assert verdict(found=False, unmodelled=False, classes=(), powerless=True) == "underpowered"
+    assert verdict(found=False, unmodelled=False, classes=(), powerless=False) == "adequate"
 
 
 SCATTER = 10e-6  # of a dial gauge, m

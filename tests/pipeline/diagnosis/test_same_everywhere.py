@@ -23,7 +23,7 @@ def answer(test, names):
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
     found = conclude(bench, SETTINGS)
     names = " / ".join(" ".join(causes[k].name for k in place) for place in found.classes)
-    return (names, found.alien), found.posterior.total(count=0, something_else=False)
+    return (names, found.unmodelled), found.posterior.total(count=0, something_else=False)
 
 
 IN_THE_PICTURE = "camera_tilt scale_error lens_distortion in_plane_load"
