@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def test_explain_knows_every_cause_of_the_contract():
     known = call("explain").stdout
-    assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 20
+    assert len([line for line in known.splitlines() if not line.startswith(" ")]) == 22
     parts = ("Amount:", "Sits in:", "Shows with:", "Told apart by:", "At the rig:", "Settled by:")
     assert all(part in call("explain", "pre_curvature").stdout for part in parts)
     assert "An der Anlage:" in call("explain", "pre_curvature", "--language", "de").stdout
