@@ -14,7 +14,7 @@ import platform
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from pipeline.identify.parts import PhotoResidual
 from pipeline.messages import Message, as_message, free_text
 from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces
 from pipeline.result import (
+    BalancePart,
     DiagnosisPart,
     FindingPart,
     InversePart,
@@ -87,7 +88,8 @@ def assemble(
         The command that reproduces the result.
     """
     parts = identification_parts(identification)
-    inverse = parts.inverse if diagnosis is None else with_all_believed(parts.inverse, diagnosis.widening)
+    wider = None if diagnosis is None else diagnosis.widening
+    fitted = parts.inverse.converged
     measured = parts.inverse.converged or parts.balance.curve is not None
     result = Result(
         status="measured" if parts.inverse.converged else "partial" if measured else "failed",
@@ -100,8 +102,8 @@ def assemble(
         ),
         photos=photo_parts(specimen, traces, parts),
         steps=parts.steps,
-        inverse=inverse,
-        balance=parts.balance,
+        inverse=with_all_believed(parts.inverse, wider if fitted else None),
+        balance=with_all_believed(parts.balance, None if fitted else wider),
         agreement=parts.agreement,
         diagnosis=diagnosis,
         findings=_gathered(specimen, traces, parts, list(findings)),
@@ -110,8 +112,11 @@ def assemble(
     return result.model_copy(update={"answer_": result.answer.stored(), "headline": str(headline(result))})
 
 
-def with_all_believed(part: InversePart, widening: Widening | None) -> InversePart:
-    """The curve of way one, where it is the answer, with all that the diagnosis believes in its band."""
+Way = TypeVar("Way", InversePart, BalancePart)
+
+
+def with_all_believed(part: Way, widening: Widening | None) -> Way:
+    """The curve of the way that answers with all that the diagnosis believes in its band."""
     if widening is None or part.curve is None or part.pre_curvature_std_per_m is None:
         return part
     more = float(np.linalg.norm(widening.pre_curvature_factor_per_m))
@@ -162,6 +167,8 @@ def headline(result: Result) -> Message:
     said = fault.said if fault else None if answer.usable else answer.said
     values = {"low": low, "high": high, "K0_per_m": (curve.pre_curvature, curve.pre_curvature_std)}
     parts = [Message("headline.range", method=curve.method, **values)]
+    if curve.method == "extended":
+        agreement = None  # both ways lack the cause that was found
     if agreement is not None and agreement.compatible is not None and agreement.rms_relative is not None:
         key = "headline.agree" if agreement.compatible else "headline.disagree"
         parts.append(Message(key, rms=agreement.rms_relative))

@@ -41,7 +41,7 @@ def diagnose(
     ----------
     test : MeasuredTest
     identification : Identification or None
-        Its curve is what the extended one is held against.
+        Its curve, if its fit converged, is what the extended one is held against.
     settings : DiagnosisSettings or None
 
     Returns
@@ -71,7 +71,8 @@ def diagnose(
         again = prepare(joined, settings, knots=settings.knots)
         if not isinstance(again, str) and again.largest <= again.limit:
             faults, bench = joined, again
-    known = None if identification is None else curve_of(identification.inverse)
+    fitted = None if identification is None else identification.inverse
+    known = curve_of(fitted) if fitted is not None and fitted.converged else None
     faults, bench, conclusion = concluded(faults, bench, settings)
     part = present(bench, conclusion, settings, identified=known)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
