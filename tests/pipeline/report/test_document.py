@@ -238,7 +238,7 @@ def test_disagreement_and_misfit_are_said(full_result, brief):
     misfit = full_result.inverse.misfit.model_copy(update={"chi2": 2000.0})
     inverse = full_result.inverse.model_copy(update={"misfit": misfit})
     text = Page(report_html(brief.model_copy(update={"agreement": agreement, "inverse": inverse}))).text
-    assert "The two independent ways disagree: they differ by 20 % rms" in text
+    assert "The two ways disagree: they differ by 20 % rms" in text
     assert "does not explain forces and shapes within their noise (χ² per degree of freedom 2.53" in text
 
 
@@ -299,7 +299,7 @@ def test_curve_without_covariance_gives_a_bound(full_result):
 
 def test_answer_of_an_extended_model_speaks_of_its_own_pre_curvature(named_page):
     assert "K0 = 2.00000 ± 0.00005 1/m" in headline(named_page)  # where the moment of its own curve is zero
-    assert "Before the extension: The two independent ways agree" in named_page
+    assert "Before the extension: The two ways agree" in named_page
 
 
 def without(*names):
