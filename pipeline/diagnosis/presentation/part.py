@@ -54,7 +54,8 @@ def present(
         classes=conclusion.classes,
         powerless=len(seen) < settings.powerless * len(rows),
     )
-    plain = identified or curve(bench.base, points=settings.curve_points)
+    told = identified is not None and sum(identified.supported) > 1
+    plain = identified if identified is not None and told else curve(bench.base, points=settings.curve_points)
     # the answer is the curve that all that is believed leaves the narrower band, with that band
     wider = None if extended is not None and word != "unexplained" else all_believed(bench, conclusion, plain)
     refuted = False
