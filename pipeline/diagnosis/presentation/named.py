@@ -102,7 +102,7 @@ def all_believed(bench: Workbench, conclusion: Conclusion, curve: Curve, own: Fi
 
 
 def known_to(curve: Curve) -> float:
-    """How well a curve is known: median relative standard deviation of its f_EI."""
+    """How well a curve is known: median relative standard deviation of its f_EI, the smaller the better."""
     return float(np.median(np.array(curve.tangent_std_Nm2) / np.array(curve.tangent_Nm2)))
 
 
