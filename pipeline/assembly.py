@@ -11,7 +11,6 @@ import base64
 import datetime
 import importlib.metadata
 import platform
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
@@ -22,7 +21,7 @@ from pipeline import __version__
 from pipeline.identify import Identification, IdentificationParts, identification_parts
 from pipeline.identify.parts import PhotoResidual
 from pipeline.messages import Message, as_message, free_text
-from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces
+from pipeline.records import Centerline, Finding, Level, LoadStep, Preview, Rejected, Specimen, Traces, of_photo
 from pipeline.result import (
     BalancePart,
     DiagnosisPart,
@@ -97,7 +96,7 @@ def assemble(
         scale=ScalePart(
             px_per_mm=traces.scale.px_per_m / 1e3,
             std_relative=traces.scale.std_relative,
-            source=traces.scale.source,
+            **ScalePart.told(traces.scale.source),
             axis_parallax_std=traces.axis_parallax_std,
         ),
         photos=photo_parts(specimen, traces, parts),
@@ -131,11 +130,11 @@ def _gathered(
     earlier = [
         *specimen.findings,
         *traces.findings,
-        *folded((photo.image, finding) for photo in traces.photos for finding in photo_findings(photo)),
+        *photo_findings(traces.photos),
         *parts.findings,
     ]
     found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
-    return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
+    return [FindingPart.of(f.level, as_message(f.said), code=f.code) for f in found]
 
 
 def _specimen_part(specimen: Specimen) -> SpecimenPart:
@@ -157,7 +156,8 @@ def headline(result: Result) -> Message:
     answer, agreement, diagnosis = result.answer, result.agreement, result.diagnosis
     curve = answer.curve
     if curve is None and result.photos and all(photo.reason for photo in result.photos):
-        reason = free_text(result.photos[0].reason or "")
+        first = result.photos[0]
+        reason = Message("photos.one", image=first.image, said=first.said)
         return Message("headline.no-photo", count=len(result.photos), reason=reason)
     if curve is None:
         advice = free_text(result.inverse.advice) if result.inverse else answer.said
@@ -172,7 +172,7 @@ def headline(result: Result) -> Message:
     if agreement is not None and agreement.compatible is not None and agreement.rms_relative is not None:
         key = "headline.agree" if agreement.compatible else "headline.disagree"
         parts.append(Message(key, rms=agreement.rms_relative))
-    lead = [] if said is None else [as_message(said)]
+    lead = [] if said is None else [said]
     rest = [] if diagnosis is None else [free_text(diagnosis.headline)]
     return Message("headline.sentences", sentences=[*lead, Message("headline.whole", parts=parts), *rest])
 
@@ -187,32 +187,24 @@ def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) 
     ]
 
 
-def photo_findings(photo: Centerline | Rejected) -> tuple[Finding, ...]:
-    """What was noticed on a photo; of a rejected one, that it is and why."""
-    if isinstance(photo, Centerline):
-        return tuple(photo.findings)
-    reason = free_text(photo.reason.removeprefix(f"{photo.image}: "))
-    return (Finding(photo.code, "warning", Message("photos.one", image=photo.image, said=reason)),)
-
-
-def folded(noticed: Iterable[tuple[str, Finding]]) -> list[Finding]:
-    """Findings of photos, by their names: what is the same on several, but for its numbers, is said once for all."""
-    groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
-    for image, finding in noticed:
-        message = finding.message.removeprefix(f"{image}: ")
-        groups.setdefault((finding.code, re.sub(r"[\d.]+", "", message)), []).append((image, finding))
+def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
+    """What was noticed on photos, and why some were refused; what is the same on several is said once, with names."""
+    groups: dict[str, list[tuple[str, Level, Message]]] = {}
+    for photo in photos:
+        told = photo.findings if isinstance(photo, Centerline) else [Finding(photo.code, "warning", photo.said)]
+        for level, said in ((finding.level, as_message(finding.said)) for finding in told):
+            groups.setdefault(said.key, []).append((photo.image, level, said))
     return [_said_once(group) for group in groups.values()]
 
 
-def _said_once(group: list[tuple[str, Finding]]) -> Finding:
-    image, first = group[0]
-    names = list(dict.fromkeys(image for image, _ in group))
+def _said_once(group: list[tuple[str, Level, Message]]) -> Finding:
+    image, level, said = group[0]
+    names = list(dict.fromkeys(image for image, _, _ in group))
     if len(names) == 1:
-        return first
-    told = {finding.message.removeprefix(f"{own}: ") for own, finding in group}
-    key = "photos.several-on" if len(told) > 1 else "photos.several"  # the numbers are those of one photo
-    said = free_text(first.message.removeprefix(f"{image}: "))
-    return Finding(first.code, first.level, Message(key, count=len(names), names=names, image=image, said=said))
+        return of_photo(image, level, said)
+    alike = len({str(one) for _, _, one in group}) == 1
+    key = "photos.several" if alike else "photos.several-on"  # the numbers are those of one photo
+    return Finding(said.code, level, Message(key, count=len(names), names=names, image=image, said=said))
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
@@ -241,15 +233,15 @@ def without_those_told_better(earlier: Iterable[Finding], diagnosed: Iterable[Fi
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
     image = str(step.image)
     if photo is None:
-        reason = str(Message("photo/missing.part"))
-        return PhotoPart(image=image, step=step.step, status="missing", reason=reason, code="photo/missing")
+        said = Message("photo/missing.part")
+        return PhotoPart(image=image, step=step.step, status="missing", code=said.code, **PhotoPart.told(said))
     if isinstance(photo, Rejected):
         return PhotoPart(
             image=image,
             step=step.step,
             status="rejected",
-            reason=photo.reason,
             code=photo.code,
+            **PhotoPart.told(photo.said),
             quality=photo.figure,
             preview=_preview_part(photo.preview),
         )

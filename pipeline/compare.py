@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
-from pipeline.messages import Message, as_message, free_text
+from pipeline.messages import Message
 from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import Result, Visited, leading
 from pipeline.settings.compare import CompareSettings
@@ -124,7 +124,7 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
         return nothing(methods=("", ""), said=Message("comparison.no-curve", names=lacking))
     methods = (one.method, two.method)
     unusable = [r for r in (a, b) if not r.answer.usable]
-    faults = [Message("comparison.unusable", name=r.specimen.id, reason=as_message(r.answer.said)) for r in unusable]
+    faults = [Message("comparison.unusable", name=r.specimen.id, reason=r.answer.said) for r in unusable]
     negative = [r.specimen.id for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
     faults += [Message("comparison.not-positive", name=name) for name in negative]
     if faults:
@@ -219,7 +219,7 @@ def _findings(
         settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
         fault = leading(result.findings)
         noticed = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
-        doubts = [as_message(f.said) for f in noticed]
+        doubts = [f.said for f in noticed]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
             doubts.append(Message("compare/doubt.unexplained"))
         if doubts:
@@ -231,11 +231,11 @@ def _scale_findings(a: Result, b: Result, mean: Difference) -> Iterator[Finding]
     if a.scale is None or b.scale is None:
         return
     if (a.scale.source, a.scale.px_per_mm) == (b.scale.source, b.scale.px_per_mm):
-        yield inferred("compare/scale-shared", px_per_mm=a.scale.px_per_mm, source=free_text(a.scale.source))
+        yield inferred("compare/scale-shared", px_per_mm=a.scale.px_per_mm, source=a.scale.said)
         return
     share = 2.0 * float(np.hypot(a.scale.std_relative, b.scale.std_relative))
     size, std = abs(float(np.log(mean.b / mean.a))), mean.std / mean.a
-    sources = {"a": free_text(a.scale.source), "b": free_text(b.scale.source)}
+    sources = {"a": a.scale.said, "b": b.scale.said}
     if size < 3.0 * share:
         level = doubtful if size > 2.0 * std else inferred
         yield level("compare/scale", share=share, size=size, half=0.5 * size, **sources)

@@ -57,6 +57,11 @@ def doubtful(key: str, /, **values: object) -> Finding:
     return Finding(said.code, "warning", said)
 
 
+def of_photo(image: str, level: Level, said: Message) -> Finding:
+    """Something noticed on one photo, told with its name."""
+    return Finding(said.code, level, Message("photos.one", image=image, said=said))
+
+
 @dataclass(frozen=True)
 class Board:
     """Chessboard of a calibration photo: inner corners per row and column, side of a square in m (measured)."""
@@ -164,7 +169,7 @@ class Scale:
 
     px_per_m: float
     std_relative: float
-    source: str
+    source: Message
 
 
 @dataclass(frozen=True)
@@ -183,13 +188,27 @@ class Preview:
 
 @dataclass(frozen=True)
 class Rejected:
-    """A photo that was not measured: a stable code, the reason in one sentence, the figure that shows why."""
+    """A photo that was not measured, and why; the values of what is said are the figures that show it."""
 
     image: str
-    code: str
-    reason: str
+    said: Message
     preview: Preview | None = None
-    figure: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def code(self) -> str:
+        """Stable code of the reason."""
+        return self.said.code
+
+    @property
+    def reason(self) -> str:
+        """Why, in an English sentence."""
+        return str(self.said)
+
+    @property
+    def figure(self) -> dict[str, float]:
+        """The numbers that show why, by name."""
+        values = self.said.values.items()
+        return {name: float(value) for name, value in values if isinstance(value, int | float)}
 
 
 @dataclass(frozen=True)

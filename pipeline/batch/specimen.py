@@ -264,7 +264,7 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
         store.install(staged, order.name)
         store.end(order.name)
         unstored = None
-    took, said = time.monotonic() - started, as_message(finding.said)
+    took, said = time.monotonic() - started, finding.said
     return Outcome(order.name, "failed", finding.message, False, took, unstored, said=said)
 
 

@@ -11,7 +11,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, note, say, told
-from pipeline.messages import Message, as_message
+from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.predict import Prediction
@@ -72,7 +72,7 @@ def predict(
     measured = read_result(result)
     name, answer = measured.specimen.id, measured.answer
     if answer.method is not None and not answer.usable:
-        unusable = Message("comparison.unusable", name=name, reason=as_message(answer.said))
+        unusable = Message("comparison.unusable", name=name, reason=answer.said)
         note(Message("headline.sentences", sentences=[unusable]))
         ctx.exit(MISSING)
     if length_mm is None and measured.specimen.length_m is None:

@@ -162,11 +162,12 @@ def _together(quantity: str) -> str:
     return quantity.replace(" ", NO_BREAK)
 
 
-def _refused(result: Result) -> str:
+def _refused(result: Result) -> Message | None:
     """Why the first photo was refused, if all of them were."""
-    if any(photo.status == "traced" for photo in result.photos):
-        return ""
-    return next((photo.reason for photo in result.photos if photo.reason), "")
+    photos = result.photos
+    if not photos or not all(photo.reason for photo in photos):
+        return None
+    return Message("photos.one", image=photos[0].image, said=photos[0].said)
 
 
 def _agreement(result: Result, words: Words) -> str:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from pipeline.messages import Message
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Area, Drawing, drawing
 from pipeline.report.curves import seen_range
@@ -168,12 +167,6 @@ def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[
     return [_photo_view(index, photo, words, settings) for index, photo in enumerate(maps.photos_of_answer(result))]
 
 
-def _reason(photo: PhotoPart, words: Words) -> str:
-    """Why a photo was not used, without its name, which stands beside it."""
-    reason, missing = (photo.reason or "").removeprefix(f"{photo.image}: "), Message("photo/missing.part")
-    return words.said(missing if reason == str(missing) else reason).text
-
-
 def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
     seen, hidden = photos.overlay_paths(photo)
     kappa, seen_kappa = None, seen_range(photo)
@@ -182,7 +175,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
         draw = partial(photos.draw_photo_curvature, photo=photo, words=words, settings=settings)
         ends = {"low": words.curvature(low), "high": words.curvature(high)}
         kappa = titled(f"kappa-{index}", draw, words, key="kappa", size=TALL, **ends)
-    told, marks = _reason(photo, words), photos.bearing_marks(photo)
+    told, marks = words.said(photo.said).text if photo.reason else "", photos.bearing_marks(photo)
     return PhotoView(index, photo.step, photo.image, photo.status, told, photo.preview, seen, hidden, marks, kappa)
 
 
@@ -220,7 +213,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
             [
                 str(photo.step),
                 photo.image,
-                words(f"status_{photo.status}") + (f": {_reason(photo, words)}" if photo.reason else ""),
+                words(f"status_{photo.status}") + (f": {words.said(photo.said)}" if photo.reason else ""),
                 *(millimetres.number(value, std) for value, std in lengths),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]

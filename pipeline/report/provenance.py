@@ -64,7 +64,7 @@ def specimen_rows(result: Result, words: Words) -> list[tuple[str, str]]:
         rows.append((words("moving"), words(part.moving_bearing)))
     if result.scale is not None:
         scale = words.measured(result.scale.px_per_mm, result.scale.px_per_mm * result.scale.std_relative)
-        rows.append((words("scale"), f"{scale} px/mm {words('scale_from', source=words.said(result.scale.source))}"))
+        rows.append((words("scale"), f"{scale} px/mm {words('scale_from', source=words.said(result.scale.said))}"))
     return rows + list(part.description.items())
 
 

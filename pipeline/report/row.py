@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.messages import Message, as_message
+from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart, Result, Visited
@@ -131,7 +131,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         causes=tuple(cause.name for cause in found),
         twins=tuple(dict.fromkeys(name for cause in found for name in cause.class_ if name != cause.name)),
         usable=told.usable,
-        fault=None if told.usable else as_message(told.said),
+        fault=None if told.usable else told.said,
         method=told.method or "",
         low=low,
         high=high,
@@ -143,7 +143,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         warnings=sum(f.level == "warning" for f in result.findings),
         errors=sum(f.level == "error" for f in result.findings),
         worst="" if worst is None else worst.code,
-        reason=None if worst is None else as_message(worst.said),
+        reason=None if worst is None else worst.said,
         shapes=_shapes(result),
         curve=None if curve is None else _thinned(curve, settings.index_curve_points),
     )

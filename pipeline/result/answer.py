@@ -29,14 +29,14 @@ class Answer:
     ----------
     usable : bool
         False where a fault of the data makes the numbers none of the cable's.
-    said : Message or str
+    said : Message
         Why it is this curve, or why it is not usable; `reason` in English.
     curve : Visited or None
         f_EI with its band and K0, over the curvatures that were visited; None if no way gave any.
     """
 
     usable: bool
-    said: Message | str
+    said: Message
     curve: Visited | None
 
     @property
@@ -61,9 +61,8 @@ class Answer:
 
     def stored(self) -> AnswerPart:
         """What ``result.json`` keeps of it; the curve stands there under its method."""
-        names = ("method", "usable", "reason", "pre_curvature_per_m", "pre_curvature_std_per_m")
-        data = self.said.stored() if isinstance(self.said, Message) else {}
-        return AnswerPart(**{name: getattr(self, name) for name in names}, **data)
+        names = ("method", "usable", "pre_curvature_per_m", "pre_curvature_std_per_m")
+        return AnswerPart(**{name: getattr(self, name) for name in names}, **AnswerPart.told(self.said))
 
     def _repr_html_(self) -> str:
         """Show the answer in a notebook."""
@@ -146,7 +145,7 @@ def answer_of(result: Result) -> Answer:
     stored = result.answer_
     if stored is not None:
         curve = None if stored.method is None else curves(result).get(stored.method)
-        return Answer(stored.usable, stored.message_or(stored.reason), curve)
+        return Answer(stored.usable, stored.said, curve)
     curve = _best(result)
     fault = data_fault(result, curve)
     if curve is None:
@@ -166,7 +165,7 @@ def _why(result: Result, method: str) -> Message:
     return Message("answer.balance" if method == "balance" else "answer.only")
 
 
-def data_fault(result: Result, curve: Visited | None) -> Message | str | None:
+def data_fault(result: Result, curve: Visited | None) -> Message | None:
     """What makes the numbers of a result none of the cable's; None if nothing does.
 
     Faults that were left out or corrected (a photo of another step, a dead load cell, a sign turned midway) do not.

@@ -7,13 +7,13 @@ provenance) keep their names; more stands beside them.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.integrate import cumulative_trapezoid
 
-from pipeline.messages import UNREADABLE, Message
+from pipeline.messages import UNREADABLE, Message, free_text
 from pipeline.records import Level
 from pipeline.result.lists import Floats, Number, check_one_length
 
@@ -28,6 +28,30 @@ class Part(BaseModel):
         populate_by_name=True,
         json_schema_extra={"additionalProperties": True},
     )
+
+
+class SaidPart(Part):
+    """A sentence as data, so that it can be said in any language; beside it stands its English text."""
+
+    TEXT: ClassVar[str] = "message"
+
+    key: str = Field("", description="which sentence of the catalogue; empty where only its English text is known")
+    values: dict[str, Any] = Field(
+        {}, description="what stands in the sentence, by name; SI units, and further sentences as key and values"
+    )
+
+    @classmethod
+    def told(cls, said: Message) -> dict[str, Any]:
+        """The fields of the part that hold what is said."""
+        return {cls.TEXT: str(said), **said.stored()}
+
+    @property
+    def said(self) -> Message:
+        """What is said, to be told in any language; its English text where the catalogue does not know it."""
+        try:
+            return Message.read({"key": self.key, "values": self.values})
+        except UNREADABLE:
+            return free_text(str(getattr(self, self.TEXT)))
 
 
 class SpecimenPart(Part):
@@ -53,8 +77,10 @@ class PreviewPart(Part):
     strip_base64: str | None = Field(None, description="the cable straightened along its centerline, JPEG in base64")
 
 
-class PhotoPart(Part):
+class PhotoPart(SaidPart):
     """One photo: traced (with its centerline) or rejected (with the reason)."""
+
+    TEXT = "reason"
 
     image: str = Field(description="file name within the specimen's folder")
     step: int = Field(description="number of its step in the log")
@@ -98,8 +124,10 @@ class PhotoPart(Part):
         return self
 
 
-class ScalePart(Part):
+class ScalePart(SaidPart):
     """Scale of the photos and where it came from; `axis_parallax_std` as in `pipeline.records.Traces`."""
+
+    TEXT = "source"
 
     px_per_mm: Number = Field(description="pixels of a photo in one millimetre, at the height of the cable's axis")
     std_relative: Number = Field(description="its standard deviation over itself, common to all photos")
@@ -271,24 +299,10 @@ class AgreementPart(Part):
 Method = Literal["extended", "inverse", "balance"]
 
 
-class SaidPart(Part):
-    """A sentence as data, so that it can be said in any language."""
-
-    key: str = Field("", description="which sentence of the catalogue; empty where only its English text is known")
-    values: dict[str, Any] = Field(
-        {}, description="what stands in the sentence, by name; SI units, and further sentences as key and values"
-    )
-
-    def message_or(self, text: str) -> Message | str:
-        """The sentence, or its English text where the catalogue does not know it (any more)."""
-        try:
-            return Message.read({"key": self.key, "values": self.values}) if self.key else text
-        except UNREADABLE:
-            return text
-
-
 class AnswerPart(SaidPart):
     """Which of the curves is the result, why, and whether a fault of the data makes it none of the cable's."""
+
+    TEXT = "reason"
 
     method: Method | None = Field(None, description="which curve: extended, inverse or balance; null without any")
     usable: bool = Field(description="false where a fault of the data makes the numbers none of the cable's")
@@ -305,12 +319,6 @@ class FindingPart(SaidPart):
     message: str = Field(description="one sentence for people")
 
     @classmethod
-    def of(cls, level: Level, said: Message | str, *, code: str = "") -> FindingPart:
+    def of(cls, level: Level, said: Message, *, code: str = "") -> FindingPart:
         """The part for something said; its code is that of the message unless another is given."""
-        data = said.stored() if isinstance(said, Message) else {}
-        return cls(code=code or Message(data["key"]).code, level=level, message=str(said), **data)
-
-    @property
-    def said(self) -> Message | str:
-        """What is said, to be told in any language."""
-        return self.message_or(self.message)
+        return cls(code=code or said.code, level=level, **cls.told(said))

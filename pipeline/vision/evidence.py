@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.vision.median import median
 
@@ -54,6 +55,11 @@ class Evidence:
     edges: float = 0.0
     unsteady: float = np.inf
     crossed: tuple[float, float] | None = None
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """The numbers that a refusal tells."""
+        return {"edges_over_noise": self.edges, "seen": self.seen, "width_unsteady": self.unsteady}
 
     @property
     def likeness(self) -> float:
@@ -194,22 +200,11 @@ def _crossed(
     return float(place[0]), float(place[1])
 
 
-def unlike_a_cable(evidence: Evidence) -> tuple[str, str]:
-    """Code and reason of a refusal: the figure that is farthest from that of a cable."""
+def unlike_a_cable(evidence: Evidence) -> Message:
+    """Why a strip is refused: the figure that is farthest from that of a cable."""
     edges, steady = evidence.edges / 6.0, 1.0 / max(evidence.unsteady, 1.0)
     if evidence.edges < _FIRM or edges <= min(evidence.seen, steady):
-        return (
-            "photo/contrast",
-            f"the cable's weaker edge stands out of the ground by {evidence.edges:.1f} times the noise and texture"
-            " beside it only; a ground of another brightness or colour helps",
-        )
-    if evidence.seen <= steady:
-        return (
-            "photo/outline",
-            f"two edges of one strip are seen on {100.0 * evidence.seen:.0f} % of its length only",
-        )
-    return (
-        "photo/outline",
-        f"the width of what was traced varies {evidence.unsteady:.1f} times as much as noise and an outline's waves"
-        " explain; a cable's does not",
-    )
+        key = "photo/contrast.weak-edge"
+    else:
+        key = "photo/outline.one-edge" if evidence.seen <= steady else "photo/outline.unsteady"
+    return Message(key, **evidence.figures)

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import cv2
 
+from pipeline.messages import Message
 from pipeline.records import Rejected
 
 Found = TypeVar("Found")
@@ -37,8 +38,7 @@ def guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
         return work()
     except UNFORESEEN as error:
         told = " ".join(str(error).split())[:200]
-        reason = f"{image}: the tracing failed ({type(error).__name__}: {told}); please report it."
-        return Rejected(image, "photo/program-error", reason)
+        return Rejected(image, Message("photo/program-error", error=type(error).__name__, told=told))
 
 
 def jointly(
@@ -71,7 +71,7 @@ def jointly(
     for k, name in enumerate(names):
         if isinstance(given[k], Rejected):
             continue
-        without = (*given[:k], Rejected(name, whole.code, f"{name}{whole.reason}"), *given[k + 1 :])
+        without = (*given[:k], Rejected(name, whole.said), *given[k + 1 :])
         found = guarded("", partial(work, without))
         if not isinstance(found, Rejected):
             return without, found

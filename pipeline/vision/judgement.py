@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.records import Array, Finding, Rejected
+from pipeline.messages import Message
+from pipeline.records import Array, Finding, Rejected, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
@@ -38,7 +39,6 @@ from pipeline.vision.search.ends import (
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
-NO_EDGES = "no two edges of a cable are seen along what stands out of the ground"
 _MAD_TO_STD = 1.4826
 _FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
@@ -67,9 +67,9 @@ class Cable:
         return self.length_px is None and self.slenderness is None
 
 
-def refused(photo: Photo, code: str, reason: str, **figure: float) -> Rejected:
-    """A refusal that names the photo, in one sentence, with its figures."""
-    return Rejected(image=photo.name, code=code, reason=f"{photo.name}: {reason}.", figure=figure)
+def refused(photo: Photo, key: str, **figure: float) -> Rejected:
+    """The refusal of a photo: the key of its sentence, and the figures in it."""
+    return Rejected(photo.name, Message(key, **figure))
 
 
 def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage: SegmentationSettings) -> CrossCut:
@@ -116,14 +116,14 @@ def _judge(
     if approaches_itself(strip.path, reading.width):
         return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
-        return refused(photo, "photo/contrast", NO_EDGES)
+        return refused(photo, "photo/contrast.no-edges")
     axes = _axes(photo, standout, reading, strip, cut, cable, settings)
     branching = branches(strip, reading, stage)
     if isinstance(axes, Rejected):
         if branching:  # which of its arms leaves the picture nobody can tell
             return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
         if cut.contrast < _FAINT * cut.texture:  # a fold of the cloth may leave the picture
-            return _too_faint(photo, cut.contrast / cut.texture)
+            return refused(photo, "photo/contrast.faint", contrast_to_noise=cut.contrast / cut.texture)
         return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
     short = short_of_axis(standout, cut, axes, stage)
     if short is not None:
@@ -131,7 +131,7 @@ def _judge(
     path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
     cut = _cut(standout, path, reading, cable, stage)
     if not len(cut.seen_widths):
-        return refused(photo, "photo/contrast", NO_EDGES)
+        return refused(photo, "photo/contrast.no-edges")
     refusal = _check_width(photo, cut, standout.reduction, cable, stage)
     if refusal is not None:
         return refusal
@@ -158,23 +158,7 @@ def _judge(
 def crossing(photo: Photo, place: Sequence[float] | Array) -> Rejected:
     """The refusal of a cable whose course is ambiguous at a place (u, v) px."""
     u, v = float(place[0]), float(place[1])
-    return refused(
-        photo,
-        "photo/crossing",
-        "the cable crosses or touches itself or another strip, so its course is ambiguous",
-        u_px=u,
-        v_px=v,
-    )
-
-
-def _too_faint(photo: Photo, ratio: float) -> Rejected:
-    return refused(
-        photo,
-        "photo/contrast",
-        f"what is longest stands out of the ground by only {ratio:.1f} times its noise and texture; a ground of another"
-        " brightness or colour helps",
-        contrast_to_noise=ratio,
-    )
+    return refused(photo, "photo/crossing", u_px=u, v_px=v)
 
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
@@ -184,27 +168,14 @@ def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSe
     moved = _moved(photo, closeup, width)
     if moved is not None or closeup.blur_px <= _BLURRED * width:
         return moved
-    return refused(
-        photo,
-        "photo/blur",
-        f"the edges are spread by {closeup.blur_px:.1f} px on a cable of {width:.1f} px; focus the camera",
-        blur_px=closeup.blur_px,
-        width_px=width,
-    )
+    return refused(photo, "photo/blur", blur_px=closeup.blur_px, width_px=width)
 
 
 def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
     """Refuse a photo taken in motion: covers are doubled, and shading is smeared over the edges."""
     if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION):
         return None
-    return refused(
-        photo,
-        "photo/blur",
-        f"camera or cable moved by {closeup.motion_px:.0f} px during the exposure, the cable is {width:.0f} px "
-        "wide; let the rig come to rest, and use a shorter exposure",
-        motion_px=closeup.motion_px,
-        width_px=width,
-    )
+    return refused(photo, "photo/blur.moved", motion_px=closeup.motion_px, width_px=width)
 
 
 def _axes(
@@ -235,19 +206,11 @@ def _axes(
     if leaving:
         return _leaves(photo, leaving[0])
     place = ends[0 if first is None else 1].place
-    return refused(
-        photo,
-        "photo/bearing",
-        f"no round cover of the given diameter is seen at the cable's end near ({place[0]:.0f}, {place[1]:.0f}) px",
-        u_px=float(place[0]),
-        v_px=float(place[1]),
-    )
+    return refused(photo, "photo/bearing.no-cover", u_px=float(place[0]), v_px=float(place[1]))
 
 
 def _leaves(photo: Photo, place: Sequence[float] | Array) -> Rejected:
-    u, v = float(place[0]), float(place[1])
-    text = f"the cable leaves the picture at ({u:.0f}, {v:.0f}) px"
-    return refused(photo, "photo/leaves-frame", text, u_px=u, v_px=v)
+    return refused(photo, "photo/leaves-frame", u_px=float(place[0]), v_px=float(place[1]))
 
 
 def _check_width(
@@ -257,43 +220,19 @@ def _check_width(
     width = cut.usual_width * reduction
     slender = float(np.hypot(*np.diff(cut.path, axis=0).T).sum()) / cut.usual_width
     if cable.diameter_px is None and slender < stage.least_slenderness:
-        return refused(
-            photo,
-            "photo/width",
-            f"the strip is only {slender:.0f} times as long as it is wide, a cable that bends is longer",
-            slenderness=slender,
-        )
+        return refused(photo, "photo/width.short", slenderness=slender)
     low, high = stage.accepted_width_ratio
     if cable.diameter_px is not None and not low <= width / cable.diameter_px <= high:
-        return refused(
-            photo,
-            "photo/width",
-            f"the strip is {width:.1f} px wide, the cable should be {cable.diameter_px:.1f} px; "
-            "a highlight may split it, or the scale or diameter is wrong",
-            width_px=width,
-            diameter_px=cable.diameter_px,
-        )
+        return refused(photo, "photo/width.other", width_px=width, diameter_px=cable.diameter_px)
     return None
 
 
 def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
-    u, v = place
-    return refused(
-        photo,
-        "photo/hidden-end",
-        f"the cable was followed to ({u:.0f}, {v:.0f}) px only and seems to go on beyond: something lies across"
-        " it or shades it there, or its colour changes",
-        u_px=float(u),
-        v_px=float(v),
-    )
+    return refused(photo, "photo/hidden-end.goes-on", u_px=float(place[0]), v_px=float(place[1]))
 
 
 def _partial(place: tuple[float, float]) -> Finding:
-    text = (
-        f"the cable was followed to ({place[0]:.0f}, {place[1]:.0f}) px and seems to go on beyond; the traced length "
-        "may be short of the cable's"
-    )
-    return Finding("photo/hidden-end", "warning", text)
+    return doubtful("photo/hidden-end.partial", u_px=place[0], v_px=place[1])
 
 
 def _assemble(
@@ -318,7 +257,7 @@ def _assemble(
         return _leaves(photo, leaving[0])
     path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
     if visible is None:
-        return refused(photo, "photo/bearing", "nothing of the cable is seen between the bearing axes")
+        return refused(photo, "photo/bearing.nothing")
     moved = _moved(photo, closeup, width)
     if moved is not None:
         return moved
@@ -367,14 +306,6 @@ def _hidden_end(axis: Bearing, cable: Cable) -> Finding:
     A warning where the length is unknown: a known one is held against the line, and tells whether a piece is missing.
     """
     u, v = axis.center_px
-    if cable.length_px is None and cable.slenderness is None:
-        text = (
-            f"the cable vanishes at something larger near ({u:.0f}, {v:.0f}) px; the line ends there, and the traced "
-            "length may be short of the cable's"
-        )
-        return Finding("photo/hidden-end", "warning", text)
-    text = (
-        f"the cable vanishes at something larger near ({u:.0f}, {v:.0f}) px; the line ends there, not at the cable's "
-        "end"
-    )
-    return Finding("photo/hidden-end", "info", text)
+    if cable.any_length:
+        return doubtful("photo/hidden-end.short", u_px=u, v_px=v)
+    return inferred("photo/hidden-end.vanishes", u_px=u, v_px=v)

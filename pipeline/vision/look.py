@@ -7,7 +7,7 @@ nothing is measured.
 
 from __future__ import annotations
 
-from pipeline.records import Finding, Level, Rejected, Specimen
+from pipeline.records import Finding, Level, Rejected, Specimen, of_photo
 from pipeline.settings import VisionSettings
 from pipeline.vision.picture_size import of_one_size
 from pipeline.vision.series import given_calibration
@@ -26,4 +26,4 @@ def look_at_photos(specimen: Specimen, settings: VisionSettings) -> tuple[Findin
     shots, sizes = of_one_size(shots, settings.series)
     refused = [shot.found for shot in shots if isinstance(shot.found, Rejected)]
     level: Level = "error" if len(refused) == len(shots) else "warning"
-    return (*covers, *sizes, *(Finding(one.code, level, one.reason) for one in refused))
+    return (*covers, *sizes, *(of_photo(one.image, level, one.said) for one in refused))

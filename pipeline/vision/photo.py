@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import ImageOps
 
+from pipeline.messages import Message
 from pipeline.records import Rejected
 from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opened, read_header
@@ -89,47 +90,34 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
             raise OSError(errno.EINVAL, "it is no ordinary file")
         megabytes = status.st_size / 1e6
         if megabytes > settings.max_file_megabytes:
-            return _refused(
-                name,
-                "photo/too-large",
-                f"the file has {megabytes:.0f} MB, more than the limit of {settings.max_file_megabytes:.0f} MB",
-                megabytes=megabytes,
-            )
+            said = Message("photo/too-large", megabytes=megabytes, limit=settings.max_file_megabytes)
+            return Rejected(name, said)
         # OpenCV opens paths in the system's code page on Windows; bytes work everywhere.
         data = path.read_bytes()
     except OSError as error:
-        return _refused(name, "photo/missing", f"the file cannot be opened ({error.strerror})")
+        return Rejected(name, Message("photo/missing.closed", why=error.strerror))
     return decode_photo(data, settings, name=name)
 
 
 def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | Rejected:
     """Decode the bytes of a photo; see `load_photo`."""
     if not data:
-        return _refused(name, "photo/empty", "the file is empty")
+        return Rejected(name, Message("photo/empty"))
     header = read_header(data)
     if header is None:
-        return _refused(name, "photo/unreadable", "the file is not a readable png, jpg, bmp or tif")
+        return Rejected(name, Message("photo/unreadable"))
     megapixels = header.width * header.height / 1e6
     if megapixels > settings.max_megapixels:
-        return _refused(
-            name,
-            "photo/too-large",
-            f"the photo has {megapixels:.0f} Mpx, more than the limit of {settings.max_megapixels:.0f} Mpx",
-            megapixels=megapixels,
-        )
-    if min(header.width, header.height) < settings.min_side_px:
-        side = min(header.width, header.height)
-        return _refused(
-            name,
-            "photo/too-small",
-            f"the picture is {side} px small, the least is {settings.min_side_px} px",
-            side_px=side,
-        )
+        said = Message("photo/too-large.pixels", megapixels=megapixels, limit=settings.max_megapixels)
+        return Rejected(name, said)
+    side = min(header.width, header.height)
+    if side < settings.min_side_px:
+        return Rejected(name, Message("photo/too-small", side_px=side, limit_px=settings.min_side_px))
     if not is_whole(data, header.kind):
-        return _refused(name, "photo/truncated", "the file ends before the picture does; copy it again")
+        return Rejected(name, Message("photo/truncated"))
     pixels = _decode(data, header) if is_sound(data, header.kind) else None
     if pixels is None:
-        return _refused(name, "photo/unreadable", f"the {header.kind} file is damaged or of an unknown variant")
+        return Rejected(name, Message("photo/unreadable.damaged", kind=header.kind))
     return Photo(name=name, pixels=pixels, bit_depth=_bit_depth(pixels))
 
 
@@ -161,10 +149,6 @@ def levels(photo: Photo) -> tuple[float, float]:
 
 def _mean_over(pixels: Pixels, size: tuple[int, int]) -> Pixels:
     return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), pixels.dtype)
-
-
-def _refused(name: str, code: str, reason: str, **figure: float) -> Rejected:
-    return Rejected(image=name, code=code, reason=f"{name}: {reason}.", figure=figure)
 
 
 def _decode(data: bytes, header: Header) -> Pixels | None:

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.records import Finding, Rejected
+from pipeline.messages import Message
+from pipeline.records import Finding, Rejected, inferred
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.shots import Shot
@@ -46,17 +47,12 @@ def of_one_size(shots: list[Shot], settings: SeriesSettings) -> tuple[list[Shot]
         if shot.size is None or tuple(sorted(shot.size)) == usual:
             settled.append(shot)
             continue
-        name, size = shot.found.image, f"{shot.size[0]} x {shot.size[1]} px"
-        most = f"{usual[1]} x {usual[0]} px"
+        name = shot.found.image
+        both = {"size": f"{shot.size[0]} x {shot.size[1]} px", "most": f"{usual[1]} x {usual[0]} px"}
         ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
         if abs(ratio - 1.0) <= settings.cropped_length:
-            text = f"{name} has {size}, most photos have {most}; it was cropped, as the cable's length on it shows."
-            findings.append(Finding("photo/size", "info", text))
+            findings.append(inferred("photo/size.cropped", image=name, **both))
             settled.append(shot)
             continue
-        reason = (
-            f"{name}: the picture has {size}, most photos of the specimen have {most}; it was scaled or taken "
-            "otherwise, and their scale does not hold for it."
-        )
-        settled.append(replace(shot, found=Rejected(name, "photo/size", reason)))
+        settled.append(replace(shot, found=Rejected(name, Message("photo/size", **both))))
     return settled, tuple(findings)

@@ -118,11 +118,7 @@ def _slenderness(found: RoughCable) -> float:
 
 
 def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
-    text = (
-        f"the strip is {_slenderness(found):.0f} times as long as wide, by length_mm and diameter_mm the cable is "
-        f"{slenderness:.0f} times; a highlight may split it, or one of the two is wrong"
-    )
-    return refused(photo, "photo/width", text, seen=_slenderness(found), stated=slenderness)
+    return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=slenderness)
 
 
 def _widths(photo: Photo, slenderness: float, settings: VisionSettings) -> list[float]:
@@ -225,7 +221,7 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
             return refusal
     if not best.evidence.enough:
-        return refused(photo, *unlike_a_cable(best.evidence), likeness=best.evidence.likeness)
+        return Rejected(photo.name, unlike_a_cable(best.evidence))
     hidden = any(finding.code == "photo/hidden-end" for finding in best.findings)
     if best.evidence.crossed is not None or (best.branching and hidden):
         return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
@@ -245,8 +241,7 @@ def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
 
 
 def _two_candidates(photo: Photo, one: float, other: float) -> Rejected:
-    text = f"2 strips could be the cable ({one:.0f} px and {other:.0f} px long); leave one cable in the picture"
-    return refused(photo, "photo/two-candidates", text, candidates=2.0)
+    return refused(photo, "photo/two-candidates", one_px=one, other_px=other)
 
 
 def _widest_alike(likely: list[RoughCable]) -> RoughCable:
@@ -298,29 +293,18 @@ def _blank(photo: Photo, stage: PhotoSettings) -> Rejected | None:
     darkest, brightest = levels(photo)
     if brightest - darkest > stage.blank_range:
         return None
-    text = (
-        f"the picture shows nothing: its brightness is {50 * (darkest + brightest):.0f} % everywhere; look after lens "
-        "cap, lamp and exposure"
-    )
-    return refused(photo, "photo/blank", text, brightness=0.5 * (darkest + brightest))
+    return refused(photo, "photo/blank", brightness=0.5 * (darkest + brightest))
 
 
 def _nothing(photo: Photo, standout: Standout, reading: Reading, *, known: bool) -> Rejected:
     """Say whether nothing is there or too little of it stands out; ``known`` if the cable's width is."""
-    longest, width = reading.longest * standout.reduction, reading.width * standout.reduction
-    found = {"contrast_to_noise": reading.level, "longest_px": longest}
-    if not known:
-        text = (
-            f"no strip of the cable's width stands out of the ground over a sufficient length: at {reading.level:.1f} "
-            f"times its noise the longest piece is {longest:.0f} px; a ground of another brightness or colour helps"
-        )
-        return refused(photo, "photo/contrast", text, **found)
-    text = (
-        f"no strip of the cable's width, {width:.0f} px, stands out of the ground over a sufficient length: at "
-        f"{reading.level:.1f} times its noise the longest piece is {longest:.0f} px; if that is not the cable's width, "
-        "scale or diameter is wrong, else a ground of another brightness or colour helps"
+    return refused(
+        photo,
+        "photo/contrast.nothing-known" if known else "photo/contrast.nothing",
+        contrast_to_noise=reading.level,
+        longest_px=reading.longest * standout.reduction,
+        width_px=reading.width * standout.reduction,
     )
-    return refused(photo, "photo/contrast", text, width_px=width, **found)
 
 
 def _surroundings(near: RoughCable, photo: Photo, stage: SegmentationSettings) -> Window:

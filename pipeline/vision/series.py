@@ -15,7 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from pipeline.records import Array, Centerline, Finding, Rejected, Scale, Specimen, Traces
+from pipeline.messages import Message
+from pipeline.records import Array, Centerline, Finding, Rejected, Scale, Specimen, Traces, doubtful
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.steady import at_least, wandering_px
@@ -43,8 +44,7 @@ from pipeline.vision.stated_width import with_width_seen
 Line = Centerline | Rejected
 Told = TypeVar("Told")
 
-NOT_ALIKE = "What all photos have in common could not be told; the centerlines stay as they are. Please report it."
-_UNTOLD = Finding("photo/program-error", "warning", NOT_ALIKE)
+_UNTOLD = doubtful("photo/program-error.series")
 
 
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
@@ -80,7 +80,7 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
         calibration = _by_what_is_seen(specimen, shots, settings) if told is None else told[0]
     if calibration is None:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
-        return Traces(photos, Scale(1.0, 1.0, "none: no photo could be measured"))
+        return Traces(photos, Scale(1.0, 1.0, Message("scale.none")))
     shots, settled = _together(shots, lambda some: with_fixed_cover(specimen, some, calibration, settings))
     shots = shots if settled is None else settled
     found, _ = _told_by(shots, [shot.found for shot in shots])
@@ -264,11 +264,7 @@ def _name_sides(
         du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
         if du <= np.tan(np.radians(settings.bearings.vertical_deg)) * dv:
             return True, _fixed_moved(steps, moving, found, calibration, settings.series)
-        text = (
-            f"The {moving} bearing moves on the photos, specimen.toml says moving_bearing = "
-            f'"{specimen.rig.moving_bearing}"; the camera may be turned by 180 degrees or the photos mirrored.'
-        )
-        findings.append(Finding("rig/moving-bearing", "warning", text))
+        findings.append(doubtful("rig/moving-bearing", moving=moving, stated=specimen.rig.moving_bearing))
     return False, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))
 
 
@@ -282,11 +278,7 @@ def _fixed_moved(
     doubt = 4.0 * np.sqrt(2.0) * float(np.median([axis.std_px for axis in axes])) / calibration.scale.px_per_m
     if shift <= max(settings.max_fixed_shift_m, doubt):
         return ()
-    text = (
-        f"The fixed ({other}) bearing wanders by {1e3 * shift:.2f} mm over the photos, more than its place on them is "
-        "open; camera or frame moved."
-    )
-    return (Finding("photo/camera-moved", "warning", text),)
+    return (doubtful("photo/camera-moved", side=other, shift_m=shift),)
 
 
 def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
@@ -317,12 +309,8 @@ def _without_hidden_ends(
     allowed = max(settings.series.max_length_deviation, 3.0 * calibration.scale.std_relative)
     if abs(ratio - 1.0) <= allowed:
         return line
-    reason = (
-        f"from visible end to visible end the cable is {1e3 * line.traced_length_m:.2f} mm long, "
-        f"{100 * (ratio - 1):+.2f} % from length_mm; "
-        "something hides the bearing axes: give bearing_marker_mm or bearings_px"
-    )
-    return Rejected(line.image, "photo/bearing", reason, line.preview, {"length_ratio": ratio})
+    said = Message("photo/bearing.hidden-ends", length_m=line.traced_length_m, change=ratio - 1.0)
+    return Rejected(line.image, said, line.preview)
 
 
 def _check_lengths(
@@ -337,13 +325,8 @@ def _check_lengths(
     spread = float(np.ptp(lengths) / np.mean(lengths))
     if spread > settings.max_length_spread:
         worst = traced[int(np.argmax(np.abs(lengths - np.median(lengths))))].image
-        text = f"The traced length varies by {100 * spread:.2f} % over the photos, most on {worst}."
-        findings.append(Finding("photo/length-varies", "warning", text))
-    ratio = float(np.median(lengths)) / specimen.length_m
-    if abs(ratio - 1.0) > settings.max_length_deviation:
-        text = (
-            f"The traced length is {1e3 * float(np.median(lengths)):.2f} mm, {100 * (ratio - 1):+.2f} % from length_mm "
-            f"= {1e3 * specimen.length_m:.2f}; the scale or the length is wrong."
-        )
-        findings.append(Finding("scale/length", "warning", text))
+        findings.append(doubtful("photo/length-varies", spread=spread, image=worst))
+    length, stated = float(np.median(lengths)), specimen.length_m
+    if abs(length / stated - 1.0) > settings.max_length_deviation:
+        findings.append(doubtful("scale/length", length_m=length, change=length / stated - 1.0, stated_mm=1e3 * stated))
     return tuple(findings)

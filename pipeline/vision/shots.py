@@ -12,7 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen
+from pipeline.messages import Message
+from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
@@ -57,11 +58,7 @@ def find_cables(
     again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
-    text = (
-        f"bearing_marker_mm is not given; round covers {2 * radius:.0f} px across are seen where the cable ends, their "
-        "centres are taken for the bearing axes."
-    )
-    return again, (Finding("rig/covers-found", "info", text),)
+    return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
 
 
 def _sought(work: Callable[[], float | None]) -> float | None:
@@ -176,12 +173,8 @@ def _with_axes_shown(shot: Shot) -> Shot:
     clamps = [axis.center_px for axis in (cable.left, cable.right) if axis.kind == "clamp"]
     if not clamps:
         return shot
-    reason = (
-        f"{cable.image}: the cable vanishes under something at ({clamps[0][0]:.0f}, {clamps[0][1]:.0f}) px that is no "
-        "round cover, and without a scale nothing tells where the bearing axis is; give scale_px_per_mm, "
-        "bearing_marker_mm or bearings_px."
-    )
-    return replace(shot, found=Rejected(cable.image, "photo/bearing", reason))
+    u, v = clamps[0]
+    return replace(shot, found=Rejected(cable.image, Message("photo/bearing.vanishes", u_px=u, v_px=v)))
 
 
 def _with_photos(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Iterator[tuple[Photo, RoughCable]]:
@@ -262,12 +255,9 @@ def with_fixed_cover(
         if isinstance(again, RoughCable) and apart_px(again, fixed) <= limit:
             settled[k] = replace(shots[k], found=again)
         elif not is_sure(cable, fixed.side):
-            apart = 1e3 * apart_px(cable, fixed) / calibration.scale.px_per_m
-            reason = (
-                f"{cable.image}: what was taken for the fixed ({fixed.side}) bearing's cover lies {apart:.1f} mm from "
-                "where the other photos show it, and too little of its rim is seen to tell that the camera moved."
-            )
-            settled[k] = replace(shots[k], found=Rejected(cable.image, "photo/bearing", reason))
+            apart = apart_px(cable, fixed) / calibration.scale.px_per_m
+            said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart)
+            settled[k] = replace(shots[k], found=Rejected(cable.image, said))
     return settled
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.guard import guarded
@@ -67,14 +68,13 @@ def with_width_seen(
     again = retrace(replace(specimen, diameter_m=width_m), settings)
     seen = [photo.width_m for photo in again.photos if isinstance(photo, Centerline)]
     better = len(seen) > len(again.photos) - len(refused)
-    used = "that width was taken" if better else "no photo was used"
-    shown = float(np.median(seen)) if better else width_m
-    finding = Finding(
+    said = Message(
         "diameter/seen",
-        "error",
-        f"the photos show a cable {1e3 * shown:.2f} mm wide where diameter_mm says "
-        f"{1e3 * specimen.diameter_m:.3g}: diameter_mm, or the scale, is wrong; {used}",
+        shown_m=np.median(seen) if better else width_m,
+        stated_mm=1e3 * specimen.diameter_m,
+        used="width-taken" if better else "width-unused",
     )
+    finding = Finding(said.code, "error", said)
     if better:
         return replace(again, findings=(finding, *again.findings))
     photos = tuple(_refused(photo) for photo in traces.photos)
@@ -105,5 +105,4 @@ def _width_seen(
 def _refused(photo: Centerline | Rejected) -> Rejected:
     if isinstance(photo, Rejected):
         return photo
-    reason = "what was traced has neither the width stated nor that of the cable on the other photos"
-    return Rejected(photo.image, "photo/width", reason, photo.preview, {"width_m": photo.width_m})
+    return Rejected(photo.image, Message("photo/width.neither", width_m=photo.width_m), photo.preview)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.assembly import folded, headline, photo_findings, without_those_told_better
+from pipeline.assembly import headline, photo_findings, without_those_told_better
 from pipeline.messages import Message
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import first_screen
@@ -11,14 +11,12 @@ from pipeline.result import FindingPart, leading
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_result import measured_result
 
-ENDS = "the file ends before the picture does; copy it again"
 
-
-@pytest.mark.parametrize("reason", [ENDS, f"images/b.png: {ENDS}"])
-def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name_once(reason):
-    found = photo_findings(Rejected("images/b.png", "photo/truncated", reason))
-    assert [(f.code, f.level, f.message) for f in found] == [("photo/truncated", "warning", f"images/b.png: {ENDS}")]
-    assert Words("de").said(found[0].said).language == "de"
+def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name():
+    (found,) = photo_findings([Rejected("images/b.png", Message("photo/truncated"))])
+    assert (found.code, found.level) == ("photo/truncated", "warning")
+    assert found.message == "images/b.png: the file ends before the picture does; copy it again"
+    assert Words("de").said(found.said).language == "de"
 
 
 @pytest.fixture(scope="module")
@@ -78,20 +76,15 @@ def test_what_the_diagnosis_names_is_said_once():
 
 def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     def narrow(image, share):
-        reason = (
-            f"what was traced is {share} % as wide as the cable: the cable is split along a highlight or shadow, or"
-        )
-        return image, Finding("photo/width", "warning", f"{image}: {reason} scale or diameter are wrong")
+        return Rejected(image, Message("photo/width.traced", width_over_diameter=share))
 
-    axis = Finding("photo/bearing", "warning", "the centerline passes 0.2 cable diameters beside a bearing axis")
-    noticed = [narrow("a.png", 116), ("b.png", axis), narrow("b.png", 115), narrow("c.png", 116)]
-    told = folded(noticed)
-    assert [finding.code for finding in told] == ["photo/width", "photo/bearing"]
-    names = "3 photos (a.png, b.png, c.png)"
-    assert told[0].message.startswith(f"{names}, on a.png: what was traced is 116 % as wide")
-    assert told[1] == axis and folded(noticed[:1]) == [noticed[0][1]]
-    (alike,) = folded([narrow("a.png", 116), narrow("c.png", 116)])
+    photos = [narrow("a.png", 1.16), Rejected("b.png", Message("photo/empty")), narrow("c.png", 1.15)]
+    told = photo_findings(photos)
+    assert [finding.code for finding in told] == ["photo/width", "photo/empty"]
+    assert told[0].message.startswith("2 photos (a.png, c.png), on a.png: what was traced is 116 % as wide")
+    assert told[1].message == "b.png: the file is empty"
+    (alike,) = photo_findings([narrow("a.png", 1.16), narrow("c.png", 1.16)])
     assert alike.message.startswith("2 photos (a.png, c.png): what was traced is 116 % as wide")
     german = Words("de").said(told[0].said)
-    assert german.language == "de" and german.text.startswith("3 Fotos (a.png, b.png, c.png), auf a.png: das ")
+    assert german.language == "de" and german.text.startswith("2 Fotos (a.png, c.png), auf a.png: das ")
     assert Words("de").said(alike.said).language == "de"

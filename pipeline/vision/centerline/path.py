@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.records import Array, Rejected
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
@@ -190,9 +191,4 @@ def _span(
 
 
 def _lost(rough: RoughCable, share: float) -> Rejected:
-    return Rejected(
-        rough.image,
-        "photo/contrast",
-        f"both edges of the cable were found on {100.0 * share:.0f} % of its length only",
-        figure={"measured_share": share},
-    )
+    return Rejected(rough.image, Message("photo/contrast.lost", measured_share=share))

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.records import Array, Finding, Rejected
+from pipeline.messages import Message
+from pipeline.records import Array, Finding, Rejected, doubtful
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
@@ -45,9 +46,7 @@ def refusal(
     """Why a fitted curve is not the cable's; ``width`` (n,) m of the cable on the sections, ``diameter`` m if known."""
     evidence = evidence_of(rough, sections)
     middle = middle_width(width)[0]
-    figure = {"edges_over_noise": evidence.edges, "seen": evidence.seen, "width_unsteady": evidence.unsteady}
-    if diameter is not None:
-        figure["width_over_diameter"] = middle / diameter
+    figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": middle / diameter})
     told = (
         _another_width(middle, diameter)
         or (None if evidence.enough else unlike_a_cable(evidence))
@@ -55,50 +54,29 @@ def refusal(
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )
-    return None if told is None else Rejected(rough.image, *told, figure=figure)
+    return None if told is None else Rejected(rough.image, Message(told.key, **{**figure, **told.values}))
 
 
-Told = tuple[str, str]
-"""Code and reason of a refusal."""
+def _another_width(middle: float, diameter: float | None) -> Message | None:
+    off = diameter is not None and abs(middle / diameter - 1.0) > _WIDTH_OFF
+    return Message("photo/width.traced") if off else None
 
 
-def _another_width(middle: float, diameter: float | None) -> Told | None:
-    if diameter is None or abs(middle / diameter - 1.0) <= _WIDTH_OFF:
-        return None
-    return (
-        "photo/width",
-        f"what was traced is {100.0 * middle / diameter:.0f} % as wide as the cable: the cable is split along a"
-        " highlight or shadow, or scale or diameter are wrong",
-    )
-
-
-def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Told | None:
+def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
     """Middles that lie about no smooth curve: what was followed are shades, not the edges of a cable."""
     width = median(sections.width)
     scatter = median(fit.point_std[fit.weight > 0.0]) * width / middle
     limit = max(_UNEVEN_PX, _UNEVEN * width)
-    if scatter <= limit:
-        return None
-    return (
-        "photo/outline",
-        f"the middles of what was traced scatter by {scatter:.1f} px about any smooth curve, those of a cable this wide"
-        f" by {limit:.1f} px at most",
-    )
+    return None if scatter <= limit else Message("photo/outline.scatter", scatter_px=scatter, limit_px=limit)
 
 
-def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Told | None:
+def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:
     covers = np.array([bearing.radius_px is not None for bearing in (rough.left, rough.right)])
     share = float((feet_of_axes(fit, chord)[1] / (0.5 * middle) * covers).max())
-    if share <= _BESIDE_COVER:
-        return None
-    return (
-        "photo/bearing",
-        f"what was traced passes {min(share, 99.0):.1f} cable radii beside the axis of a bearing cover: it is a flank,"
-        " a shadow or a stripe of the cable, or the cover is not the bearing's",
-    )
+    return None if share <= _BESIDE_COVER else Message("photo/bearing.beside-cover", radii=min(share, 99.0))
 
 
-def _bent(fit: CurveFit, middle: float) -> Told | None:
+def _bent(fit: CurveFit, middle: float) -> Message | None:
     """A curve that bends as no cable can over one diameter, where it was seen.
 
     Over the last pixels before an axis, without data, it may bend as it likes: what ties it to the axis mends that.
@@ -106,13 +84,7 @@ def _bent(fit: CurveFit, middle: float) -> Told | None:
     s = np.arange(fit.s.min(), fit.s.max(), 0.1 * middle)  # the feet of a curve that ran wild are in no order
     angle = fit.curve.at(s)[1]
     bend = float(np.abs(angle[10:] - angle[:-10]).max(initial=0.0))
-    if bend <= _BEND:
-        return None
-    return (
-        "photo/outline",
-        f"what was traced bends to a radius of {1.0 / bend:.1f} cable diameters, no cable does: near there another edge"
-        " was taken for the cable's",
-    )
+    return None if bend <= _BEND else Message("photo/outline.bend", radius_diameters=1.0 / bend)
 
 
 def refusal_of_band(image: str, kappa: Array, std: Array, length: float, options: CurveSettings) -> Rejected | None:
@@ -120,22 +92,15 @@ def refusal_of_band(image: str, kappa: Array, std: Array, length: float, options
 
     The range of a nearly straight cable is that of a bend by one radian over its ``length`` (m).
     """
-    usual = 100.0 * 1.96 * median(std) / max(float(np.abs(kappa).max()), 1.0 / length)
-    if usual <= options.max_band_percent:
-        return None
-    text = (
-        f"the curvature is known to {min(usual, 999.0):.0f} % of its range only, {options.max_band_percent:.0f} % are"
-        " of use; more px/mm, sharper focus and a plainer ground help"
-    )
-    return Rejected(image, "photo/contrast", text, figure={"band_percent": usual})
+    band, most = 1.96 * median(std) / max(float(np.abs(kappa).max()), 1.0 / length), 0.01 * options.max_band_percent
+    return None if band <= most else Rejected(image, Message("photo/contrast.band", band=min(band, 9.99), most=most))
 
 
 def beside_axis(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
     """Finding about a curve that passes ``miss`` (m) beside an axis, of a cable ``width`` (m) wide."""
     if miss <= 0.5 * options.axis_distance_radii * width:
         return ()
-    message = f"the centerline passes {miss / width:.1f} cable diameters beside a bearing axis: is the axis right?"
-    return (Finding("photo/bearing", "warning", message),)
+    return (doubtful("photo/bearing.axis", diameters=miss / width),)
 
 
 def feet_of_axes(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.records import Centerline, Finding, Rejected
+from pipeline.messages import Message
+from pipeline.records import Centerline, Finding, Rejected, of_photo
 from pipeline.settings.vision.series import SeriesSettings
 from rod.measurement import MeasuredShape
 
@@ -47,12 +48,7 @@ def on_one_side(
     turned = [line for line in traced if line.side != side]
     names = {line.image for line in turned}
     findings = tuple(
-        Finding(
-            "photo/other-side",
-            "info",
-            f"{line.image}: the cable bows by {1e3 * _bow(line):.1f} mm to the other side than where it is bent most; "
-            "its curvature counts negative. Was it turned over, or pushed against its natural bow?",
-        )
+        of_photo(line.image, "info", Message("photo/other-side", bow_m=_bow(line)))
         for line in turned
         if _bow(line) > settings.other_side_widths * diameter_m
     )

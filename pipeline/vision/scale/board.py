@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale
+from pipeline.messages import Message
+from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.photo import Photo, load_photo
@@ -52,27 +53,18 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
     try:
         fit = fit_views(views, stage)
     except (np.linalg.LinAlgError, cv2.error) as error:
-        raise InputError(
-            "no plane follows from the corners of the board",
-            path=camera.calibration,
-            code="calibration/no-board",
-            remedy="show the whole board from above, lying in the plane of the cable",
-        ) from error
+        raise InputError(Message("calibration/no-board.plane"), path=camera.calibration) from error
     raised, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)
     plane = _magnified(fit.plane, raised)
     middle = 0.5 * np.array([views[0].size], float)
     uniform = float(np.hypot(stage.board_std, height_std))
     std = float(np.hypot(fit.scale_std, uniform))
-    scale = Scale(float(plane.local_scale(middle)[0]), std, f"board photos ({len(views)}), {fit.lens_source}")
+    source = Message("scale.board", photos=len(views), lens=fit.lens_source)
+    scale = Scale(float(plane.local_scale(middle)[0]), std, source)
     if fit.rms_px > stage.max_board_rms_px:
-        text = f"The board's corners lie {fit.rms_px:.2f} px rms off the fitted plane; is it flat and the photo sharp?"
-        findings.append(Finding("calibration/residual", "warning", text))
+        findings.append(doubtful("calibration/residual", rms_px=fit.rms_px))
     if fit.border_std > stage.max_border_std:
-        text = (
-            f"The board tells the scale at the border of the picture to ± {100 * fit.border_std:.2f} % only, against "
-            "the middle, and curvature to about half of that. Show a board that fills the picture."
-        )
-        findings.append(Finding("calibration/border", "warning", text))
+        findings.append(doubtful("calibration/border", std=fit.border_std))
     aside = tuple(_magnified(other, raised) for other in fit.aside)
     return Calibration(plane, scale, (*findings, *height_findings), uniform, aside)
 
@@ -84,23 +76,13 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
         photo = load_photo(path, settings.photo)
         view = photo if isinstance(photo, Rejected) else find_board(photo, board, settings.calibration)
         if isinstance(view, Rejected):
-            findings.append(Finding("calibration/photo", "warning", f"Calibration photo left out: {view.reason}"))
+            findings.append(doubtful("calibration/photo", image=view.image, said=view.said))
         else:
             views.append(view)
     if not views:
-        raise InputError(
-            f"the board ({board.columns} x {board.rows} inner corners) is found on none of the calibration photos",
-            path=folder,
-            code="calibration/no-board",
-            remedy="check columns and rows (inner corners) and show the whole board in focus",
-        )
+        raise InputError(Message("calibration/no-board", columns=board.columns, rows=board.rows), path=folder)
     if len({view.size for view in views}) > 1:
-        raise InputError(
-            "the calibration photos have different sizes",
-            path=folder,
-            code="calibration/size",
-            remedy="take all of them with the camera settings of the measurement",
-        )
+        raise InputError(Message("calibration/size"), path=folder)
     return views, findings
 
 
@@ -111,8 +93,8 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
     reduced = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
     small = np.asarray(reduced, np.uint8)
     found = _charuco(small, board) if board.charuco else _chessboard(small, board)
-    reason = f"{photo.name}: the board with {board.columns} x {board.rows} inner corners is not seen."
-    missing = Rejected(photo.name, "calibration/no-corners", reason)
+    said = Message("calibration/no-corners", columns=board.columns, rows=board.rows)
+    missing = Rejected(photo.name, said)
     if found is None or not _tells_plane(found[0], board):
         return missing
     points, uv = found
@@ -192,10 +174,6 @@ def _raise_to_axis(
     distance = distance_m if distance_m is not None else fit.distance_m
     if distance is None:
         std = height / settings.usual_distance_m
-        text = (
-            f"The cable axis lies {1e3 * height:.1f} mm above the board and the camera's distance is unknown; "
-            f"up to {100 * std:.1f} % of scale are counted as uncertainty. Give distance_mm in [camera]."
-        )
-        return 1.0, std, (Finding("calibration/height", "info", text),)
+        return 1.0, std, (inferred("calibration/height", height_m=height, std=std),)
     # the board's thickness and the user's reading of the distance are known to about a third of the height
     return 1.0 - height / distance, height / distance / 3.0, ()

@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.records import Array, Finding, Scale, Specimen
+from pipeline.messages import Message
+from pipeline.records import Array, Finding, Scale, Specimen, inferred
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
-_LENGTH = "length of the cable on the photos"
+_LENGTH = Message("scale.length")
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Calibration:
 
 def from_number(px_per_m: float, settings: CalibrationSettings) -> Calibration:
     """Scale as given in specimen.toml."""
-    scale = Scale(px_per_m, settings.given_scale_std, "number given in specimen.toml")
+    scale = Scale(px_per_m, settings.given_scale_std, Message("scale.number"))
     return Calibration(PlaneMap.from_scale(px_per_m), scale, uniform_std=scale.std_relative)
 
 
@@ -85,8 +86,7 @@ def from_found(
             settings.length_scale_std,
             _LENGTH,
         )
-    message = f"No scale is given; {scale.px_per_m / 1e3:.4g} px/mm follow from the {scale.source}."
-    finding = Finding("scale/source", "info", message)
+    finding = inferred("scale/source", px_per_mm=scale.px_per_m / 1e3, source=scale.source)
     return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,), scale.std_relative)
 
 
@@ -123,7 +123,7 @@ def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: floa
     if slope <= 0:
         return None
     std_relative = float(np.hypot(std / slope, parallax_std))
-    return Scale(slope, std_relative, "travel of the moving bearing against the displacement log")
+    return Scale(slope, std_relative, Message("scale.travel"))
 
 
 def cover_radii_px(found: list[RoughCable]) -> Array:
@@ -146,7 +146,7 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
     scatter = float(np.std(radii) / np.mean(radii))
     parallax_std = axis_parallax_std(specimen, found, settings)
     std = math.hypot(settings.cover_diameter_std, parallax_std, scatter, rims)
-    return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, "diameter of the bearing covers")
+    return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, Message("scale.covers"))
 
 
 def check_scale(
@@ -175,13 +175,11 @@ def check_scale(
             and abs(covers.px_per_m - 1.0) > settings.check_sigmas * _std(witness, found_by)
         ]
         confirmed = witnesses and not any(_off(witness, found_by, settings) for witness in witnesses)
-        text = _away(covers, found_by)
         if confirmed:
-            text = (
-                f"The rims seen of the bearing covers are {100 * covers.px_per_m:.1f} % as wide as the diameter given; "
-                f"the scale used ({found_by.source}) is confirmed by the {witnesses[0].source}."
-            )
-        findings.append(Finding("scale/covers", "info" if confirmed else "warning", text))
+            both = {"used": found_by.source, "other": witnesses[0].source}
+            findings.append(inferred("scale/covers", width=covers.px_per_m, **both))
+        else:
+            findings.append(Finding("scale/covers", "warning", _away(covers, found_by)))
     if travel is not None and travel.source != found_by.source and _off(travel, found_by, settings):
         findings.append(Finding("scale/displacement", "warning", _away(travel, found_by)))
     return tuple(findings)
@@ -201,11 +199,9 @@ def _off(other: Scale, used: Scale, settings: CalibrationSettings) -> bool:
     return abs(other.px_per_m - 1.0) > max(settings.check_sigmas * _std(other, used), settings.check_floor)
 
 
-def _away(other: Scale, used: Scale) -> str:
-    return (
-        f"The {other.source} gives a scale {100 * (other.px_per_m - 1):+.2f} ± {100 * _std(other, used):.2f} % away "
-        f"from the one used ({used.source})."
-    )
+def _away(other: Scale, used: Scale) -> Message:
+    off, std = other.px_per_m - 1.0, _std(other, used)
+    return Message("scale.away", other=other.source, off=off, std=std, used=used.source)
 
 
 def _by_length(

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
+from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
@@ -46,7 +47,7 @@ class PlaneFit:
         border.
     distance_m : float or None
         Of the camera, if the photos tell.
-    lens_source : str
+    lens_source : Message
     aside : tuple of PlaneMap
         Maps one standard deviation away along each principal direction of the fit's covariance.
     """
@@ -56,7 +57,7 @@ class PlaneFit:
     scale_std: float
     border_std: float
     distance_m: float | None
-    lens_source: str
+    lens_source: Message
     aside: tuple[PlaneMap, ...]
 
 
@@ -76,7 +77,7 @@ def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> P
     start, moves = _start(views, middle, radius)
     fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), settings.usual_lens, settings)
     homography, lens = _plane_parts(fit.x, middle, radius)
-    source = f"lens k1 = {fit.x[0]:+.4f} ± {np.sqrt(fit.covariance[0, 0]):.4f} at half the diagonal"
+    source = Message("lens.fitted", k1=fit.x[0], std=np.sqrt(fit.covariance[0, 0]))
     aside = tuple(PlaneMap(*_plane_parts(fit.x + step, middle, radius)) for step in _steps_aside(fit))
     return PlaneFit(PlaneMap(homography, lens), fit.rms, *_scale_stds(fit, middle, radius), None, source, aside)
 
@@ -230,7 +231,7 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     fit = _least_squares([ideal], np.append(0.0, _start([ideal], middle, radius)[0]), lens_std, settings)
     plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
     # OpenCV counts distances, here as above coordinates.
-    source = f"lens from {len(views)} photos"
+    source = Message("lens.photos", photos=len(views))
     aside = _aside_of(plane, fit, middle, radius)
     return PlaneFit(plane, float(rms) / np.sqrt(2.0), *_scale_stds(fit, middle, radius), distance, source, aside)
 

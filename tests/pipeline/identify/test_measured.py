@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.identify import identification_parts, identify, measured_test
 from pipeline.identify.measured import picture_centre
+from pipeline.messages import Message
 from pipeline.records import CameraSpec, Centerline, LoadStep, Preview, Rejected, RigSpec, Scale, Specimen, Traces
 from pipeline.settings import IdentifySettings
 
@@ -63,7 +64,11 @@ def specimen(measured):
 
 @pytest.fixture
 def traces(measured):
-    return Traces(tuple(centerline(s) for s in measured.steps), Scale(PX_PER_M, 3e-4, "given"), axis_parallax_std=4e-3)
+    return Traces(
+        tuple(centerline(s) for s in measured.steps),
+        Scale(PX_PER_M, 3e-4, Message("scale.number")),
+        axis_parallax_std=4e-3,
+    )
 
 
 def test_steps_and_photos_meet_by_name(specimen, traces, measured):
@@ -88,7 +93,7 @@ def test_a_photo_that_the_log_does_not_name_was_taken_in_the_middle_of_its_hold(
 
 def test_a_rejected_photo_leaves_the_force(specimen, traces):
     photos = list(traces.photos)
-    photos[2] = Rejected(photos[2].image, "photo/blur", "blurred")
+    photos[2] = Rejected(photos[2].image, Message("photo/blur", blur_px=5.0, width_px=9.0))
     test = measured_test(specimen, Traces(tuple(photos), traces.scale), IdentifySettings())
     assert test.steps[2].shape is None
     assert test.steps[2].chord is None

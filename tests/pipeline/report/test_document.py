@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from pipeline.messages import Message
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, unbroken, write_report
 from pipeline.report.pdf import pdf_bytes
@@ -217,7 +218,7 @@ def test_failed_specimen_says_why(failed_result):
 
 def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
     refused = [
-        PhotoPart(image=photo.image, step=photo.step, status="rejected", reason=f"{photo.image}: the file is empty")
+        PhotoPart(image=photo.image, step=photo.step, status="rejected", **PhotoPart.told(Message("photo/empty")))
         for photo in full_result.photos[:2]
     ]
     steps = [step.model_copy(update={"force_fit_N": None}) for step in full_result.steps]
@@ -254,7 +255,7 @@ def test_german_page_has_german_words_and_numbers(brief):
 def test_german_page_says_the_verdict_in_german(diagnosed):
     result = diagnosed("class")
     told = {"headline": "The simulation lacks hysteresis (0.0049 ± 0.0002 N m)."}
-    finding = FindingPart(code="photo/empty", level="warning", message="the file is empty")
+    finding = FindingPart.of("warning", Message("photo/empty"))
     strange = FindingPart(code="my/own", level="warning", message="The moon is full.")
     changed = {"diagnosis": result.diagnosis.model_copy(update=told), "findings": [finding, strange]}
     page = report_html(result.model_copy(update=changed), ReportSettings(language="de"))

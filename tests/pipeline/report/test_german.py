@@ -199,10 +199,9 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
             "f_EI bei 3,4 1/m (± 0,2 im Logarithmus); f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
         ),
         (
-            "The left bearing moves on the photos, specimen.toml says moving_bearing = \"right\"; the camera may be "
-            "turned by 180 degrees or the photos mirrored.",
-            "Auf den Fotos bewegt sich das Lager links, specimen.toml sagt moving_bearing = \"right\"; die Kamera "
-            "kann um 180 Grad gedreht sein, oder die Fotos sind gespiegelt.",
+            Message("rig/moving-bearing", moving="left", stated="right"),
+            "auf den Fotos bewegt sich das Lager links, specimen.toml sagt moving_bearing = \"right\"; die Kamera "
+            "kann um 180 Grad gedreht sein, oder die Fotos sind gespiegelt",
         ),
         ("a tape measure (length_error)", "ein Maßband (Längenfehler)"),
         (

@@ -279,7 +279,7 @@ def test_scale_by_travel_against_the_log() -> None:
     flat = STAGE.model_copy(update={"usual_distance_m": 1e6})
     calibration = from_found(specimen(marker_m=None), cables, travel, flat)
     assert calibration is not None
-    assert "displacement log" in calibration.scale.source
+    assert calibration.scale.source.key == "scale.travel"
     std = calibration.scale.std_relative
     assert abs(calibration.scale.px_per_m - scale) < 3.0 * std * scale
     # of a line through the axes against the travel; two axes of 0.02 px each, the scale found stands for the true one
@@ -308,7 +308,7 @@ def test_scale_by_covers_where_nothing_moved() -> None:
     calibration = from_found(specimen(), [found(200, 1900, 57.0)], np.array([0.0]), STAGE)
     assert calibration is not None
     assert calibration.scale.px_per_m == pytest.approx(2 * 57.0 / 0.012)
-    assert "covers" in calibration.scale.source
+    assert calibration.scale.source.key == "scale.covers"
 
 
 def test_scale_by_the_length_where_nothing_else_tells() -> None:

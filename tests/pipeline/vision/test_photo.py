@@ -106,7 +106,7 @@ def refused(data: bytes, settings: PhotoSettings = SETTINGS) -> str:
     outcome = decode_photo(data, settings, name="bad.jpg")
     assert isinstance(outcome, Rejected)
     assert outcome.image == "bad.jpg"
-    assert outcome.reason.endswith(".")
+    assert len(outcome.reason) > 10
     return outcome.code
 
 
@@ -225,7 +225,7 @@ def test_a_damaged_remark_behind_the_pixels_of_a_png_is_no_reason_to_refuse_its_
 def test_the_true_size_of_an_enormous_picture_is_told(side: int, megapixels: str) -> None:
     outcome = decode_photo(bare_png(side, side), SETTINGS, name="big")
     assert isinstance(outcome, Rejected)
-    assert outcome.reason == f"big: the photo has {megapixels} Mpx, more than the limit of 120 Mpx."
+    assert outcome.reason == f"the photo has {megapixels} Mpx, more than the limit of 120 Mpx"
 
 
 def test_the_limit_on_megapixels_can_be_raised_beyond_that_of_the_library() -> None:
@@ -242,7 +242,7 @@ def test_a_pipe_is_not_opened(tmp_path: Path) -> None:
     os.mkfifo(path)
     outcome = load_photo(path, SETTINGS)  # waits for a writer for ever if it is opened
     assert isinstance(outcome, Rejected)
-    assert outcome.reason == "pipe.png: the file cannot be opened (it is no ordinary file)."
+    assert outcome.reason == "the file cannot be opened (it is no ordinary file)"
 
 
 def test_a_tif_of_absurd_tiles_is_refused() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.messages import Message
 from pipeline.records import LoadStep, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.photo import Photo
@@ -19,7 +20,7 @@ def shot(number: int, size: tuple[int, int], length: float | None = 900.0) -> Sh
     """A photo of so many px on which the cable is so long; None: refused."""
     step, name = LoadStep(number, "loading", 0.0, 0.0, 0.0, None, NOTHING, NOTHING, None), f"step_{number}.png"
     if length is None:
-        return Shot(step, Rejected(name, "photo/contrast", "nothing found"), None, size)
+        return Shot(step, Rejected(name, Message("photo/contrast.no-edges")), None, size)
     path = np.column_stack([np.linspace(50.0, 50.0 + length, 50), np.full(50, 200.0)])
     ends = [Bearing((float(u), 200.0), 0.1) for u in path[[0, -1], 0]]
     grey = np.zeros((1, 1), np.float32)

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from pipeline.intake.folder import read_specimen
+from pipeline.messages import Message
 from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejected, RigSpec, Side, Specimen, Traces
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
@@ -105,12 +106,12 @@ def test_chords_and_lengths_of_a_series_are_true(tmp_path: Path) -> None:
         assert line.traced_length_m == pytest.approx(LENGTH, abs=5 * line.traced_length_std_m)
         assert line.preview is not None and line.preview.strip is not None
     assert not codes(traces)
-    assert traces.scale.source == "number given in specimen.toml"
+    assert traces.scale.source.key == "scale.number"
 
 
 def test_scale_follows_from_the_displacement_log(tmp_path: Path) -> None:
     traces = trace_series(series(tmp_path, scale_error=None), FLAT)
-    assert "displacement log" in traces.scale.source
+    assert traces.scale.source.key == "scale.travel"
     # axes of some hundredths of a pixel on a way of 50 px: a thousandth
     assert abs(traces.scale.px_per_m / SCALE - 1) < 4 * traces.scale.std_relative < 0.005
     assert [f.code for f in traces.findings if f.level == "info"] == ["scale/source"]
@@ -280,7 +281,7 @@ def test_series_without_any_usable_photo_says_so(tmp_path: Path) -> None:
         assert cv2.imwrite(str(path), np.full((300, 500), 128, np.uint8))
     traces = trace_series(specimen, SETTINGS)
     assert all(isinstance(photo, Rejected) and photo.preview is not None for photo in traces.photos)
-    assert traces.scale.source.startswith("none")
+    assert traces.scale.source.key == "scale.none"
 
 
 def test_preview_is_a_reduced_photo_and_a_straight_strip(tmp_path: Path) -> None:
@@ -361,7 +362,7 @@ def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
         told = near is not None and cable.diameter_px is not None and lost != (2,)
         if told or int(photo.name[5:7]) not in lost:
             return sound(photo, settings, cable=cable, near=near)
-        return Rejected(photo.name, "photo/crossing", "the cable crosses itself")
+        return Rejected(photo.name, Message("photo/crossing"))
 
     monkeypatch.setattr(shots_module, "find_cable", strict)
     photos = trace_series(series(tmp_path, scale_error=scale_error), FLAT).photos

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.intake.folder import read_specimen
+from pipeline.messages import Message
 from pipeline.records import Centerline, Rejected, Scale, Traces
 from pipeline.settings import Settings
 from pipeline.vision.series import trace_series
@@ -45,6 +46,6 @@ def test_a_photo_that_breaks_the_look_without_a_diameter_costs_no_specimen(speci
     def broken(*_, **__):
         raise ValueError("numbers nobody foresaw")
 
-    refused = tuple(Rejected(image, "photo/width", "too narrow") for image in specimen.images)
-    traces = Traces(refused, Scale(5e3, 1e-3, "number given in specimen.toml"))
+    refused = tuple(Rejected(image, Message("photo/width.neither")) for image in specimen.images)
+    traces = Traces(refused, Scale(5e3, 1e-3, Message("scale.number")))
     assert with_width_seen(specimen, traces, SETTINGS.vision, retrace=broken, trace=broken) is traces
