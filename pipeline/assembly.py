@@ -20,7 +20,7 @@ import numpy as np
 from pipeline import __version__
 from pipeline.identify import Identification, IdentificationParts, identification_parts
 from pipeline.identify.parts import PhotoResidual
-from pipeline.messages import Message, as_message, free_text
+from pipeline.messages import Message
 from pipeline.records import Centerline, Finding, Level, LoadStep, Preview, Rejected, Specimen, Traces, of_photo
 from pipeline.result import (
     BalancePart,
@@ -134,7 +134,7 @@ def _gathered(
         *parts.findings,
     ]
     found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
-    return [FindingPart.of(f.level, as_message(f.said), code=f.code) for f in found]
+    return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 
 
 def _specimen_part(specimen: Specimen) -> SpecimenPart:
@@ -160,7 +160,7 @@ def headline(result: Result) -> Message:
         reason = Message("photos.one", image=first.image, said=first.said)
         return Message("headline.no-photo", count=len(result.photos), reason=reason)
     if curve is None:
-        advice = free_text(result.inverse.advice) if result.inverse else answer.said
+        advice = result.inverse.said if result.inverse else answer.said
         return Message("headline.none", advice=advice)
     low, high = (Message("headline.end", value_Nm2=(f, std), at_per_m=kappa) for kappa, f, std in curve.ends())
     fault = leading(result.findings)
@@ -173,7 +173,7 @@ def headline(result: Result) -> Message:
         key = "headline.agree" if agreement.compatible else "headline.disagree"
         parts.append(Message(key, rms=agreement.rms_relative))
     lead = [] if said is None else [said]
-    rest = [] if diagnosis is None else [free_text(diagnosis.headline)]
+    rest = [] if diagnosis is None else [diagnosis.said]
     return Message("headline.sentences", sentences=[*lead, Message("headline.whole", parts=parts), *rest])
 
 
@@ -192,8 +192,8 @@ def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
     groups: dict[str, list[tuple[str, Level, Message]]] = {}
     for photo in photos:
         told = photo.findings if isinstance(photo, Centerline) else [Finding(photo.code, "warning", photo.said)]
-        for level, said in ((finding.level, as_message(finding.said)) for finding in told):
-            groups.setdefault(said.key, []).append((photo.image, level, said))
+        for finding in told:
+            groups.setdefault(finding.said.key, []).append((photo.image, finding.level, finding.said))
     return [_said_once(group) for group in groups.values()]
 
 

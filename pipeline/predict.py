@@ -27,9 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from pipeline.diagnosis.words import spoken
 from pipeline.identified_model import IdentifiedModel, Zero, identified_model
-from pipeline.messages import Message, free_text
+from pipeline.messages import Message, ended, word
 from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
 from pipeline.rounding import plain
@@ -255,7 +254,7 @@ def _step(
     """The last step of a path."""
     step = path[-1]
     if not step.good:
-        return PredictedStep(displacement, "no equilibrium", free_text(step.outcome.advice))
+        return PredictedStep(displacement, "no equilibrium", ended(step.outcome))
     (low, high), sharpest = model.visited, float(step.kappa.max())
     slack = settings.range_slack * (high - low)
     status: Status = "predicted"
@@ -365,12 +364,12 @@ def _about_causes(causes: list[CausePart], model: IdentifiedModel) -> list[Findi
     rest = [cause.name for cause in causes if cause.name not in held]
     found = []
     if inside:
-        names = [free_text(spoken(cause.name)) for cause in inside]
-        others = [free_text(spoken(name)) for cause in inside for name in cause.class_ if name != cause.name]
+        names = [word(cause.name) for cause in inside]
+        others = [word(name) for cause in inside for name in cause.class_ if name != cause.name]
         told = [Message("predict/cause.contains", names=names)]
         told += [Message("predict/cause.order")] if model.remembers else []
         told += [Message("predict/cause.class", others=others)] if others else []
         found.append((doubtful if others else inferred)("predict/cause", sentences=told))
     if rest:
-        found.append(inferred("predict/left-out", names=[free_text(spoken(name)) for name in rest]))
+        found.append(inferred("predict/left-out", names=map(word, rest)))
     return found

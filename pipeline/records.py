@@ -24,14 +24,11 @@ Side = Literal["left", "right"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something a reader of the report must know: a stable code, a level, and what is said.
-
-    ``said`` is a `Message`; a text stands for a sentence that is in no catalogue.
-    """
+    """Something a reader of the report must know: a stable code, a level, and what is said."""
 
     code: str
     level: Level
-    said: Message | str
+    said: Message
 
     @property
     def message(self) -> str:
@@ -41,8 +38,7 @@ class Finding:
     @property
     def document(self) -> dict[str, Any]:
         """The finding as plain values for JSON."""
-        data = self.said.stored() if isinstance(self.said, Message) else {"key": "", "values": {}}
-        return {"code": self.code, "level": self.level, "message": self.message, **data}
+        return {"code": self.code, "level": self.level, "message": self.message, **self.said.stored()}
 
 
 def inferred(key: str, /, **values: object) -> Finding:

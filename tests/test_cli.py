@@ -302,10 +302,10 @@ def test_settings_from_file_and_assignments(tmp_path):
         ("[report]\nlanguage = 'fr'\n", "settings/wrong-value", 2, 'the default is "en"'),
         ("[intake\n", "toml/syntax", 1, ""),
         # integers of 6,000 digits: Python does not write them, be it into a message or into a result
-        (f"[intake]\nphotos_max = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "photos_max = an endless number"),
-        (f"intake = 0x{'F' * 5000}\n", "settings/wrong-value", None, "intake = an endless number"),
-        (f"[intake]\nlength_range_mm = [0x{'F' * 5000}, 1]\n", "settings/wrong-value", None, "an endless number"),
-        (f"[report]\nlanguage = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "language = an endless number"),
+        (f"[intake]\nphotos_max = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "photos_max = ..."),
+        (f"intake = 0x{'F' * 5000}\n", "settings/wrong-value", None, "intake = ..."),
+        (f"[intake]\nlength_range_mm = [0x{'F' * 5000}, 1]\n", "settings/wrong-value", None, "..."),
+        (f"[report]\nlanguage = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "language = ..."),
     ],
 )
 def test_settings_that_are_refused(text, code, line, hint, tmp_path):

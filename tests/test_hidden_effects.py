@@ -210,7 +210,7 @@ def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)
     part, _ = diagnose(with_alien(test, alien, 12.0 * alien_size("six", alien)), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
-    assert {"waves": "shapes", "sticking": "forces"}[alien] in part.leftover["message"]
+    assert {"waves": "shapes", "sticking": "forces"}[alien] in part.leftover.message
 
 
 RENDERED = {

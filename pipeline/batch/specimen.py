@@ -22,7 +22,7 @@ from pipeline.batch.orders import Order, fingerprint
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.messages import Message, as_message
+from pipeline.messages import Message, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.settings import Settings
 from pipeline.threads import one_thread
@@ -241,7 +241,7 @@ def _said(result: Result) -> dict[str, Any]:
 
     if result.steps:
         return headline(result).stored()
-    return as_message(result.findings[0].said if result.findings else result.headline).stored()
+    return (result.findings[0].said if result.findings else free_text(result.headline)).stored()
 
 
 def store_failure(order: Order, finding: FindingPart, started: float, *, trace: str | None = None) -> Outcome:

@@ -10,7 +10,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import columns, entry, language, say, table, told
-from pipeline.messages import Message, free_text
+from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.diagnosis.plans.design import Design
@@ -100,7 +100,7 @@ def echo_outlook(found: Design) -> None:
         size = amount_unit(cause.unit, likely, decimal=decimal).plain(likely, 2)
         rows.append((cause.name, seen, size, yes if cause.visible else no, f"{off} %"))
         key = "plan.apart" if cause.separated_by else "plan.like" if cause.nearest_twin else "plan.alone"
-        like = {"twin": cause.nearest_twin, "cosine": cause.twin_cosine, "by": free_text(cause.separated_by)}
+        like = {"twin": cause.nearest_twin, "cosine": cause.twin_cosine, "by": cause.separated_by or ""}
         twins.append(told(Message(key, survives=cause.surviving_fraction, **like)))
     wide = columns() is None
     for line, twin in zip(table([heads, *rows]), ("", "", *twins), strict=True):

@@ -57,8 +57,7 @@ def _line(text: str) -> str:
 
 
 def _cause(cause: str, words: Words) -> str:
-    """The page of a cause; the name that commands and result.json know stays beside its translation."""
+    """The page of a cause."""
     from pipeline.diagnosis import explain as page
 
-    said = words.said(page(cause)).text
-    return said if said.startswith(cause) else f"{cause}: {said}"
+    return page(cause, words.language)

@@ -26,11 +26,7 @@ def language() -> str:
 
 def told(said: Message | str) -> str:
     """A message, or a sentence that is stored in English alone, in the language of the command."""
-    if language() == "en":
-        return str(said)
-    from pipeline.report.words import Words  # loads names of all causes
-
-    return Words(language()).said(said).text
+    return said.said(language()) if isinstance(said, Message) else said
 
 
 def say(key: str, /, **values: object) -> None:

@@ -25,6 +25,7 @@ from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
+from pipeline.messages import Message
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -52,24 +53,24 @@ def diagnose(
     """
     settings = settings or DiagnosisSettings()
     if not any(step.shape is not None and step.branch != "mounted" for step in test.steps):
-        return _nothing_to_compare("no photo under load was measured"), ()
+        return _nothing_to_compare(Message("diagnosis.no-photo")), ()
     if not any(step.force for step in test.steps):
-        return _nothing_to_compare("all forces in the log are zero"), ()
+        return _nothing_to_compare(Message("diagnosis.no-force")), ()
     if _stands_still(test, settings):
-        return _nothing_to_compare("the log gives one displacement for all steps"), ()
+        return _nothing_to_compare(Message("diagnosis.no-travel")), ()
     if identification is not None and identification.inverse.outcome is InverseOutcome.OPPOSITE_FORCES:
-        return _nothing_to_compare("photos and forces contradict each other"), ()
+        return _nothing_to_compare(Message("diagnosis.contradiction")), ()
     faults = faults_of_input(test, settings)
     if not faults.loaded_forces():
-        return _nothing_to_compare("no force under load can be used"), faults.findings
+        return _nothing_to_compare(Message("diagnosis.no-force-used")), faults.findings
     bench = prepare(faults, settings, knots=settings.knots)
-    if isinstance(bench, str):
+    if isinstance(bench, Message):
         return _nothing_to_compare(bench), faults.findings
     fault = _data_at_fault(bench, settings)
     if fault is not None:
         joined = joined_with_outlier(faults, fault, test)
         again = prepare(joined, settings, knots=settings.knots)
-        if not isinstance(again, str) and again.largest <= again.limit:
+        if not isinstance(again, Message) and again.largest <= again.limit:
             faults, bench = joined, again
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
@@ -100,7 +101,7 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
         return faults, bench, first
     scattered = with_scatter(faults, std)
     again = prepare(scattered, settings, knots=settings.knots)
-    if isinstance(again, str):
+    if isinstance(again, Message):
         return faults, bench, first
     second = conclude(again, settings)
     if second.accepted is not None:
@@ -174,7 +175,6 @@ def _item_at_fault(bench: Workbench, settings: DiagnosisSettings, *, by_cause: f
     return outlier_fault(bench.test, item) if fits and better else None
 
 
-def _nothing_to_compare(reason: str) -> DiagnosisPart:
-    return DiagnosisPart(
-        verdict="underpowered", headline=f"The simulation could not be held against the data: {reason}."
-    )
+def _nothing_to_compare(reason: Message) -> DiagnosisPart:
+    said = Message("diagnosis.nothing", reason=reason)
+    return DiagnosisPart(verdict="underpowered", **DiagnosisPart.told(said))

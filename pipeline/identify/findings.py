@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from pipeline.identify.identification import Identification
-from pipeline.messages import Message, free_text
+from pipeline.messages import Message, ended
 from pipeline.records import Finding, Level, doubtful
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceOutcome
@@ -33,13 +33,19 @@ def _outcomes(found: Identification) -> Iterator[Finding]:
     inverse, graph = found.inverse.outcome, found.balance.outcome
     if inverse is not InverseOutcome.CONVERGED:
         level: Level = "warning" if inverse is InverseOutcome.NOT_VISIBLE else "error"
-        open_ = [free_text(text) for text in found.inverse.invisible]
-        key = "way.inverse-open" if open_ else "way.inverse"
-        said = Message(key, outcome=free_text(inverse.value), open=open_)
+        open_ = [_open(*one) for one in found.inverse.invisible]
+        said = Message("way.inverse-open" if open_ else "way.inverse", outcome=ended(inverse), open=open_)
         yield Finding(f"identify/inverse-{inverse.name.lower().replace('_', '-')}", level, said)
     if graph is not BalanceOutcome.MEASURED:
-        said = Message("way.balance", outcome=free_text(graph.value))
+        said = Message("way.balance", outcome=ended(graph))
         yield Finding(f"identify/balance-{graph.name.lower().replace('_', '-')}", "warning", said)
+
+
+def _open(kappa: float | None, std: float) -> Message:
+    """What the data leave open, as of `rod.inverse.estimate.invisible_combinations`."""
+    if kappa is None:
+        return Message("open.rest", std_per_m=std)
+    return Message("open.stiffness", at_per_m=kappa, std=std)
 
 
 def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:

@@ -98,13 +98,10 @@ def inverse_part(found: Identification) -> InversePart:
     way = found.inverse
     spline, law, model = way.characteristic, way.law, way.model
     if spline is None or law is None or model is None:
-        return InversePart(
-            outcome=way.outcome.name.lower(), advice=way.outcome.value, converged=False, iterations=way.iterations
-        )
+        return InversePart(**InversePart.ending(way.outcome), converged=False, iterations=way.iterations)
     stds = np.sqrt(np.diag(way.covariance))
     return InversePart(
-        outcome=way.outcome.name.lower(),
-        advice=way.outcome.value,
+        **InversePart.ending(way.outcome),
         converged=way.outcome in (InverseOutcome.CONVERGED, InverseOutcome.NOT_VISIBLE),
         iterations=way.iterations,
         pre_curvature_per_m=law.pre_curvature,
@@ -158,7 +155,7 @@ def balance_part(way: BalanceGraph) -> BalancePart:
     """The balance equations."""
     law = way.law
     if law is None:
-        return BalancePart(outcome=way.outcome.name.lower(), advice=way.outcome.value)
+        return BalancePart(**BalancePart.ending(way.outcome))
     pointwise = []
     for points in way.points:
         if points.force != 0.0:
@@ -168,8 +165,7 @@ def balance_part(way: BalanceGraph) -> BalancePart:
                 PointwisePart(step=points.step.step, kappa_per_m=_list(kappa[good]), tangent_Nm2=_list(ratio[good]))
             )
     return BalancePart(
-        outcome=way.outcome.name.lower(),
-        advice=way.outcome.value,
+        **BalancePart.ending(way.outcome),
         pre_curvature_per_m=law.pre_curvature,
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),

@@ -137,7 +137,7 @@ def shown(value: Any) -> str:
     try:
         told = repr(value)
     except ValueError:  # an integer of more digits than Python writes, given in hexadecimal
-        return "an endless number"
+        told = "..."
     return told if len(told) <= LONGEST_SHOWN else f"{told[: LONGEST_SHOWN - 3]}..."
 
 

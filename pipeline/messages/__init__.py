@@ -15,10 +15,15 @@ written as in `str.format`; what may stand behind its colon:
     A p value; a number to three significant digits, or to so many; ``curvature``, the end of a range in 1/m.
 ``word``
     A name used inside the program (a branch, a column) as one says it: the entry ``word.NAME``.
+``amount``
+    A triple, value, standard deviation (or None) and unit, with the prefix that suits it.
 ``wrong``
     Of a message: what is wrong, without what to do.
 `` and ``
-    Of a list: what stands between its parts; a comma, where nothing is said; a dot makes a sentence of each.
+    Of a list: what stands between its last two parts, and a comma between the others; other signs stand between all;
+    a comma, where nothing is said; a dot makes a sentence of each.
+
+`rod` is a library and says itself, in English, how something ended: `ended` makes a message of that.
 """
 
 from __future__ import annotations
@@ -26,19 +31,21 @@ from __future__ import annotations
 import string
 import tomllib
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from pipeline.rounding import p_value, plain, rounded
-from pipeline.units import quantity
+from pipeline.units import amount_unit, quantity
 
 LONGEST = 600
 """Letters of a text that is quoted from a file: a line may have a million. What is cut is its middle."""
 DECIMAL = {"en": ".", "de": ","}
-FACTORS = {"mm": 1e3, "%": 1e2, "mN m²": 1e3, "1/m": 1.0, "N": 1.0}
+PER = {"en": " per ", "de": " je "}
+FACTORS = {"mm": 1e3, "µm": 1e6, "%": 1e2, "mN m²": 1e3, "1/m": 1.0, "N": 1.0, "": 1.0}
 QUANTITIES = ("N", "N m²")
 UNREADABLE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 """What `Message.read` raises on values that do not fit: those of another version, or changed by somebody."""
@@ -76,15 +83,23 @@ class Message:
         """The key without what tells the sentences of a code apart."""
         return self.key.partition(".")[0]
 
-    def said(self, language: str = "en", free: Callable[[str], str] = str) -> str:
-        """The sentence in a language; ``free`` turns texts that stand in no catalogue."""
-        return "; ".join(self.parts(language, free))
+    @property
+    def english(self) -> bool:
+        """Whether it is, or holds, a sentence that stands in no catalogue and is English in every language."""
+        held = (part for value in self.values.values() for part in (value if isinstance(value, tuple) else (value,)))
+        return self.key == "text" or any(isinstance(part, Message) and part.english for part in held)
 
-    def parts(self, language: str = "en", free: Callable[[str], str] = str) -> tuple[str, ...]:
+    def said(self, language: str = "en") -> str:
+        """The sentence in a language."""
+        return "; ".join(self.parts(language))
+
+    def parts(self, language: str = "en") -> tuple[str, ...]:
         """What is wrong and, where the catalogue has it, what to do."""
         if self.key == "text":
-            return (free(str(self.values["text"])),)
-        return tuple(_Gaps(language, free).vformat(text, (), self.values) for text in catalogue(language)[self.key])
+            return (str(self.values["text"]),)
+        known = catalogue(language)
+        texts = known[self.key] if language != "en" or self.key in known else _outcomes()[self.key]
+        return tuple(_Gaps(language).vformat(text, (), self.values) for text in texts)
 
     def stored(self) -> dict[str, Any]:
         """The message as plain values for JSON."""
@@ -103,9 +118,32 @@ def free_text(text: str) -> Message:
     return Message("text", text=text)
 
 
-def as_message(said: Message | str) -> Message:
-    """What is said, as a message."""
-    return free_text(said) if isinstance(said, str) else said
+def entry(kind: str, name: str) -> Message:
+    """What the catalogue has of a name under ``kind.NAME``; the name with blanks where it has nothing."""
+    return Message(f"{kind}.{name}") if f"{kind}.{name}" in catalogue("en") else free_text(name.replace("_", " "))
+
+
+def word(name: str) -> Message:
+    """A name used inside the program as one says it."""
+    return entry("word", name)
+
+
+def ended(outcome: Enum) -> Message:
+    """How a solver, a fit or the balance ended, with its advice."""
+    return Message(f"{_KINDS[type(outcome).__name__]}.{outcome.name.lower().replace('_', '-')}")
+
+
+_KINDS = {"InverseOutcome": "inverse", "BalanceOutcome": "balance", "Outcome": "equilibrium"}
+
+
+@cache
+def _outcomes() -> dict[str, tuple[str, ...]]:
+    """English of all outcomes, `rod`'s own."""
+    from rod.balance import BalanceOutcome
+    from rod.inverse import InverseOutcome
+    from rod.newton import Outcome
+
+    return {ended(one).key: (one.value,) for kind in (InverseOutcome, BalanceOutcome, Outcome) for one in kind}
 
 
 @cache
@@ -136,16 +174,16 @@ def printable(text: str) -> str:
 class _Gaps(string.Formatter):
     """Values of one language for the gaps of its sentences."""
 
-    def __init__(self, language: str, free: Callable[[str], str]) -> None:
-        self.language, self.free, self.decimal = language, free, DECIMAL[language]
+    def __init__(self, language: str) -> None:
+        self.language, self.decimal = language, DECIMAL[language]
 
     def format_field(self, value: Any, spec: str) -> str:
         """A value as the reader gets it; see the module for what ``spec`` may be."""
         if isinstance(value, Message):
-            parts = value.parts(self.language, self.free)
+            parts = value.parts(self.language)
             return parts[0] if spec == "wrong" else "; ".join(parts)
         if isinstance(value, str):
-            return catalogue(self.language)[f"word.{value}"][0] if spec == "word" else format(value, spec)
+            return word(value).said(self.language) if spec == "word" else format(value, spec)
         if spec in QUANTITIES:
             number, std = value if isinstance(value, tuple) else (value, None)
             return quantity(number, spec, std, decimal=self.decimal)
@@ -153,9 +191,21 @@ class _Gaps(string.Formatter):
             std, number = (FACTORS[spec[2:]] * one for one in reversed(value))
             return f"{rounded(number, std, decimal=self.decimal)} {spec[2:]}"
         if isinstance(value, tuple):
-            texts = [self.format_field(part, "") for part in value]
-            return (spec or ", ").join(texts) if spec != "." else " ".join(f"{sentence(t).rstrip('.')}." for t in texts)
+            return self._amount(*value) if spec == "amount" else self._listed(value, spec)
         return self._number(value, spec)
+
+    def _amount(self, number: float, std: float | None, unit: str) -> str:
+        sizes = (number,) if std is None else (number, std)
+        shown = amount_unit(unit.replace(" per ", PER[self.language]), *sizes, decimal=self.decimal)
+        return shown.plain(number, 2) if std is None else shown.text(number, std)
+
+    def _listed(self, values: tuple[Any, ...], spec: str) -> str:
+        texts = [self.format_field(value, "") for value in values]
+        if spec == ".":
+            return " ".join(f"{sentence(text).rstrip('.')}." for text in texts)
+        if not spec.strip().isalpha():
+            return (spec or ", ").join(texts)
+        return spec.join([*([", ".join(texts[:-1])] if texts[1:] else []), *texts[-1:]])
 
     def _number(self, value: float, spec: str) -> str:
         form, _, unit = spec.partition(" ")

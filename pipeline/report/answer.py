@@ -94,7 +94,7 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
             "hidden_row",
             name=words.cause(spot.name),
             bias=words.number(100.0 * bias, 2),
-            settled=words.said(spot.settled_by),
+            settled=words.settled(spot.name),
         )
         for bias, spot in worst
     )
@@ -128,8 +128,8 @@ def _sentence(result: Result, words: Words) -> str:
         refused = _refused(result)
         if refused:
             return words("answer_refused", id=name, count=len(result.photos), reason=words.said(refused))
-        reason = next((f.said for f in result.findings if f.level == "error"), "")
-        if result.status == "failed" and reason:
+        reason = next((f.said for f in result.findings if f.level == "error"), None)
+        if result.status == "failed" and reason is not None:
             return words("answer_failed", id=name, reason=words.said(reason))
         return words("answer_none", id=name)
     fault = leading(result.findings)
@@ -151,9 +151,9 @@ def _sentence(result: Result, words: Words) -> str:
     return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
 
 
-def _brief(said: Message | str) -> Message | str:
+def _brief(said: Message) -> Message:
     """What is wrong without the figures that show it: they stand with the finding."""
-    reading = said.values.get("reading") if isinstance(said, Message) else None
+    reading = said.values.get("reading")
     return reading if isinstance(reading, Message) else said
 
 
@@ -191,7 +191,7 @@ def _agreement(result: Result, words: Words) -> str:
 def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
     """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
     if result.diagnosis is not None:
-        return words.said(result.diagnosis.headline).text, result.diagnosis.verdict == "adequate"
+        return words.said(result.diagnosis.said).text, result.diagnosis.verdict == "adequate"
     misfit = result.inverse.misfit if result.inverse else None
     if misfit is None or misfit.degrees_of_freedom <= 0:
         return words("model_unknown"), False
@@ -213,7 +213,7 @@ def _advice(result: Result, words: Words) -> str:
     experiment = result.diagnosis.next_experiment if result.diagnosis else None
     if experiment is not None:
         names = ", ".join(words.cause(name) for name in experiment.separates)
-        what = words.said(experiment.what).text
+        what = words.said(experiment.said).text
         what = what[:1].upper() + what[1:]
         key = "next_what" if len(experiment.separates) > 1 else "next_settles"
         return words(key, what=what, causes=names) if names else what

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
-from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.messages import Message
 from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import residual_map, titled
@@ -71,11 +70,11 @@ def diagnosis_view(
                 "blind_row",
                 name=words.cause(spot.name),
                 bias=words.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), SHARE_DIGITS),
-                settled=words.said(spot.settled_by),
+                settled=words.settled(spot.name),
             )
             for spot in part.blind_spots
         ],
-        next_what=words.said(following.what).sentence if following else "",
+        next_what=words.said(following.said).sentence if following else "",
         next_separates=_separates(following, words) if following else "",
         leftover=_leftover(part, words),
         figures=_figures(result, part, words, settings) if figures else {},
@@ -95,7 +94,6 @@ def _separates(experiment: NextExperiment, words: Words) -> str:
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says."""
-    catalogue = {cause.name: cause for cause in CATALOGUE}
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
@@ -104,12 +102,12 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
             share = words("does_not_suffice")
         twins = [words.cause(name) for name in cause.class_ if name != cause.name]
         tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
-        line, known = f"{words.cause(cause.name)}: {estimate} ({share}){tail}", catalogue.get(cause.name)
+        line = f"{words.cause(cause.name)}: {estimate} ({share}){tail}"
         for twin in cause.twins:
             chance = words.number(100.0 * twin.probability, SHARE_DIGITS)
-            said = {"name": words.cause(twin.name), "share": chance, "settled": words.said(twin.settled_by)}
+            said = {"name": words.cause(twin.name), "share": chance, "settled": words.settled(twin.name)}
             line += f"; {words('fits_too', **said)}"
-        named.append(NamedCause(line, known.summary, known.remedy) if known else NamedCause(line))
+        named.append(NamedCause(line, *words.about(cause.name)))
     return named
 
 
@@ -168,20 +166,16 @@ def _range(least: float, most: float | None, unit: str, words: Words) -> str:
 def _leftover(part: DiagnosisPart, words: Words) -> list[str]:
     """Sentences on what is left where anything was found: where it sits, unless noise leaves as much."""
     left = part.leftover
-    if not left or part.verdict == "adequate":
+    if left is None or part.verdict == "adequate":
         return []
-    if _is_noise(left):
-        return [words("leftover_noise", p=words.probability(left["probability"], name="p"))]
-    return [words.said(str(left[key])).sentence for key in ("message", "noise") if left.get(key)]
-
-
-def _is_noise(leftover: dict[str, Any]) -> bool:
-    """Whether something else is too improbable for a place and a pattern to mean anything."""
-    return float(leftover.get("probability", 1.0)) < LIKELY
+    if left.probability < LIKELY:
+        return [words("leftover_noise", p=words.probability(left.probability, name="p"))]
+    noise = [] if left.noise_factor == 1.0 else [Message("left.noise", factor=left.noise_factor)]
+    return [words.said(said).sentence for said in (left.said, *noise)]
 
 
 LIKELY = 0.5
-"""Probability of something else from which its place and pattern are told."""
+"""Probability of something else from which its place and pattern are told: below, they mean nothing."""
 
 
 def _figures(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
@@ -197,10 +191,9 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     # where the extended model does not answer, the map among the mechanics is the one before
     if before is not None and after is not None and result.answer.method == "extended":
         drawn.update(_before_and_after(before, after, words, settings))
-    pattern = part.leftover or {}
-    meant = part.verdict != "adequate" and not _is_noise(pattern)
-    if meant and pattern.get("shape_m") and pattern.get("s_m"):
-        left = partial(maps.draw_leftover, s_m=pattern["s_m"], shape_m=pattern["shape_m"], words=words)
+    pattern = part.leftover
+    if pattern is not None and part.verdict != "adequate" and pattern.probability >= LIKELY and pattern.shape_m:
+        left = partial(maps.draw_leftover, s_m=pattern.s_m, shape_m=pattern.shape_m, words=words)
         told = {"title": words("leftover"), "description": words("fig_leftover_alt")}
         drawn["leftover"] = drawing("leftover", left, size=(400.0, 180.0), **told)
     return drawn

@@ -196,7 +196,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
     """
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
     rms = None if row.rms_relative is None else 100.0 * row.rms_relative
-    said = words.said(row.fault or row.reason or "")
+    said = words.said(row.fault or row.reason or Message("text", text=""))
     state, verdict = row.state, _verdict(row)
     numbers: list[tuple[float | None, str]] = [(value, unit.number(value, std)) for value, std in ends]
     numbers.append((row.pre_curvature[0], words.measured(*row.pre_curvature)) if row.pre_curvature else (None, "–"))

@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.diagnosis.rediscovery import Discovery, papers_test, rediscover
-from pipeline.diagnosis.words import spoken
+from pipeline.messages import word
 from pipeline.report.canvas import Area, Drawing, drawing, page_colours
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, environment, palette_css
@@ -218,7 +218,7 @@ def statements(paper: Paper) -> list[Statement]:
 def _found(step: Discovery) -> str:
     """One step from a poorer model to a richer one, in words."""
     before, after = (plain(value, 2) for value in step.chi2)
-    words = f"{spoken(step.name)} by the {step.data}, chi-square {before} to {after}"
+    words = f"{word(step.name)} by the {step.data}, chi-square {before} to {after}"
     if step.gain is None:
         return words
     return f"{words}, {100.0 * min(step.gain.heldout_excess_removed, 1.0):.0f} % of the misfit at steps left out gone"

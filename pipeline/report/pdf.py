@@ -254,7 +254,7 @@ def _diagnosis_sheet(
     """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
     sheet = Sheet(_head(result))
     sheet.text(words("nav_diagnosis"), size=13.0, bold=True)
-    sheet.text(words.said(part.headline).sentence, bold=True)
+    sheet.text(words.said(part.said).sentence, bold=True)
     for line in (*(cause.line for cause in view.named), *view.gain, *view.leftover):
         sheet.text(line)
     if part.table:

@@ -1,9 +1,8 @@
 """The words of report and index in English and German; the numbers in the reader's format.
 
-The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes; the English
-names of causes are the diagnosis's own. Sentences made by other rooms (findings, headline of the diagnosis) are stored
-in English; `Words.said` gives them in the reader's language, see `pipeline.report.german`. One that has no German twin
-stays English and is marked as such on the page.
+The table is ``templates/words.toml``: ``key = ["English", "German"]``, with ``{name}`` where a value goes. Sentences of
+other rooms (findings, headline of the diagnosis) and names of causes are those of `pipeline.messages`; one that no
+catalogue has, such as a finding of an older version, stays English and is marked as such on the page.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.messages import Message, as_message, sentence
-from pipeline.report.german import in_german
+from pipeline.messages import PER, Message, catalogue, entry, sentence, word
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
 
@@ -27,16 +25,6 @@ LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 @cache
 def _table() -> dict[str, dict[str, Any]]:
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))
-
-
-@cache
-def _german_causes() -> dict[str, str]:
-    """German names of the causes, by their names of the contract, with and without underscores, and by the English."""
-    from pipeline.diagnosis.words import spoken  # the index needs it in German alone, and it loads all causes
-
-    rows = _table()["causes"].items()
-    forms = {name: (name, name.replace("_", " "), spoken(name)) for name, _ in rows}  # the second: earlier results
-    return {english: german for name, german in rows for english in forms[name]}
 
 
 @cache
@@ -98,22 +86,21 @@ class Words:
 
     def cause(self, name: str) -> str:
         """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
-        from pipeline.diagnosis.words import spoken
+        return word(name).said(self.language)
 
-        return str(_table()["causes"].get(name, spoken(name))) if self.language == "de" else spoken(name)
+    def said(self, said: Message) -> Said:
+        """A message in this language, as far as it is known in it."""
+        return Said(said.said(self.language), "en" if said.english else self.language)
 
-    def said(self, said: Message | str) -> Said:
-        """A message, or a sentence that is stored in English alone, in this language, as far as it is known."""
-        unknown: list[str] = []
+    def about(self, cause: str) -> tuple[str, str]:
+        """What a cause is and what to do about it at the rig; empty for one that the catalogue does not have."""
+        known = f"cause.{cause}" in catalogue(self.language)
+        texts = Message(f"cause.{cause}").parts(self.language) if known else ("", "")
+        return texts[0], texts[-1]
 
-        def free(text: str) -> str:
-            told, known = in_german(text, _german_causes()) if self.language == "de" else (text, True)
-            if not known:
-                unknown.append(text)
-            return told.replace("+-", "±")
-
-        text = as_message(said).said(self.language, free)
-        return Said(text, "en" if unknown else self.language)
+    def settled(self, cause: str) -> str:
+        """The measurement that settles a cause."""
+        return entry("settled", cause).said(self.language)
 
     def code(self, code: str) -> tuple[str, str] | None:
         """What a message's code means and what to do about it; None for one that is not known."""
@@ -163,4 +150,4 @@ class Words:
 
     def unit(self, unit: str, *values: float) -> Unit:
         """A unit of the contract as one writes it (nothing for a plain number), its prefix suited to the values."""
-        return amount_unit(unit.replace(" per ", self("per")), *values, decimal=self.decimal)
+        return amount_unit(unit.replace(" per ", PER[self.language]), *values, decimal=self.decimal)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
 from pipeline.result.lists import Floats, Number
-from pipeline.result.parts import Curve, Part, Widening
+from pipeline.result.parts import Curve, Part, SaidPart, Widening
 
 
 class CauseForm(Part):
@@ -106,8 +106,10 @@ class BlindSpot(Part):
     settled_by: str = Field(description="measurement that would show it")
 
 
-class NextExperiment(Part):
+class NextExperiment(SaidPart):
     """The cheapest measurement that tells apart causes which these data cannot."""
+
+    TEXT = "what"
 
     what: str = Field(description="to do, in words")
     separates: list[str] = Field(description="causes that it tells apart")
@@ -153,8 +155,25 @@ class ForceCorrectionPart(Part):
     )
 
 
-class DiagnosisPart(Part):
+class LeftoverPart(SaidPart):
+    """What no cause explains, as it is likeliest."""
+
+    message: str = Field(description="where it sits, in words")
+    probability: Number = Field(1.0, description="that something acts that is no cause of the catalogue")
+    chi2: Number | None = Field(None, description="of its pattern")
+    noise_factor: Number = Field(1.0, description="scatter of the sections of the photos over the stated one")
+    share: dict[str, Number] = Field({}, description="of its chi-square by kind of data: force, chord, shape")
+    place: Number | None = Field(None, description="arc length where it is strongest, m")
+    step: int | None = Field(None, description="step where it is strongest, number in the log")
+    s_m: Floats = Field([], description="arc length of its pattern on the photo of that step, m")
+    shape_m: Floats = Field([], description="its pattern: displacement along the normal, m")
+    spoken: str = Field("", description="kind of data where it is strongest, in words")
+
+
+class DiagnosisPart(SaidPart):
     """What the simulation gets wrong, and why."""
+
+    TEXT = "headline"
 
     verdict: Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"] = Field(
         description=(
@@ -177,13 +196,7 @@ class DiagnosisPart(Part):
     widening: Widening | None = Field(
         None, description="what weak effects and something else add to the band of the curve that answers"
     )
-    leftover: dict[str, Any] | None = Field(
-        None,
-        description=(
-            "what no cause explains: message, probability, share by kind of data, step, place (m), "
-            "pattern shape_m (m) over s_m (m)"
-        ),
-    )
+    leftover: LeftoverPart | None = Field(None, description="what no cause explains")
     residuals_before: MapOrNone = Field(None, description="of the fitted simulation")
     residuals_after: MapOrNone = Field(None, description="of the model extended by the causes")
     twins: dict[str, dict[str, Number]] = Field({}, description="cosines of confusable causes")

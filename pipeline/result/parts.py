@@ -6,6 +6,7 @@ provenance) keep their names; more stands beside them.
 
 from __future__ import annotations
 
+from enum import Enum
 from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self
 
@@ -13,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.integrate import cumulative_trapezoid
 
-from pipeline.messages import UNREADABLE, Message, free_text
+from pipeline.messages import UNREADABLE, Message, ended, free_text
 from pipeline.records import Level
 from pipeline.result.lists import Floats, Number, check_one_length
 
@@ -241,19 +242,31 @@ class MisfitPart(Part):
     chi2_by_block: dict[str, tuple[Number, Number]] = Field({}, description="chi2 and number of data by block")
 
 
-class InversePart(Part):
-    """Way one: simulate the experiment and fit."""
+class WayPart(SaidPart):
+    """One of the two ways to f_EI: how it ended, and where it leads."""
 
-    reading: Literal["tangent"] = Field("tangent", description="f_EI is dm/dkappa")
-    outcome: str = Field(description="how the fit ended")
+    TEXT = "advice"
+
+    outcome: str = Field(description="how it ended")
     advice: str = Field("", description="what that means and what to do")
-    converged: bool = Field(description="whether the fit is to be trusted")
-    iterations: int = Field(0, description="of the fit")
     pre_curvature_per_m: Number | None = Field(None, description="K0, curvature at rest, 1/m")
     pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
     supported_per_m: tuple[Number, Number] | None = Field(None, description="curvatures visited, from and to, 1/m")
-    knots: list[KnotPart] = Field([], description="points of f_EI along the fitted law")
     curve: Curve | None = Field(None, description="f_EI and moment on a grid")
+
+    @classmethod
+    def ending(cls, outcome: Enum) -> dict[str, Any]:
+        """The fields that hold how it ended."""
+        return {"outcome": outcome.name.lower(), **cls.told(ended(outcome))}
+
+
+class InversePart(WayPart):
+    """Way one: simulate the experiment and fit."""
+
+    reading: Literal["tangent"] = Field("tangent", description="f_EI is dm/dkappa")
+    converged: bool = Field(description="whether the fit is to be trusted")
+    iterations: int = Field(0, description="of the fit")
+    knots: list[KnotPart] = Field([], description="points of f_EI along the fitted law")
     misfit: MisfitPart | None = Field(None, description="how well the simulation explains the data")
     nuisance: dict[str, tuple[Number, Number]] = Field({}, description="fitted value and std, e.g. scale, length")
     branches: dict[str, Curve] = Field({}, description="loading and unloading fitted apart")
@@ -267,15 +280,9 @@ class PointwisePart(Part):
     tangent_Nm2: Floats = Field(description="dm/dkappa at each point, N m^2")
 
 
-class BalancePart(Part):
+class BalancePart(WayPart):
     """Way two: balance equations, no simulation."""
 
-    outcome: str = Field(description="how it ended")
-    advice: str = Field("", description="what that means and what to do")
-    pre_curvature_per_m: Number | None = Field(None, description="K0, curvature at rest, 1/m")
-    pre_curvature_std_per_m: Number | None = Field(None, description="its standard deviation, 1/m")
-    supported_per_m: tuple[Number, Number] | None = Field(None, description="curvatures visited, from and to, 1/m")
-    curve: Curve | None = Field(None, description="f_EI and moment on a grid")
     points_kappa_per_m: Floats = Field([], description="curvature of points along the photos, 1/m")
     points_moment_Nm: Floats = Field([], description="their moment by statics, force times y, N m")
     pointwise: list[PointwisePart] = Field([], description="the paper's graph, photo by photo")

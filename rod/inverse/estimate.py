@@ -69,8 +69,8 @@ class Estimate:
     model, evaluation, unknowns, covariance
         The fit itself: unknowns (q,) with covariance (q, q); residuals and jacobian whitened by the noise as stated,
         whatever ``model.blur`` the bands were made with.
-    invisible : tuple of str
-        Combinations of parameters that the data leave open, in words.
+    invisible : tuple of (float or None, float)
+        What the data leave open; see `invisible_combinations`.
     iterations : int
         Evaluations of the model, all fits together.
     """
@@ -83,7 +83,7 @@ class Estimate:
     evaluation: Evaluation | None = None
     unknowns: Array = field(default_factory=_none)
     covariance: Array = field(default_factory=_none)
-    invisible: tuple[str, ...] = ()
+    invisible: tuple[tuple[float | None, float], ...] = ()
     iterations: int = 0
 
     @property
@@ -167,17 +167,25 @@ def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Pos
     return averaged(found.value[keep], found.jacobian[keep], found.unknowns, priors(model.basis))
 
 
-def invisible_combinations(model: FitModel, law: MeasuredLaw, covariance: Array, *, bound: float) -> tuple[str, ...]:
-    """Parts of the law and K0 whose std exceeds `bound` (log f_EI, K0 times length), in words."""
-    open_ones = []
+def invisible_combinations(
+    model: FitModel, law: MeasuredLaw, covariance: Array, *, bound: float
+) -> tuple[tuple[float | None, float], ...]:
+    """Parts of the law and K0 whose std exceeds `bound` (log f_EI, K0 times length).
+
+    Returns
+    -------
+    tuple of (float or None, float)
+        Curvature (1/m) with the std of log f_EI there; for K0 None with its std (1/m).
+    """
+    open_ones: list[tuple[float | None, float]] = []
     std = np.sqrt(np.diag(law.log_covariance))
     for where in (slice(None, law.kappa.size // 3), slice(law.kappa.size // 3, None)):
         worst = int(np.argmax(std[where])) + (where.start or 0)
         if std[worst] > bound:
-            open_ones.append(f"f_EI at {law.kappa[worst]:.3g} 1/m (+- {std[worst]:.2g} in the logarithm)")
+            open_ones.append((float(law.kappa[worst]), float(std[worst])))
     K0_std = float(np.sqrt(covariance[model.basis.size, model.basis.size]))
     if K0_std > bound:
-        open_ones.append(f"K0 (+- {K0_std / model.length:.2g} 1/m)")
+        open_ones.append((None, K0_std / model.length))
     return tuple(open_ones)
 
 

@@ -107,7 +107,9 @@ def cheap_stages() -> Stages:
         lost = len(specimen.steps) - len(loaded) + len(rejected)
         return Result(
             status="partial" if lost else "measured",
-            headline=f"{lost} photos lost: " + "; ".join(p.reason for p in rejected.values()) if lost else "measured",
+            headline=f"{lost} photos lost: " + "; ".join(f"{p.image}: {p.reason}" for p in rejected.values())
+            if lost
+            else "measured",
             specimen=SpecimenPart(
                 id=specimen.id, folder=str(folder), length_m=specimen.length_m, description=specimen.description
             ),

@@ -24,6 +24,11 @@ MADE = (
     "folder/no-photos.",
     "toml/unknown-",
     "photo/no-",
+    "settled.",
+    "cause.",
+    "diagnosis.",
+    "photo/outlier",
+    "force/outlier",
     "cli.",
     "plan.",
 )
@@ -35,7 +40,8 @@ def gaps(text):
 
 def test_both_languages_have_the_same_sentences_with_the_same_gaps():
     english, german = catalogue("en"), catalogue("de")
-    assert list(english) == list(german)
+    of_rod = ("inverse.", "balance.", "equilibrium.")  # rod says its outcomes in English itself
+    assert list(english) == [key for key in german if not key.startswith(of_rod)]
     assert [key for key in english if [*map(gaps, english[key])] != [*map(gaps, german[key])]] == []
     alike = [key for key, texts in english.items() if texts == german[key]]
     assert [key for key in alike if re.search(r"[a-z]{5}", re.sub(r"\{.*?\}", "", str(english[key])))] == []

@@ -40,15 +40,6 @@ class OutOfPlaneBow:
     additive: bool = False
     limited: bool = True
     seat: str = "cable"
-    needs: str = "photos at several steps"
-    summary: str = "The cable leaves the plane of the picture, so its bow is seen foreshortened."
-    sign_means: str = "height of the bow over (or under) the plane of the bearing axes at the step of the largest bow"
-    apart: str = (
-        "It shrinks the bow and leaves the chord alone. With the same lean in all photos it does what a camera tilted "
-        "across the chord does; a scale that is off changes the chord too."
-    )
-    remedy: str = "Let the cable lie on a smooth board in the plane of the bearing axes, or turn its own bend into it."
-    settled_by: str = "a photo from the side, along the plane of the bearing axes"
 
     def plausible(self, facts: Facts) -> float:
         """A sixth of the bow: a lean of ten degrees."""

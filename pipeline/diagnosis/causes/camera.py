@@ -117,15 +117,6 @@ class ScaleError:
     additive: bool = False
     limited: bool = False
     seat: str = "camera"
-    needs: str = "the cable's length or the displacement log to compare with"
-    summary: str = "The scale of the photos (px/mm) is off, so every photographed length and curvature is off alike."
-    sign_means: str = "positive: the stated px/mm is larger than the true one and the photos show everything too small"
-    apart: str = (
-        "It scales chord, chord change and traced length by one factor. length_error leaves the chord change right; "
-        "lens_distortion and camera_tilt grow away from the centre of the picture."
-    )
-    remedy: str = "Photograph a scale or a chessboard in the plane of the cable axis and give it as calibration."
-    settled_by: str = "a chessboard photo in the plane of the cable"
 
     def plausible(self, facts: Facts) -> float:
         """One percent: a scale read from a ruler one cable radius off the plane."""
@@ -151,17 +142,6 @@ class LensDistortion:
     additive: bool = False
     limited: bool = True
     seat: str = "camera"
-    needs: str = "the cable away from the centre of the picture"
-    summary: str = "The lens magnifies the rim of the picture more or less than its centre (pincushion or barrel)."
-    sign_means: str = "positive: pincushion, the rim is shown too far out; negative: barrel"
-    apart: str = (
-        "It bends straight lines, most near the rim: the ends of the cable and the bow change against the middle. "
-        "camera_tilt is one-sided, scale_error uniform."
-    )
-    remedy: str = (
-        "Calibrate the lens with ten or more chessboard photos, or move the camera back and use a longer lens."
-    )
-    settled_by: str = "a straight edge photographed along the rim, or a lens calibration"
 
     def plausible(self, facts: Facts) -> float:
         """One percent at half the diagonal: a common zoom lens."""
@@ -193,17 +173,6 @@ class CameraTilt:
     additive: bool = False
     limited: bool = True
     seat: str = "camera"
-    needs: str = "photos of different chords, or the cable's length"
-    summary: str = "The camera does not look straight down, so the scale changes across the picture."
-    sign_means: str = (
-        "positive: the scale falls toward the right bearing (along the chord) or toward the bow (across it)"
-    )
-    apart: str = (
-        "It makes one side of the picture larger than the other: left against right half, or bow against chord. "
-        "A cable turned end for end keeps a tilt's trace and reverses that of a varying pre-curvature."
-    )
-    remedy: str = "Level the camera over the table, or give one chessboard photo in the plane of the cable."
-    settled_by: str = "a chessboard photo in the plane of the cable"
 
     def plausible(self, facts: Facts) -> float:
         """Two degrees seen from twice the cable's length."""

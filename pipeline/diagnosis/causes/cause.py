@@ -1,4 +1,4 @@
-"""What a cause is: one small frozen class that can be put into a model, and can explain itself.
+"""What a cause is: one small frozen class that can be put into a model. What is said of it stands with the messages.
 
 A cause has one amount (in `unit`) and one or more variants: what is scanned because it has no meaning without the
 cause, such as the place of a soft spot or a relaxation time. ``amount = 0`` leaves every model as it was.
@@ -76,9 +76,6 @@ class Variant:
 
 
 PLAIN = (Variant(),)
-UNLOADING = "unloading in the same steps"
-FORCE_FREE_PHOTO = "a photo of the force-free cable"
-"""What settles a cause by a branch of the test itself; see `Cause.settled_by`."""
 
 
 class Cause(Protocol):
@@ -102,18 +99,6 @@ class Cause(Protocol):
     seat : str
         Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first
         kind only.
-    needs : str
-        What the data must have for the cause to show at all, in words.
-    summary : str
-        What it is.
-    sign_means : str
-        What a positive amount means.
-    apart : str
-        What separates it from its twins.
-    remedy : str
-        What to do at the rig.
-    settled_by : str
-        The measurement that settles it, as few words.
     """
 
     @property
@@ -143,30 +128,6 @@ class Cause(Protocol):
     @property
     def seat(self) -> str:
         """Where it sits."""
-
-    @property
-    def needs(self) -> str:
-        """What the data must have."""
-
-    @property
-    def summary(self) -> str:
-        """What it is."""
-
-    @property
-    def sign_means(self) -> str:
-        """What a positive amount means."""
-
-    @property
-    def apart(self) -> str:
-        """What separates it from its twins."""
-
-    @property
-    def remedy(self) -> str:
-        """What to do at the rig."""
-
-    @property
-    def settled_by(self) -> str:
-        """The measurement that settles it."""
 
     def plausible(self, facts: Facts) -> float:
         """Size (positive, in `unit`) that would surprise nobody on such a rig."""

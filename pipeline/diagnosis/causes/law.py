@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import UNLOADING, Variant
+from pipeline.diagnosis.causes.cause import Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
@@ -37,12 +37,6 @@ class NonlinearStiffness:
     additive: bool = False
     limited: bool = False
     seat: str = "cable"
-    needs: str = "steps of different curvature"
-    summary: str = "The bending stiffness depends on curvature, or does so in another form than the spline allows."
-    sign_means: str = "positive: stiffer at the named curvature than the spline between its control points"
-    apart: str = "The same law then holds for every photo, both halves and both branches; no other cause keeps to that."
-    remedy: str = "Nothing to mend: give the characteristic more control points, or bend in smaller steps."
-    settled_by: str = "more displacement steps"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent of the stiffness."""
@@ -90,15 +84,6 @@ class Hysteresis:
     additive: bool = True
     limited: bool = True
     seat: str = "cable"
-    needs: str = "an unloading branch"
-    summary: str = "Wires rub on each other: the moment depends on the way the cable was bent to its shape."
-    sign_means: str = "half the width of the loop of moment over curvature"
-    apart: str = (
-        "It acts wherever the curvature changes, most in the middle; bearing friction acts at the ends only and bends "
-        "them; plastic set does not close the loop when the force is gone."
-    )
-    remedy: str = "Measure loading and unloading; cycle a few times first; report both branches."
-    settled_by: str = UNLOADING
 
     def plausible(self, facts: Facts) -> float:
         """A tenth of the largest moment."""
@@ -130,14 +115,6 @@ class PlasticSet:
     additive: bool = False
     limited: bool = True
     seat: str = "cable"
-    needs: str = "an unloading branch or a force-free photo after bending"
-    summary: str = "Bending leaves the cable bent: the pre-curvature grows with the largest curvature reached."
-    sign_means: str = "growth of the pre-curvature per curvature reached"
-    apart: str = (
-        "After unloading the cable stays more bent than before; with friction alone small vibrations undo that."
-    )
-    remedy: str = "Photograph the force-free cable before and after the test; bend less."
-    settled_by: str = "a photo of the force-free cable after the test"
 
     def plausible(self, facts: Facts) -> float:
         """A twentieth of the curvature stays."""
@@ -174,15 +151,6 @@ class StiffnessDrift:
     additive: bool = False
     limited: bool = True
     seat: str = "cable"
-    needs: str = "steps enough that a law of any form does not take it over, best an unloading branch"
-    summary: str = "The cable grows stiffer or softer while the test runs, as it warms up, cools down or ages."
-    sign_means: str = "positive: stiffer by this share from one step to the next, on average over the test"
-    apart: str = (
-        "All forces change by one factor, the shapes by nothing. A drift of the load cell adds the same force at every "
-        "load, also to the force-free cable."
-    )
-    remedy: str = "Keep cable and room at one temperature, wait before the test, and log the temperature at every step."
-    settled_by: str = "the first steps once more at the end of the test"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent over the test: a plastic sheath that warms up by one or two kelvin."""

@@ -50,15 +50,6 @@ class ForceOffset:
     additive: bool = False
     limited: bool = False
     seat: str = "load cell"
-    needs: str = "a force reading of the force-free cable, or large changes of the bow"
-    summary: str = "The load cell shows a constant force too much or too little."
-    sign_means: str = "positive: every reading is too high by this much"
-    apart: str = (
-        "A reading of the force-free cable shows it at once. Without one, loads in the plane and a varying "
-        "pre-curvature leave nearly the same trace."
-    )
-    remedy: str = "Zero the load cell with the cable taken out, and log a reading of the mounted, force-free cable."
-    settled_by: str = "one reading with the cable taken out"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force."""
@@ -84,12 +75,6 @@ class ForceGain:
     additive: bool = False
     limited: bool = False
     seat: str = "load cell"
-    needs: str = "nothing helps: it is the scale of EI itself"
-    summary: str = "The load cell shows all forces too large or too small by one factor."
-    sign_means: str = "positive: readings are too high by this share"
-    apart: str = "Nothing in a bending test does: forces scale with EI, shapes do not change."
-    remedy: str = "Hang known weights on the load cell."
-    settled_by: str = "dead weights on the load cell"
 
     def plausible(self, facts: Facts) -> float:
         """One percent: a load cell a few years after its calibration."""
@@ -115,15 +100,6 @@ class ForceDrift:
     additive: bool = False
     limited: bool = True
     seat: str = "load cell"
-    needs: str = "times in the force log"
-    summary: str = "The load cell's zero wanders steadily while the test runs."
-    sign_means: str = "positive: readings rise with time"
-    apart: str = (
-        "The same slope in every hold, whatever the force, also in the force-free one. Relaxation is "
-        "proportional to the force and fades within each hold."
-    )
-    remedy: str = "Let the load cell warm up, read it with the cable taken out before and after the test."
-    settled_by: str = "readings with the cable taken out before and after"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force over the test."""
@@ -150,14 +126,6 @@ class Relaxation:
     additive: bool = False
     limited: bool = True
     seat: str = "cable"
-    needs: str = "several force samples, with times, in every hold"
-    summary: str = "The cable gives way while a step is held: the force decays toward a smaller value."
-    sign_means: str = "share of the force that is lost if the step is held for long"
-    apart: str = "The decay starts anew in every hold, is proportional to the force and fades. Drift does none of that."
-    remedy: str = (
-        "Hold every step equally long and take photo and force at the same time after the move; or wait longer."
-    )
-    settled_by: str = "one step held ten times longer"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent."""

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, Cause, Variant
+from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 Array = NDArray[np.float64]
@@ -208,15 +208,6 @@ class PreCurvatureVarying:
     additive: bool = False
     limited: bool = True
     seat: str = "cable"
-    needs: str = "photos; a photo of the force-free cable shows it directly"
-    summary: str = "The pre-curvature varies along the cable: set from the spool, or a kink."
-    sign_means: str = "positive: more bent at rest toward the right end, in the middle, or in the spot"
-    apart: str = (
-        "It is there without any force. A load in the plane or a varying stiffness shows under load only; "
-        "turned end for end, the cable takes it along, the table does not."
-    )
-    remedy: str = "Photograph the force-free cable; straighten it, or cut a piece away from the kink."
-    settled_by: str = FORCE_FREE_PHOTO
 
     def plausible(self, facts: Facts) -> float:
         """A change of direction of a tenth of a radian over the cable."""
@@ -243,18 +234,6 @@ class StiffnessVarying:
     additive: bool = False
     limited: bool = False
     seat: str = "cable"
-    needs: str = "photos under load"
-    summary: str = "The bending stiffness varies along the cable: a soft spot, a splice, a stiff label."
-    sign_means: str = (
-        "positive: stiffer toward the right end or in the middle, relative to the mean; or in the spot, relative to "
-        "the cable beside it"
-    )
-    apart: str = (
-        "Nothing of it shows without force, and its trace grows with the moment, while a varying pre-curvature is "
-        "there from the start. Turned end for end, the cable takes it along."
-    )
-    remedy: str = "Turn the cable end for end and repeat; look for the spot; test a uniform piece."
-    settled_by: str = "the same test with the cable turned end for end"
 
     def plausible(self, facts: Facts) -> float:
         """A tenth."""

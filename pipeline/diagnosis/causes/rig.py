@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, PLAIN, UNLOADING, Variant
+from pipeline.diagnosis.causes.cause import PLAIN, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
@@ -33,15 +33,6 @@ class BearingFriction:
     additive: bool = False
     limited: bool = False
     seat: str = "rig"
-    needs: str = "an unloading branch or a force-free photo"
-    summary: str = "The bearings turn with a constant friction moment, against their turning direction."
-    sign_means: str = "Coulomb moment of each bearing"
-    apart: str = (
-        "It changes sign when the bearing turns back, and bends the cable's ends, where friction between the wires has "
-        "nothing to do. Loading alone cannot show it: it is then a shift of K0."
-    )
-    remedy: str = "Unload in the same steps; clean, oil or replace the bearings; tap the rig before each photo."
-    settled_by: str = UNLOADING
 
     def plausible(self, facts: Facts) -> float:
         """Three percent of the largest moment."""
@@ -72,12 +63,6 @@ class BearingStiffness:
     additive: bool = False
     limited: bool = False
     seat: str = "rig"
-    needs: str = "photos at several steps"
-    summary: str = "The bearings spring back: a moment that grows with their turn, from the mounted position."
-    sign_means: str = "spring of each bearing"
-    apart: str = "It grows with the turn of the ends and is gone with it; friction keeps its size and changes sign."
-    remedy: str = "Look for a cable clamped under twist, a seal, or a lead that drags at the bearing."
-    settled_by: str = "turning the empty bearing by hand with a gauge"
 
     def plausible(self, facts: Facts) -> float:
         """A twentieth of the cable's own stiffness EI/L."""
@@ -106,12 +91,6 @@ class RigidEnds:
     additive: bool = False
     limited: bool = True
     seat: str = "rig"
-    needs: str = "photos that show the cable near its ends"
-    summary: str = "Clamps hold the cable's ends straight: a piece between bearing axis and free cable does not bend."
-    sign_means: str = "length of the stiff piece at each end"
-    apart: str = "Straight pieces next to the bearings, in every photo alike; a soft middle shows no straight ends."
-    remedy: str = "Measure the clamp; give the free length and mount the cable so that it bends up to the axis."
-    settled_by: str = "a ruler on the clamp"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the length."""
@@ -142,15 +121,6 @@ class RigCompliance:
     additive: bool = False
     limited: bool = True
     seat: str = "rig"
-    needs: str = "photographed chords beside the displacement log"
-    summary: str = "The frame or the drive yields under force: less of the displacement reaches the cable."
-    sign_means: str = "displacement lost per force"
-    apart: str = (
-        "What is lost follows the force, so it comes back on unloading; an offset is the same at every step. The "
-        "forces of a soft cable hardly change from step to step: then the two are twins."
-    )
-    remedy: str = "Use the photographed chord instead of the log; stiffen the drive."
-    settled_by: str = "a stiff bar in place of the cable, pushed to the same force"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the travel lost at the largest force."""
@@ -176,12 +146,6 @@ class DisplacementOffset:
     additive: bool = False
     limited: bool = False
     seat: str = "rig"
-    needs: str = "photographed chords beside the displacement log"
-    summary: str = "The displacement was not zero where the log says so: play in the drive, or zeroed under force."
-    sign_means: str = "positive: the cable is pushed further than the log says"
-    apart: str = "The same at every step, whatever the force; a yielding rig loses in proportion to the force."
-    remedy: str = "Use the photographed chord; zero the log on the force-free, mounted cable."
-    settled_by: str = FORCE_FREE_PHOTO
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the travel."""
@@ -209,14 +173,6 @@ class LengthError:
     additive: bool = False
     limited: bool = False
     seat: str = "rig"
-    needs: str = "photos with a known scale"
-    summary: str = "The stated cable length is not the length between the bearing axes."
-    sign_means: str = "positive: the stated length is larger than the true one"
-    apart: str = (
-        "The photographed length is off, the change of the chord from step to step is right; a wrong scale spoils both."
-    )
-    remedy: str = "Measure the length between the bearing axes on the mounted cable."
-    settled_by: str = "a tape measure"
 
     def plausible(self, facts: Facts) -> float:
         """One percent."""
@@ -243,15 +199,6 @@ class InPlaneLoad:
     additive: bool = False
     limited: bool = False
     seat: str = "rig"
-    needs: str = "photos at several steps"
-    summary: str = "A load acts along the cable in the plane of the test: its weight on a tilted table, or a draught."
-    sign_means: str = "positive: toward the right bearing (along) or toward the bow (across)"
-    apart: str = (
-        "It matters less the larger the force; a varying pre-curvature or stiffness goes "
-        "with the cable when that is turned end for end, a tilted table does not."
-    )
-    remedy: str = "Level the table; turn the cable end for end to check."
-    settled_by: str = "a spirit level on the table"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force, spread over the length."""

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.observations.observation import Observation
-from pipeline.records import Finding
-from pipeline.rounding import plain
+from pipeline.records import doubtful
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]
@@ -71,9 +70,5 @@ def with_scatter(faults: Faults, std: float) -> Faults:
         else replace(step, displacement_std=max(std, step.displacement_std or 0.0))
         for step in faults.test.steps
     )
-    message = (
-        f"the displacements of the log scatter by about {plain(1e6 * std, 1)} um about what photos and forces say of "
-        "each step, more than the log tells; the diagnosis allowed for that"
-    )
-    finding = Finding("log/displacement-scatter", "warning", message)
+    finding = doubtful("log/displacement-scatter", std_m=std)
     return replace(faults, test=replace(faults.test, steps=steps), findings=(*faults.findings, finding))

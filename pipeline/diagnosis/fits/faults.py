@@ -18,19 +18,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.diagnosis.fits.stuck_forces import stuck_forces
-from pipeline.records import Finding
+from pipeline.records import Finding, doubtful
 from pipeline.settings.diagnosis import DiagnosisSettings
-from pipeline.units import quantity
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
 
-UNITS = {
-    1e3: "m instead of mm",
-    1e-3: "micrometres instead of mm",
-    10.0: "cm instead of mm",
-    25.4: "inches instead of mm",
-}
+UNITS = {1e3: "m", 1e-3: "um", 10.0: "cm", 25.4: "inches"}
 """What the displacement column may hold if the chord changes this many times as much as the log says."""
 
 ALONE = 4.0
@@ -145,17 +139,7 @@ def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
         replace(step, displacement=None if step.displacement is None else -slope * step.displacement)
         for step in test.steps
     )
-    return Faults(
-        replace(test, steps=steps),
-        (
-            Finding(
-                "log/unit",
-                "warning",
-                f"the photographed chord changes {-slope:.4g} times as much as the displacement of the log says: the "
-                f"log seems to hold {UNITS[factor]}; displacements were scaled to the photos",
-            ),
-        ),
-    )
+    return Faults(replace(test, steps=steps), (doubtful("log/unit.scaled", times=-slope, unit=UNITS[factor]),))
 
 
 def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
@@ -171,14 +155,8 @@ def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
         gap = {k: abs(_mismatch(found.test, k)) for k in (i, j)}
         wrong = j if gap[j] >= gap[i] else i
         dropped.add(wrong)
-        findings.append(
-            Finding(
-                "photo/doubled",
-                "warning",
-                f"the photos of steps {steps[i].step} and {steps[j].step} are the same picture; the one of step "
-                f"{steps[wrong].step}, which fits its displacement less well, is left out",
-            )
-        )
+        both = {"step": steps[i].step, "other": steps[j].step}
+        findings.append(doubtful("photo/doubled.picture", **both, wrong=steps[wrong].step))
     return Faults(found.test, tuple(findings), frozenset(dropped))
 
 
@@ -230,19 +208,8 @@ def _order_of_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
     wrong = np.abs(given) > limit
     if wrong.sum() < 2 or np.any(np.abs(sorted_sum - natural) > limit):
         return Faults(test)
-    names = ", ".join(str(test.steps[used[k]].step) for k in np.flatnonzero(wrong))
-    return Faults(
-        test,
-        (
-            Finding(
-                "photo/order",
-                "warning",
-                f"the photos of steps {names} fit the displacements of each other: they are out of order and left out; "
-                "correct the column `image` of the force log",
-            ),
-        ),
-        frozenset(int(used[k]) for k in np.flatnonzero(wrong)),
-    )
+    out = [used[k] for k in np.flatnonzero(wrong)]
+    return Faults(test, (doubtful("photo/order", steps=[test.steps[i].step for i in out]),), frozenset(out))
 
 
 def _displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
@@ -261,14 +228,8 @@ def _displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
     if abs(off[worst]) < max(settings.displacement_mismatch * travel, ALONE * rest):
         return Faults(test)
     step = test.steps[used[worst]]
-    apart = "farther apart" if off[worst] > 0.0 else "nearer"
-    finding = Finding(
-        "log/displacement",
-        "warning",
-        f"the photo of step {step.step} shows the bearings {1e3 * abs(off[worst]):.2f} mm {apart} than the "
-        "displacement of the log says, where all other steps agree: the displacement is wrong, or the photo is of "
-        "another step; the displacement was taken from the photo",
-    )
+    apart = "apart" if off[worst] > 0.0 else "nearer"
+    finding = doubtful("log/displacement", step=step.step, off_m=abs(off[worst]), apart=apart)
     steps = tuple(replace(one, displacement=None) if one is step else one for one in test.steps)
     return Faults(replace(test, steps=steps), (finding,))
 
@@ -282,17 +243,9 @@ def _traced_length(found: Faults, settings: DiagnosisSettings) -> Faults:
     off = float(np.median(traced)) / test.length - 1.0
     if abs(off) < settings.length_mismatch or np.ptp(traced) / test.length > abs(off):
         return Faults(test)
-    shown, stated = 1e3 * float(np.median(traced)), 1e3 * test.length
-    message = (
-        f"the photos show a cable of {shown:.1f} mm where length_mm says {stated:.1f} mm: length or scale is wrong"
-    )
     # covers above the cable are seen too far apart, never too near: then neither need be wrong
-    if off > 0.0 and test.axis_parallax_std > 0.0:
-        message = (
-            f"the photos show a cable of {shown:.1f} mm where length_mm says {stated:.1f} mm: length or scale is "
-            "wrong, or the bearing covers lie high above the cable and near to the camera (give distance_mm)"
-        )
-    return Faults(test, (Finding("length/traced", "warning", message),))
+    key = "length/traced.covers" if off > 0.0 and test.axis_parallax_std > 0.0 else "length/traced"
+    return Faults(test, (doubtful(key, seen_m=np.median(traced), stated_m=test.length),))
 
 
 def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
@@ -301,19 +254,11 @@ def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
     pushed = [step for step in test.steps if step.branch != "mounted"]
     forces = np.array([step.force for step in pushed])
     if forces.size and np.mean(forces < 0.0) > 0.5:
-        message = (
-            "most forces are tension although the bearings approach: the sign of the log seems reversed; set "
-            'force_sign = "tension" in specimen.toml'
-        )
-        return Faults(test, (Finding("force/sign", "warning", message),))
+        return Faults(test, (doubtful("force/sign"),))
     stiffness = float(np.max(np.abs(forces), initial=0.0)) * test.length**2 / np.pi**2
     low, high = settings.stiffness_range
     if 0.0 < stiffness < low or stiffness > high:
-        message = (
-            f"the forces mean a bending stiffness of about {stiffness:.2g} N m^2, outside {low:g} to {high:g} for any "
-            "cable: check the unit of the force column"
-        )
-        return Faults(test, (Finding("force/unit", "warning", message),))
+        return Faults(test, (doubtful("force/unit", stiffness=stiffness, low=low, high=high),))
     return Faults(test)
 
 
@@ -323,10 +268,7 @@ def _stuck(found: Faults, settings: DiagnosisSettings) -> Faults:
     stuck = stuck_forces(test.steps)
     if not stuck:
         return Faults(test)
-    names = ", ".join(str(test.steps[i].step) for i in stuck)
-    read = quantity(float(np.mean([test.steps[i].force for i in stuck])), "N")
-    message = (
-        f"the force of steps {names} stands still at {read}: the load cell was at the end of its range, or its channel "
-        "froze; these forces are left out, repeat the test with a larger range"
-    )
-    return Faults(test, (Finding("force/stuck", "warning", message),), forces=frozenset(stuck))
+    steps = [test.steps[i] for i in stuck]
+    read = np.mean([step.force for step in steps])
+    finding = doubtful("force/stuck", steps=[step.step for step in steps], force_N=read)
+    return Faults(test, (finding,), forces=frozenset(stuck))

@@ -52,8 +52,6 @@ class Fit:
     jacobian : (N, p)
         Sensitivities of the model: ``d residual = - jacobian d vector``; prior rows ``1 / std``.
     converged : bool
-    advice : str
-        Why there is no fit, or what stopped it.
     """
 
     extension: Extension
@@ -62,7 +60,6 @@ class Fit:
     residual: Array
     jacobian: Array
     converged: bool
-    advice: str = ""
 
     @property
     def chi2(self) -> float:
@@ -175,8 +172,7 @@ def fit(
             break
         if not raised:  # what was too little a step ago is not tried again at once
             damping = 0.1 * damping if damping > 1e-4 else 0.0
-    advice = "" if converged else "the fit did not settle"
-    return Fit(extension, state.vector, state.run, state.residual, jacobian, converged, advice)
+    return Fit(extension, state.vector, state.run, state.residual, jacobian, converged)
 
 
 def fit_from(
@@ -206,7 +202,7 @@ def evaluated(observation: Observation, extension: Extension, vector: Array, nea
     here = run(extension.model(vector, of=base_model), extension.facts, near=near)
     value = whole_residual(observation, here.prediction, vector, extension.prior)
     if value is None:
-        return Fit(extension, vector, here, np.zeros(0), np.zeros((0, extension.size)), False, here.advice)
+        return Fit(extension, vector, here, np.zeros(0), np.zeros((0, extension.size)), False)
     jacobian = sensitivities(observation, extension, vector, base_model, here)
     return Fit(extension, vector, here, value, jacobian, False)
 

@@ -29,10 +29,9 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.records import Finding, Level
-from pipeline.rounding import plain, rounded
+from pipeline.messages import Message
+from pipeline.records import Finding, Level, doubtful
 from pipeline.settings.diagnosis import DiagnosisSettings
-from pipeline.units import quantity
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -290,23 +289,15 @@ def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
     steps = tuple(test.steps[i].step for i in found.steps)
     correction = ForceCorrection(steps, factor, offset, _errors(test, found, other))
     if found.kind == "sign":
-        names = ", ".join(map(str, correction.steps))
-        message = (
-            f"the forces of steps {names} have the sign of tension, by their size they belong to the others, which "
-            "have that of compression: their sign was turned; check the plug and the log of the load cell"
-        )
-        return Faults(correction.applied(test), (Finding("force/sign", "warning", message),), corrections=(correction,))
-    first = test.steps[found.steps[0]].step
-    size = _size(found) if other is None else f"{_size(found)}, or {_size(other)}, which these data do not tell apart"
-    message = (
-        f"from step {first} on all forces are off {size} against those before: a range was switched or a zero was "
-        "lost; f_EI goes by the forces before, and the later ones were corrected"
-    )
-    if found.kind == "factor":
-        message += f"; if it is the later ones that are right, f_EI is {plain(found.amount, 3)} times as large"
+        finding = doubtful("force/sign.turned", steps=correction.steps)
+        return Faults(correction.applied(test), (finding,), corrections=(correction,))
+    first, size = test.steps[found.steps[0]].step, _size(found)
+    size = size if other is None else Message("break.either", one=size, other=_size(other))
+    more = Message("break.later", factor=found.amount) if found.kind == "factor" else ""
+    said = Message("break.found", step=first, size=size, more=more)
     code = "force/factor" if found.kind == "factor" else "force/zero-moved"
     level: Level = "error" if found.kind == "factor" or other or not _zeroed(test, found) else "warning"
-    return Faults(correction.applied(test), (Finding(code, level, message),), corrections=(correction,))
+    return Faults(correction.applied(test), (Finding(code, level, said),), corrections=(correction,))
 
 
 def _errors(test: MeasuredTest, found: Break, other: Break | None) -> tuple[tuple[float, ...], ...]:
@@ -334,24 +325,17 @@ def _without_dead(test: MeasuredTest, found: Break) -> Faults:
     after, share, std = abs(found.amount) < 1.0, found.amount, found.std
     if not after:
         share, std = 1.0 / found.amount, found.std / found.amount**2
-    first, times = test.steps[found.steps[0]].step, rounded(share, std)
-    message = (
-        f"from step {first} on the load cell shows hardly any force, {times} times what the photos ask for: it failed, "
-        "or its cable or its range; these forces are left out"
-        if after
-        else f"before step {first} the load cell shows hardly any force, {times} times what the photos ask for: it "
-        "failed, or its cable or its range; these forces are left out"
-    )
+    first = test.steps[found.steps[0]].step
+    finding = doubtful("force/dead" if after else "force/dead.before", step=first, share=(share, std))
     # the force-free step tells no stiffness, and its photo is not to be lost
     loaded = (i for i, step in enumerate(test.steps) if step.branch != "mounted")
     dead = frozenset(i for i in loaded if (i in found.steps) == after)
-    return Faults(test, (Finding("force/dead", "warning", message),), forces=dead)
+    return Faults(test, (finding,), forces=dead)
 
 
-def _size(found: Break) -> str:
-    if found.kind == "factor":
-        return f"by a factor of {rounded(found.amount, found.std)}"
-    return f"by an offset of {quantity(found.amount, 'N', found.std)}"
+def _size(found: Break) -> Message:
+    size = (found.amount, found.std)
+    return Message("break.factor", factor=size) if found.kind == "factor" else Message("break.zero", force_N=size)
 
 
 def _zeroed(test: MeasuredTest, found: Break) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.observations.observation import Observation
-from pipeline.records import Finding
+from pipeline.records import doubtful
 from rod.measurement import MeasuredTest
 
 
@@ -54,19 +54,10 @@ def worst_item(observation: Observation, fitted: Fit) -> Outlier | None:
 
 def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
     """Finding and exclusion of an item at fault."""
-    name = test.steps[outlier.index].step
     sigma = np.sqrt(max(outlier.gain - outlier.rows, 0.0))
-    what = "photo" if outlier.kind == "photo" else "force"
-    finding = Finding(
-        f"{what}/outlier",
-        "warning",
-        f"the {what} of step {name} contradicts all other data by {sigma:.0f} sigma, and no cause explains that; it is "
-        "left out",
-    )
-    index = frozenset({outlier.index})
-    return Faults(
-        test, (finding,), index if what == "photo" else frozenset(), index if what == "force" else frozenset()
-    )
+    finding = doubtful(f"{outlier.kind}/outlier", step=test.steps[outlier.index].step, sigma=sigma)
+    index, photo = frozenset({outlier.index}), outlier.kind == "photo"
+    return Faults(test, (finding,), index if photo else frozenset(), frozenset() if photo else index)
 
 
 def joined_with_outlier(found: Faults, outlier: Faults, measured: MeasuredTest) -> Faults:
@@ -80,15 +71,11 @@ def joined_with_outlier(found: Faults, outlier: Faults, measured: MeasuredTest) 
     if outlier.corrections or not wrong:
         return found.joined(outlier)
     (index,) = wrong
-    message = (
-        f"the photo of step {measured.steps[index].step} fits neither the displacement nor the force of its step, "
-        "which fit all others: it is a photo of another step and left out"
-    )
     kept = tuple(finding for finding in found.findings if finding.code != "log/displacement")
     steps = tuple(measured.steps[i] if i == index else step for i, step in enumerate(found.test.steps))
     return replace(
         found,
         test=replace(found.test, steps=steps),
-        findings=(*kept, Finding("photo/other-step", "warning", message)),
+        findings=(*kept, doubtful("photo/other-step", step=measured.steps[index].step)),
         photos=found.photos | wrong,
     )

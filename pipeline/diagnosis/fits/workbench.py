@@ -24,6 +24,7 @@ from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
 from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.statistics.score import null_maxima, threshold
+from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
 
@@ -72,7 +73,7 @@ def prepare(
     knots: int,
     causes: Sequence[Cause] = SUSPECTS,
     straight: bool = False,
-) -> Workbench | str:
+) -> Workbench | Message:
     """Fit the base model and score all causes.
 
     Parameters
@@ -88,7 +89,7 @@ def prepare(
 
     Returns
     -------
-    Workbench or str
+    Workbench or Message
         The advice of the equilibrium that failed, where no base model can be simulated.
     """
     test = faults.test
@@ -105,7 +106,8 @@ def prepare(
     )
     fitted = _robust_fit(observation, base, facts, settings)
     if fitted.run.prediction is None:
-        return fitted.advice
+        assert fitted.run.failed is not None
+        return ended(fitted.run.failed)
     if observation.photos:
         noise = calibrate_photo_noise(
             [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in observation.photos],

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from pipeline.diagnosis.observations.work import counted
 from rod.equilibrium import Branch, Equilibrium, solve
+from rod.newton import Outcome
 from rod.parameters import Parameter
 from rod.sensitivity import Derivatives, derivatives
 
@@ -35,15 +36,15 @@ class Run:
         Before any observer; None if a step has no equilibrium.
     prediction : Prediction or None
         As observed.
-    advice : str
-        Of the first step that failed; empty if none.
+    failed : Outcome or None
+        Of the first step that has no equilibrium.
     """
 
     model: Model
     steps: tuple[Equilibrium, ...]
     bare: Prediction | None
     prediction: Prediction | None
-    advice: str = ""
+    failed: Outcome | None = None
 
 
 def run(model: Model, facts: Facts, *, near: Run | None = None, patient: bool = True) -> Run:
@@ -64,7 +65,7 @@ def run(model: Model, facts: Facts, *, near: Run | None = None, patient: bool = 
         steps, bare = _simulated(model, facts, near, patient=patient), None
     failed = next((step for step in steps if not step.good), None)
     if failed is not None:
-        return Run(model, steps, None, None, failed.outcome.advice)
+        return Run(model, steps, None, None, failed.outcome)
     bare = bare or _bare(steps, facts)
     return Run(model, steps, bare, observed(bare, model, facts))
 

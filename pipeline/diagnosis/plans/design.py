@@ -28,6 +28,7 @@ from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import detectable_amount
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.messages import Message, entry
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.characteristic import MomentCurve
@@ -103,7 +104,7 @@ class CausePlan:
     twin_cosine: float
     stiffness_bias_at_plausible_size: float
     visible: bool
-    separated_by: str
+    separated_by: Message | None
 
 
 @dataclass(frozen=True)
@@ -209,7 +210,7 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
     vector[: len(base.knots)] = np.log(tangent / base.stiffness)
     made = run(base.model(vector), facts)
     if made.prediction is None:
-        raise ValueError(f"the planned test cannot be made: {made.advice}")
+        raise ValueError(f"the planned test cannot be made: {made.failed and made.failed.advice}")
     pixel = 1e-3 / plan.px_per_mm
     precision = Precision(
         force_std=plan.force_noise * float(np.max(np.abs(made.prediction.force))),
@@ -255,7 +256,9 @@ def _cause_plan(
     own = suspicion.of(index)
     plausible = cause.plausible(bench.facts)
     if own.size == 0:
-        return CausePlan(cause.name, cause.unit, plausible, None, 0.0, "", 0.0, 0.0, False, cause.settled_by)
+        return CausePlan(
+            cause.name, cause.unit, plausible, None, 0.0, "", 0.0, 0.0, False, entry("settled", cause.name)
+        )
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
     smallest = detectable_amount(
@@ -263,13 +266,13 @@ def _cause_plan(
     )
     bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
     twin, closeness = nearest(table)
-    separated = ""
+    separated = None
     if closeness[index] > settings.twin_cosine:
         freed = [(other[index, twin[index]], protocol.what) for protocol, other in others]
         better = [pair for pair in freed if pair[0] < settings.twin_cosine]
         pair = (cause, suspicion.causes[twin[index]])
-        settled = [each.settled_by for each in pair if still_open(each, bench)]
-        separated = min(better)[1] if better else next(iter(settled), "")
+        settled = [entry("settled", each.name) for each in pair if still_open(each, bench)]
+        separated = Message(min(better)[1]) if better else next(iter(settled), None)
     return CausePlan(
         name=cause.name,
         unit=cause.unit,

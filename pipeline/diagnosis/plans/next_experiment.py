@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import FORCE_FREE_PHOTO, UNLOADING, Cause
+from pipeline.diagnosis.causes.cause import Cause
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -24,13 +24,14 @@ from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
 from pipeline.diagnosis.posterior.explanation import Explanation
+from pipeline.messages import Message, entry, word
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """A further measurement: in words, its circumstances, whether the test is made again, and turned end for end."""
+    """A further measurement: key of what to do, circumstances, whether the test is made again, turned end for end."""
 
     what: str
     facts: Facts
@@ -42,33 +43,32 @@ def protocols(facts: Facts) -> list[Protocol]:
     """What was not made yet, the cheapest first."""
     found = []
     if "mounted" not in facts.branch:
-        found.append(
-            Protocol(
-                "photograph the mounted, force-free cable and log its force", more_steps(facts, [0.0], ["mounted"])
-            )
-        )
+        found.append(Protocol("next.free-photo", more_steps(facts, [0.0], ["mounted"])))
     if not facts.returns:
         back = sorted({float(d) for d in facts.displacement if d > 0.0}, reverse=True)[1:] or [
             0.5 * float(facts.displacement.max())
         ]
-        found.append(
-            Protocol("unload in the same steps, with photos", more_steps(facts, back, ["unloading"] * len(back)))
-        )
+        found.append(Protocol("next.unload", more_steps(facts, back, ["unloading"] * len(back))))
     elif facts.displacement[-1] > 0.0:
         there = more_steps(facts, [0.0], ["unloading"])
-        found.append(Protocol("come back to displacement zero and photograph the cable there", there))
-    found.append(Protocol("repeat the same test", facts, again=True))
-    found.append(Protocol("turn the cable end for end and repeat the test", facts, again=True, turned=True))
+        found.append(Protocol("next.back", there))
+    found.append(Protocol("next.repeat", facts, again=True))
+    found.append(Protocol("next.turn", facts, again=True, turned=True))
     return found
 
 
 def still_open(cause: Cause, bench: Workbench) -> bool:
     """Whether what settles a cause was not made yet: there is no use in asking for a branch that the test has."""
-    if cause.settled_by == UNLOADING:
+    if cause.name in BY_UNLOADING:
         return not bench.facts.returns
-    if cause.settled_by == FORCE_FREE_PHOTO:
+    if cause.name in BY_FREE_PHOTO:
         return all(bench.facts.branch[photo.step] != "mounted" for photo in bench.observation.photos)
     return True
+
+
+BY_UNLOADING = {"bearing_friction", "hysteresis"}
+BY_FREE_PHOTO = {"pre_curvature_varying", "displacement_offset"}
+"""Causes that are settled by a branch of the test itself."""
 
 
 def next_experiment(
@@ -86,21 +86,26 @@ def next_experiment(
         protocol.what: min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
         for protocol in protocols(bench.facts)
     }
-    repeated = apart["repeat the same test"]
+    repeated = apart["next.repeat"]
     # what is no better than the same once more is no experiment of its own
     better = {what: sigma for what, sigma in apart.items() if sigma == repeated or sigma > repeated + BETTER}
     enough = [what for what, sigma in better.items() if sigma >= settings.separated]
     differ = (causes[cause] for cause in differing if causes[cause].seat != "cable")
-    outside = [f"{cause.settled_by} ({cause.name})" for cause in differ if still_open(cause, bench)]
+    outside = [cause.name for cause in differ if still_open(cause, bench)]
     if not enough and outside:
-        return NextExperiment(what=outside[0], separates=names, repeated_sigma=repeated)
+        said = Message("next.settled", by=entry("settled", outside[0]), cause=word(outside[0]))
+        return NextExperiment(**NextExperiment.told(said), separates=names, repeated_sigma=repeated)
     what = enough[0] if enough else max(better, key=lambda name: better[name])
     if better[what] < TELLS:
-        return NextExperiment(what=NOTHING, separates=[], sigma=better[what], repeated_sigma=repeated)
-    return NextExperiment(what=what, separates=names, sigma=better[what], repeated_sigma=repeated)
+        what, names = NOTHING, []
+    told = NextExperiment.told(Message(what))
+    return NextExperiment(
+        **told, separates=names, sigma=better.get(what, max(better.values())), repeated_sigma=repeated
+    )
 
 
-NOTHING = "no measurement on this rig is expected to separate these causes"
+NOTHING = "next.nothing"
+
 
 BETTER, TELLS = 1.0, 2.0
 """Sigma: a protocol counts as better than repetition if it takes the rivals apart by one more, and as telling anything

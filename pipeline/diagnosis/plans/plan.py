@@ -104,7 +104,7 @@ def planned_test(made: Run, facts: Facts, precision: Precision, *, photos: bool 
     """
     seen = made.prediction
     if seen is None:
-        raise ValueError(f"nothing can be planned on a model without equilibrium: {made.advice}")
+        raise ValueError(f"nothing can be planned on a model without equilibrium: {made.failed and made.failed.advice}")
     steps = []
     for i, branch in enumerate(facts.branch):
         times = facts.hold_times[i]

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.words import spoken
-from pipeline.records import Finding
-from pipeline.units import amount_unit
+from pipeline.messages import word
+from pipeline.records import Finding, doubtful
 
 
 def too_large(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
@@ -21,12 +20,8 @@ def too_large(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
         times = abs(amount) / cause.plausible(bench.facts)
         if not cause.limited or abs(amount) - 2.0 * std < IMPOSSIBLE * cause.plausible(bench.facts):
             continue
-        size = amount_unit(cause.unit, amount, std).text(amount, std)
-        message = (
-            f"{spoken(cause.name)} would remove the misfit, but only at {size}, {times:.0f} times its usual size: it "
-            "is something else, or scale, length or photos are wrong"
-        )
-        return (Finding("diagnosis/impossible-size", "warning", message),)
+        size = (amount, std, cause.unit)
+        return (doubtful("diagnosis/impossible-size", cause=word(cause.name), size=size, times=times),)
     return ()
 
 
@@ -36,10 +31,4 @@ IMPOSSIBLE = 20.0
 
 def search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:
     """That not everything was tried, where the search was ended."""
-    if not conclusion.curtailed:
-        return ()
-    message = (
-        "the search for causes was ended before all of them, and all pairs of them, were tried, it took too long: "
-        "another cause or pair may explain the data better"
-    )
-    return (Finding("diagnosis/search-ended", "warning", message),)
+    return (doubtful("diagnosis/search-ended"),) if conclusion.curtailed else ()

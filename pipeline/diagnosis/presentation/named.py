@@ -11,6 +11,7 @@ from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.mixture import centre_of, widening
+from pipeline.messages import entry
 from pipeline.result import CausePart, Curve, HypothesisPart, TwinPart, Widening
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -70,7 +71,7 @@ def _twins(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings
     fits = [one.causes[0] for one in conclusion.singles if one.fitted.reduced_chi2 < settings.fits]
     found = [(believed.of(k), bench.suspicion.causes[k]) for k in dict.fromkeys(fits) if k not in accepted.causes]
     return [
-        TwinPart(name=cause.name, probability=chance, settled_by=cause.settled_by)
+        TwinPart(name=cause.name, probability=chance, settled_by=str(entry("settled", cause.name)))
         for chance, cause in sorted(found, key=lambda pair: -pair[0])
     ]
 

@@ -27,6 +27,7 @@ from pipeline.diagnosis.presentation.named import (
 )
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
 from pipeline.diagnosis.words import could_have_been_seen, headline
+from pipeline.messages import Message
 from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -69,14 +70,14 @@ def present(
         causes=causes,
         explained=None if gain is None else gain.heldout_excess_removed,
         change=change_of_stiffness(bench, accepted, extended, identified),
-        weakest=could_have_been_seen(seen, len(rows)),
-        leftover=leftover["message"],
+        seen=could_have_been_seen(seen, len(rows)),
+        left=leftover.said,
     )
     photos, forces = left_out(bench)
     spots = blind_spots(bench, seen, settings)
     return DiagnosisPart(
         verdict=word,
-        headline=sentence,
+        **DiagnosisPart.told(sentence),
         hypotheses=believed,
         none_of_these=none,
         causes=causes,
@@ -122,18 +123,12 @@ def what_next(
     if conclusion.accepted is not None and conclusion.rivals and not unexplained:
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
     if unexplained:
-        turned = "turn the cable end for end and repeat the test"
-        unload = "repeat the test with the cable turned end for end, and unload"
-        return NextExperiment(what=turned if bench.facts.returns else unload, separates=[])
+        turn = Message("next.turn" if bench.facts.returns else "next.turn-unload")
+        return NextExperiment(**NextExperiment.told(turn), separates=[])
     if not bench.facts.returns:
-        return NextExperiment(
-            what="unload in the same steps, with photos", separates=["bearing_friction", "hysteresis", "plastic_set"]
-        )
+        hidden = ["bearing_friction", "hysteresis", "plastic_set"]
+        return NextExperiment(**NextExperiment.told(Message("next.unload")), separates=hidden)
     gain = next((spot.stiffness_bias_at_plausible_size for spot in spots if spot.name == "force_gain"), None)
     if gain is None:
         return None
-    what = (
-        f"hang dead weights on the load cell: a usual error of its calibration changes f_EI by {100.0 * gain:.2g} %, "
-        "and nothing else shows it"
-    )
-    return NextExperiment(what=what, separates=["force_gain"])
+    return NextExperiment(**NextExperiment.told(Message("next.weights", change=gain)), separates=["force_gain"])

@@ -19,6 +19,7 @@ from pipeline.diagnosis.posterior.detectable import detectable_amount, in_any_fo
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.statistics.score import adjusted_p
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.messages import entry
 from pipeline.result import BlindSpot, CauseRow, GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -137,7 +138,8 @@ def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSetti
         sizes = np.full(own.size, cause.plausible(bench.facts))
         bias = float(stiffness_change_linear(bench.base, suspicion.columns[:, own], sizes).max())
         if bias >= settings.harm:
-            spots.append(BlindSpot(name=cause.name, stiffness_bias_at_plausible_size=bias, settled_by=cause.settled_by))
+            settled = str(entry("settled", cause.name))
+            spots.append(BlindSpot(name=cause.name, stiffness_bias_at_plausible_size=bias, settled_by=settled))
     return sorted(spots, key=lambda spot: -spot.stiffness_bias_at_plausible_size)
 
 

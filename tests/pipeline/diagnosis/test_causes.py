@@ -60,7 +60,7 @@ def test_amount_zero_changes_nothing_and_a_plausible_one_something(bench, name):
         assert np.allclose(same.force, before.prediction.force, rtol=1e-7, atol=1e-9)
         assert np.allclose(same.y, before.prediction.y, rtol=0, atol=1e-10)
         there = run(cause.apply(model, cause.plausible(facts), variant, facts), facts)
-        assert there.prediction is not None, there.advice
+        assert there.prediction is not None, there.failed
         # stiff ends add vertices, so bows are compared, not points
         moved = [np.abs(np.max(there.prediction.y, 1) - np.max(before.prediction.y, 1)).max() / 0.181]
         moved += [
@@ -81,13 +81,6 @@ def test_no_step_of_a_refit_makes_an_impossible_cable(bench, name, times):
         for variant in cause.variants(facts):
             rod = cause.apply(model, times * cause.plausible(facts), variant, facts).bending.rod
             assert rod.length > 0.0 and np.all(rod.edges[1:-1] > 0.0)  # the outer ones are rigid pieces
-
-
-@pytest.mark.parametrize("name", sorted(CONTRACT))
-def test_a_cause_explains_itself(name):
-    cause, page = BY_NAME[name], explain(name)
-    for text in (cause.summary, cause.apart, cause.remedy, cause.settled_by, cause.unit):
-        assert text and text in page
 
 
 def test_unknown_name_lists_the_known():

@@ -28,14 +28,14 @@ def refits(protocol, amount, names, hidden):
 def test_nobody_is_told_to_do_what_was_done(protocol):
     bench, _ = refits(protocol, 0.0, (), "force_offset")
     told = [one.what for one in protocols(bench.facts)]
-    assert ("unload in the same steps, with photos" in told) == (protocol != "loop")
-    assert any("force-free" in what for what in told) == (protocol == "three")
+    assert ("next.unload" in told) == (protocol != "loop")
+    assert ("next.free-photo" in told) == (protocol == "three")
 
 
 def test_unloading_beats_repetition_for_friction_and_its_twin():
     bench, (friction, bend) = refits("six", 0.004, ("bearing_friction", "pre_curvature_varying"), "bearing_friction")
     found = next_experiment(bench, friction, [bend], SETTINGS)
-    assert found.what == "unload in the same steps, with photos"
+    assert found.key == "next.unload"
     assert set(found.separates) == {"bearing_friction", "pre_curvature_varying"}
     assert found.sigma >= SETTINGS.separated and found.sigma > found.repeated_sigma + BETTER
 
@@ -45,4 +45,4 @@ def test_repetition_is_what_it_is_held_against():
     bench, (offset, drift) = refits("loop", 0.03, ("force_offset", "force_drift"), "force_offset")
     once = next_experiment(bench, offset, [drift], SETTINGS)
     assert once.repeated_sigma > SETTINGS.separated  # two that these data tell apart already
-    assert once.what == "repeat the same test" or once.sigma > once.repeated_sigma + BETTER
+    assert once.key == "next.repeat" or once.sigma > once.repeated_sigma + BETTER

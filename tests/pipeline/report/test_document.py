@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from pipeline.messages import Message
+from pipeline.messages import Message, word
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, unbroken, write_report
 from pipeline.report.pdf import pdf_bytes
@@ -152,7 +152,7 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert f"The verdict is {verdict}: hysteresis between the wires bends <the> answer." in text
     assert 'id="ranking"' in page
     assert 'id="cosines"' in page
-    assert "dead weights" in text
+    assert "dead weights on the load cell" in text
     found = verdict in ("named", "class", "two_causes")
     assert ('id="map-before"' in page) == found
     assert page.count('id="residual-map"') == 1  # of the model that answers
@@ -168,7 +168,7 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
 @pytest.mark.parametrize(("probability", "told"), [(0.1, True), (0.99, False)])
 def test_leftover_that_noise_makes_has_no_place(diagnosed, probability, told):
     result = diagnosed("named").model_copy(update={"photos": []})
-    left = diagnosed("unexplained").diagnosis.leftover | {"probability": probability}
+    left = diagnosed("unexplained").diagnosis.leftover.model_copy(update={"probability": probability})
     page = report_html(
         result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"leftover": left})}),
         ReportSettings(language="de"),
@@ -254,13 +254,15 @@ def test_german_page_has_german_words_and_numbers(brief):
 
 def test_german_page_says_the_verdict_in_german(diagnosed):
     result = diagnosed("class")
-    told = {"headline": "The simulation lacks hysteresis (0.0049 ± 0.0002 N m)."}
+    size = (0.0049, 0.0002, "N m")
+    cause = Message("diagnosis.cause", names=[word("hysteresis")], size=size)
+    told = Message("diagnosis.named", cause=cause, gain="", shift="").stored()
     finding = FindingPart.of("warning", Message("photo/empty"))
     strange = FindingPart(code="my/own", level="warning", message="The moon is full.")
     changed = {"diagnosis": result.diagnosis.model_copy(update=told), "findings": [finding, strange]}
     page = report_html(result.model_copy(update=changed), ReportSettings(language="de"))
     text = Page(page).text
-    assert "Der Simulation fehlt: Hysterese (0,0049 ± 0,0002 N m)." in text
+    assert "Der Simulation fehlt: Hysterese (4,90 ± 0,20 mN m)." in text.replace("\N{NO-BREAK SPACE}", " ")
     assert "<span>Die Datei ist leer</span>" in page
     assert '<span lang="en">The moon is full.</span>' in page
     assert "Drähte reiben aneinander" in text

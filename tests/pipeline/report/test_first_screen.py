@@ -35,7 +35,7 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
         SETTINGS,
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
-    assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading."
+    assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading in the same steps."
 
 
 @pytest.mark.parametrize("language", ["en", "de"])

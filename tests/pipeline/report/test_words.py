@@ -12,7 +12,6 @@ from pipeline.report.words import TABLE, Words
 
 SOURCES = [p for p in Path(TABLE).parents[1].rglob("*") if p.suffix in (".py", ".html")]
 SECTIONS = tomllib.loads(Path(TABLE).read_text(encoding="utf-8"))
-GERMAN_CAUSES = SECTIONS.pop("causes")
 ENTRIES = {f"{section}.{key}": texts for section, rows in SECTIONS.items() for key, texts in rows.items()}
 
 
@@ -38,8 +37,8 @@ def test_every_word_is_used():
 
 
 def test_every_cause_of_the_contract_has_a_name():
-    assert GERMAN_CAUSES.keys() == {"pre_curvature", *(cause.name for cause in CATALOGUE)}
-    assert len(GERMAN_CAUSES) == 22
+    for name in ("pre_curvature", *(cause.name for cause in CATALOGUE)):
+        assert Words().cause(name) != Words("de").cause(name)
     assert Words().cause("pre_curvature_varying") == "varying pre-curvature"
     assert Words().cause("bearing_friction") == "bearing friction"
     assert Words("de").cause("hysteresis") == "Hysterese"

@@ -10,6 +10,7 @@ from pipeline.result import (
     CauseRow,
     DiagnosisPart,
     GainPart,
+    LeftoverPart,
     NextExperiment,
     ResidualMap,
 )
@@ -86,7 +87,9 @@ def diagnosis_of(verdict, photos):
         if verdict != "adequate"
         else None,
         extended=curve_of(0.005) if found else None,
-        leftover={"message": "A hump at mid-span on all photos.", "s_m": s.tolist(), "shape_m": (1e-6 * wave).tolist()}
+        leftover=LeftoverPart(
+            message="A hump at mid-span on all photos.", s_m=s.tolist(), shape_m=(1e-6 * wave).tolist()
+        )
         if verdict == "unexplained"
         else None,
         residuals_before=residuals(1.0),
