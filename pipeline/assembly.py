@@ -33,8 +33,8 @@ from pipeline.result import (
     ScalePart,
     SpecimenPart,
     Widening,
-    leading,
 )
+from pipeline.result.headline import headline
 from pipeline.settings import Settings
 
 PROGRAM = "cablebend"
@@ -146,35 +146,6 @@ def _specimen_part(specimen: Specimen) -> SpecimenPart:
         moving_bearing=specimen.rig.moving_bearing,
         description=specimen.description,
     )
-
-
-def headline(result: Result) -> Message:
-    """The answer in one sentence: the characteristic at both ends of the visited range, K0, whether the ways agree.
-
-    Where no photo could be used, why the first was not. A fault of the data comes before all that.
-    """
-    answer, agreement, diagnosis = result.answer, result.agreement, result.diagnosis
-    curve = answer.curve
-    if curve is None and result.photos and all(photo.reason for photo in result.photos):
-        first = result.photos[0]
-        reason = Message("photos.one", image=first.image, said=first.said)
-        return Message("headline.no-photo", count=len(result.photos), reason=reason)
-    if curve is None:
-        advice = result.inverse.said if result.inverse else answer.said
-        return Message("headline.none", advice=advice)
-    low, high = (Message("headline.end", value_Nm2=(f, std), at_per_m=kappa) for kappa, f, std in curve.ends())
-    fault = leading(result.findings)
-    said = fault.said if fault else None if answer.usable else answer.said
-    values = {"low": low, "high": high, "K0_per_m": (curve.pre_curvature, curve.pre_curvature_std)}
-    parts = [Message("headline.range", method=curve.method, **values)]
-    if curve.method == "extended":
-        agreement = None  # both ways lack the cause that was found
-    if agreement is not None and agreement.compatible is not None and agreement.rms_relative is not None:
-        key = "headline.agree" if agreement.compatible else "headline.disagree"
-        parts.append(Message(key, rms=agreement.rms_relative))
-    lead = [] if said is None else [said]
-    rest = [] if diagnosis is None else [diagnosis.said]
-    return Message("headline.sentences", sentences=[*lead, Message("headline.whole", parts=parts), *rest])
 
 
 def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:

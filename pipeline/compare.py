@@ -128,7 +128,7 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     negative = [r.specimen.id for r, c in ((a, one), (b, two)) if np.any(c.tangent <= 0.0)]
     faults += [Message("comparison.not-positive", name=name) for name in negative]
     if faults:
-        return nothing(methods=methods, said=Message("headline.sentences", sentences=faults))
+        return nothing(methods=methods, said=Message("sentences", sentences=faults))
     first, second = _log_curve(one), _log_curve(two)
     grid = first.common_grid(second)
     if grid is None:

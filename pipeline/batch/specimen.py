@@ -237,7 +237,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
 
 def _said(result: Result) -> dict[str, Any]:
     """The headline as data; of what was never measured, that of its finding."""
-    from pipeline.assembly import headline
+    from pipeline.result.headline import headline
 
     if result.steps:
         return headline(result).stored()

@@ -33,11 +33,11 @@ def demo(
     seed: int,
 ) -> None:
     """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
-    from pipeline.assembly import headline
     from pipeline.batch import run_batch
     from pipeline.cli.progress import progress
     from pipeline.cli.run import exit_code
     from pipeline.result import from_json
+    from pipeline.result.headline import headline
     from pipeline.simulate import demo_specimen
 
     settings = chosen_settings()

@@ -73,7 +73,7 @@ def predict(
     name, answer = measured.specimen.id, measured.answer
     if answer.method is not None and not answer.usable:
         unusable = Message("comparison.unusable", name=name, reason=answer.said)
-        note(Message("headline.sentences", sentences=[unusable]))
+        note(Message("sentences", sentences=[unusable]))
         ctx.exit(MISSING)
     if length_mm is None and measured.specimen.length_m is None:
         raise click.UsageError("the result tells no length: give --length-mm")

@@ -16,7 +16,7 @@ written as in `str.format`; what may stand behind its colon:
 ``word``
     A name used inside the program (a branch, a column) as one says it: the entry ``word.NAME``.
 ``amount``
-    A triple, value, standard deviation (or None) and unit, with the prefix that suits it.
+    Value, standard deviation (or None) and unit, with the prefix that suits it, and further values that may follow.
 ``wrong``
     Of a message: what is wrong, without what to do.
 `` and ``
@@ -194,8 +194,8 @@ class _Gaps(string.Formatter):
             return self._amount(*value) if spec == "amount" else self._listed(value, spec)
         return self._number(value, spec)
 
-    def _amount(self, number: float, std: float | None, unit: str) -> str:
-        sizes = (number,) if std is None else (number, std)
+    def _amount(self, number: float, std: float | None, unit: str, *alike: float) -> str:
+        sizes = (number, *alike) if std is None else (number, std, *alike)
         shown = amount_unit(unit.replace(" per ", PER[self.language]), *sizes, decimal=self.decimal)
         return shown.plain(number, 2) if std is None else shown.text(number, std)
 

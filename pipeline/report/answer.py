@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.messages import Message
-from pipeline.report.figures import stiffness_unit
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import Result, leading, trusted
+from pipeline.result.headline import opening, refusal
 from pipeline.settings import ReportSettings
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
+TOGETHER = re.compile(r" (?=±)|(?<=±) |(?<=\d) (?=1/m)|(?<=N) (?=m)")
+"""Blanks within a quantity, where no line may break."""
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
@@ -63,7 +65,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
     else:
         verdict, tone = "", "good" if adequate else "warn"
     return FirstScreen(
-        sentence=_sentence(result, words),
+        sentence=TOGETHER.sub(NO_BREAK, words.said(opening(result)).sentence),
         agreement=_agreement(result, words),
         model=model,
         advice=_advice(result, words),
@@ -120,56 +122,6 @@ def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]
     return sources
 
 
-def _sentence(result: Result, words: Words) -> str:
-    """f_EI at both ends of the visited range and K0."""
-    name, told = result.specimen.id, result.answer
-    curve = told.curve
-    if curve is None:
-        refused = _refused(result)
-        if refused:
-            return words("answer_refused", id=name, count=len(result.photos), reason=words.said(refused))
-        reason = next((f.said for f in result.findings if f.level == "error"), None)
-        if result.status == "failed" and reason is not None:
-            return words("answer_failed", id=name, reason=words.said(reason))
-        return words("answer_none", id=name)
-    fault = leading(result.findings)
-    lead = f"{words.said(_brief(fault.said)).sentence.rstrip('.')}. " if fault is not None else ""
-    if not told.usable:
-        lead = f"{words('answer_unusable', id=name, reason=str(words.said(_brief(told.said))).rstrip('.'))} "
-    unit = stiffness_unit(result, words)
-    (low, f_low, std_low), (high, f_high, std_high) = curve.ends()
-    beyond = abs(f_high - f_low) > 2.0 * math.hypot(std_low, std_high)
-    text = words(
-        "answer_constant" if not beyond else "answer_falls" if f_high < f_low else "answer_rises",
-        id=name,
-        first=_together(unit.text(f_low, std_low)),
-        last=_together(unit.text(f_high, std_high)),
-        low=words.curvature(low),
-        high=words.curvature(high),
-    )
-    rest = _together(words.measured(curve.pre_curvature, curve.pre_curvature_std))
-    return f"{lead}{text} {words('answer_pre_curvature', value=rest)}"
-
-
-def _brief(said: Message) -> Message:
-    """What is wrong without the figures that show it: they stand with the finding."""
-    reading = said.values.get("reading")
-    return reading if isinstance(reading, Message) else said
-
-
-def _together(quantity: str) -> str:
-    """A quantity that no line break takes apart."""
-    return quantity.replace(" ", NO_BREAK)
-
-
-def _refused(result: Result) -> Message | None:
-    """Why the first photo was refused, if all of them were."""
-    photos = result.photos
-    if not photos or not all(photo.reason for photo in photos):
-        return None
-    return Message("photos.one", image=photos[0].image, said=photos[0].said)
-
-
 def _agreement(result: Result, words: Words) -> str:
     """Difference of the two ways against what their bands allow."""
     part, found = result.agreement, trusted(result)
@@ -203,7 +155,7 @@ def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str,
 def _advice(result: Result, words: Words) -> str:
     """What to put right in the data, else the next experiment, else the warnings, else nothing."""
     if result.status == "failed":
-        return words("next_refused" if _refused(result) else "next_failed")
+        return words("next_refused" if refusal(result) else "next_failed")
     fault = leading(result.findings)
     remedy = words.code(fault.code) if fault is not None else None
     if fault is not None:

@@ -2,12 +2,13 @@
 
 import pytest
 
-from pipeline.assembly import headline, photo_findings, without_those_told_better
+from pipeline.assembly import photo_findings, without_those_told_better
 from pipeline.messages import Message
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import first_screen
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, leading
+from pipeline.result.headline import headline
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_result import measured_result
 
@@ -53,10 +54,13 @@ def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads
 
 def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
     plain, led = headline(measured), headline(measured.model_copy(update={"findings": [UNIT]}))
-    assert str(led) == f"The {TOO_LARGE}. {plain}"
+    assert str(led) == f"The numbers of cable-07 are not usable: the {TOO_LARGE}. {plain}"
     german = Words("de").said(led)
     assert german.language == "de" and german.text.endswith(Words("de").said(plain).text)
-    assert german.text.startswith("Die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder N für kN). ")
+    assert german.text.startswith(
+        "Die Zahlen von cable-07 sind nicht verwendbar: die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder "
+        "N für kN). "
+    )
 
 
 def test_what_the_diagnosis_names_is_said_once():
