@@ -15,7 +15,7 @@ from pipeline.result.headline import opening, refusal
 from pipeline.settings import ReportSettings
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-TOGETHER = re.compile(r" (?=±)|(?<=±) |(?<=\d) (?=1/m)|(?<=N) (?=m)")
+TOGETHER = re.compile(r" (?=±)|(?<=±) |(?<=\d) (?=1/m|px|mm|%)|(?<=N) (?=m)")
 """Blanks within a quantity, where no line may break."""
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}

@@ -51,10 +51,11 @@ def refusal(result: Result) -> Message | None:
 def _unmeasured(result: Result) -> Message:
     name, refused, inverse = result.specimen.id, refusal(result), result.inverse
     if refused is not None:
-        return Message("opening.refused", id=name, count=len(result.photos), reason=refused)
+        said = Message("opening.refused", id=name, count=len(result.photos), reason=refused)
+        return Message("sentences", sentences=[said])
     faults = [finding.said for finding in result.findings if finding.level == "error"]
     other = inverse.said if inverse is not None and inverse.advice else result.answer.said
-    return Message("opening.failed", id=name, reason=[*faults, other][0])
+    return Message("sentences", sentences=[Message("opening.failed", id=name, reason=[*faults, other][0])])
 
 
 def _range(name: str, curve: Visited) -> Message:

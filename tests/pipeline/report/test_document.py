@@ -228,7 +228,7 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
     heading = headline(page)
     assert heading == (
         f"cable-07 wurde nicht vermessen: Keines seiner 2 Fotos war verwendbar. Das erste: {refused[0].image}: "
-        "die Datei ist leer"
+        "die Datei ist leer."
     )
     assert "Sie danach neu aufnehmen" in page
     assert "simuliert</text>" not in page
