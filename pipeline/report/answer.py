@@ -140,6 +140,10 @@ def _agreement(result: Result, words: Words) -> str:
     return f"{words('before_extension')} {text}" if "extended" in found else text
 
 
+MISFIT = 3.0
+"""Standard deviations by which chi-square exceeds its expectation where it counts as a misfit; 1 in 700 by chance."""
+
+
 def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
     """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
     if result.diagnosis is not None:
@@ -148,7 +152,7 @@ def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str,
     if misfit is None or misfit.degrees_of_freedom <= 0:
         return words("model_unknown"), False
     ratio, std = misfit.chi2 / misfit.degrees_of_freedom, math.sqrt(2.0 / misfit.degrees_of_freedom)
-    good = ratio < 1.0 + settings.misfit_sigma * std
+    good = ratio < 1.0 + MISFIT * std
     return words("model_ok" if good else "model_bad", chi2=words.number(ratio), std=words.number(std, 2)), good
 
 

@@ -40,6 +40,7 @@ DASHES: dict[str, Any] = {"inverse": "-", "balance": (0, (6, 2)), "extended": "-
 STEP_RANGE_LIGHT, STEP_RANGE_DARK = (0.0, 0.82), (0.22, 1.0)
 STEP_LEVELS = 24  # neighbours of a longer test share a colour; no eye tells more of them apart
 
+NOISE = 2.0  # standard deviations inside which figures call a residual noise; 95 % of normal errors
 # Room above the axes for a legend, in px.
 ONE_ROW, TWO_ROWS = 22.0, 38.0
 # Between the labels of an axis and both its sides, in px.

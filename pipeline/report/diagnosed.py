@@ -182,7 +182,7 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     """Ranking, cosines, maps before and after."""
     drawn: dict[str, Drawing] = {}
     if part.table:
-        draw = partial(ranking.draw_ranking, diagnosis=part, words=words, settings=settings)
+        draw = partial(ranking.draw_ranking, diagnosis=part, words=words)
         drawn["ranking"] = titled("ranking", draw, words, size=(400.0, ranking.ranking_height(part)))
     if part.twins:
         cosines = partial(maps.draw_cosines, cosines=part.twins, words=words)
@@ -205,7 +205,7 @@ def _before_and_after(
     """What was left of shapes before the extension, and of forces before and after."""
     drawn = {"before": residual_map("map-before", before, words, settings, title="fig_map_before")}
     if any(value is not None for value in before.force_sigma):
-        draw = partial(maps.draw_force_rest, before=before, after=after, words=words, settings=settings)
+        draw = partial(maps.draw_force_rest, before=before, after=after, words=words)
         texts = _force_texts(before, after, words)
         drawn["force_rest"] = titled("force-rest", draw, words, key="force_rest", size=(400.0, 240.0), values=texts)
     return drawn

@@ -135,7 +135,7 @@ def residual_map(
     """The figure of a residual map, high enough for its steps."""
     return drawing(
         name,
-        partial(maps.draw_map, residuals=residuals, words=words, settings=settings),
+        partial(maps.draw_map, residuals=residuals, words=words),
         size=(400.0, maps.map_height(residuals)),
         title=words(title),
         description=words("fig_map_alt", rms=map_rms(residuals, words)),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from pipeline.report.canvas import DASHES, LIGHT, ONE_ROW, Area, finish, plot_area, step_colours
+from pipeline.report.canvas import DASHES, LIGHT, NOISE, ONE_ROW, Area, finish, plot_area, step_colours
 from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
@@ -214,7 +214,7 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
         _simulated(axes, fitted, unit, LIGHT[role], words)
         rest = plot_area(figure, top=0.68 * height)
         rest.sharex(axes)
-        _force_rest(rest, given, words, settings)
+        _force_rest(rest, given, words)
     finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
     return axes
 
@@ -236,16 +236,15 @@ def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, word
         )
 
 
-def _force_rest(rest: Axes, given: list[StepPart], words: Words, settings: ReportSettings) -> None:
+def _force_rest(rest: Axes, given: list[StepPart], words: Words) -> None:
     """Measured minus simulated force in standard deviations."""
-    noise = settings.residual_noise_sigma
     for branch in MARKERS:
         steps = [step for step in given if step.branch == branch]
         left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
         rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **_marks(branch))
-    rest.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    rest.axhspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    limit = max([1.5 * noise, *(1.15 * abs(force_residual(step) or 0.0) for step in given)])
+    limit = max([1.5 * NOISE, *(1.15 * abs(force_residual(step) or 0.0) for step in given)])
     rest.set_ylim(-limit, limit)
     sigma = Ruling(words("axis_sigma"), most=4, whole=True)
     finish(rest, x=words("axis_displacement"), y=sigma, decimal=words.decimal)

@@ -14,11 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, plot_area
+from pipeline.report.canvas import LIGHT, NOISE, ONE_ROW, Area, finish, label_width, plot_area
 from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, ResidualMap, Result
-from pipeline.settings import ReportSettings
 from pipeline.units import suited
 
 Array = NDArray[np.float64]
@@ -80,19 +79,24 @@ def map_height(residuals: ResidualMap) -> float:
     return 72.0 + 24.0 * min(12, max(4, len(residuals.steps)))
 
 
-def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "") -> Axes:
+COLUMNS = 120
+"""Of a map along s; at 440 px a column is 3 px, finer is not seen."""
+
+STRONG = 5.0
+"""Standard deviations at which the colours of a map end; beyond, the size no longer matters."""
+
+
+def draw_map(figure: Area, residuals: ResidualMap, words: Words, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
     branches = residuals.branches or [""] * len(residuals.steps)
     names = [f"{step} {words.branch(b)}" for step, b in zip(residuals.steps, branches, strict=True)]
     width = figure.bbox.width
     axes = plot_area(figure, left=label_width(names, most=0.4 * width), right=84.0, top=20.0 if title else 8.0)
     s = 1e3 * np.asarray(residuals.s_m)
-    columns = np.linspace(s[0], s[-1], settings.map_columns)
+    columns = np.linspace(s[0], s[-1], COLUMNS)
     table = np.array([np.interp(columns, s, _numbers(row)) for row in residuals.shape_sigma])
     # noise alone stays pale; a large misfit sets its own scale, else all of it would be one colour
-    limit = (
-        max(settings.map_limit_sigma, float(np.nanpercentile(np.abs(table), 98.0))) if np.isfinite(table).any() else 1.0
-    )
+    limit = max(STRONG, float(np.nanpercentile(np.abs(table), 98.0))) if np.isfinite(table).any() else 1.0
     image = axes.imshow(
         np.ma.masked_invalid(table),
         cmap="PuOr_r",
@@ -112,12 +116,10 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, settings: Repor
     return axes
 
 
-def draw_force_rest(
-    figure: Area, before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
-) -> Axes:
+def draw_force_rest(figure: Area, before: ResidualMap, after: ResidualMap, words: Words) -> Axes:
     """Draw forces left over by step in sigma, before and after the extension."""
-    axes, noise = plot_area(figure, top=ONE_ROW), settings.residual_noise_sigma
-    axes.axhspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    axes = plot_area(figure, top=ONE_ROW)
+    axes.axhspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     for residuals, role, marker, label in ((before, "alarm", "x", "before"), (after, "extended", "o", "after")):
         if residuals.force_sigma:

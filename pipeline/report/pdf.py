@@ -185,7 +185,7 @@ def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> 
         figures.draw_curvatures(sheet.part(230.0, right=0.5, advance=False), result, words)
     residuals = maps.answer_map(result)
     if residuals is not None:
-        maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, settings, title=words("fig_map"))
+        maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, title=words("fig_map"))
     sheet.y += 236.0
     unit = figures.force_unit(result, words).symbol
     heads = [words("col_step"), words("col_branch"), words("col_displacement")]
@@ -259,12 +259,12 @@ def _diagnosis_sheet(
         sheet.text(line)
     if part.table:
         height = min(ranking.ranking_height(part), 280.0)
-        ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words, settings)
+        ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words)
     before, after = part.residuals_before, part.residuals_after
     if before is not None and after is not None:
         for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
             area = sheet.part(165.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
-            maps.draw_map(area, residuals, words, settings, title=words(title))
+            maps.draw_map(area, residuals, words, title=words(title))
         sheet.y += 170.0
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]

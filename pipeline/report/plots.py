@@ -56,7 +56,7 @@ def plot_residuals(result: Result, *, settings: ReportSettings | None = None) ->
     if residuals is None:
         raise ValueError(f"{result.specimen.id} has no residuals to plot")
     size = (400.0, maps.map_height(residuals))
-    return _figure(lambda area: maps.draw_map(area, residuals, words, settings), size)
+    return _figure(lambda area: maps.draw_map(area, residuals, words), size)
 
 
 def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = None) -> Figure:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
-from pipeline.report.canvas import LIGHT, Area, finish, label_width, plot_area
+from pipeline.report.canvas import LIGHT, NOISE, Area, finish, label_width, plot_area
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart
-from pipeline.settings import ReportSettings
 
 ROW_PX = 21.0
 
@@ -28,7 +27,7 @@ def ranking_height(diagnosis: DiagnosisPart) -> float:
     return 54.0 + ROW_PX * len(diagnosis.table)
 
 
-def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings: ReportSettings) -> Axes:
+def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words) -> Axes:
     """Draw pull (left) and impact on f_EI in percent (right); named causes are emphasised."""
     rows, width = ranked(diagnosis), figure.bbox.width
     named = {name for cause in diagnosis.causes for name in (cause.name, *cause.class_)}
@@ -39,12 +38,11 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words, settings:
     impact = plot_area(figure, left=middle + 6.0, top=8.0)
     colours = [LIGHT["alarm"] if row.name in named else LIGHT["muted"] for row in rows]
     places = range(len(rows))
-    noise = settings.residual_noise_sigma
-    pull.axvspan(-noise, noise, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    pull.axvspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     pull.barh(places, [row.z for row in rows], color=colours, height=0.62)
     shifts = [100.0 * (row.stiffness_shift or 0.0) for row in rows]
     impact.barh(places, shifts, color=colours, height=0.62)
-    limit = max(2.0 * noise, *(1.1 * abs(row.z) for row in rows)) if rows else 2.0 * noise
+    limit = max(2.0 * NOISE, *(1.1 * abs(row.z) for row in rows)) if rows else 2.0 * NOISE
     pull.set_xlim(-limit, limit)
     reach = max([1.0, *(1.1 * abs(shift) for shift in shifts)])
     impact.set_xlim(-reach, reach)

@@ -70,6 +70,10 @@ def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
     return judged
 
 
+DRAWN = 24
+"""Types of cable with a figure in the index; more would make it slow to open."""
+
+
 def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSettings) -> Iterable[Repeats]:
     """Repeat specimens by type, most specimens first; ``unit`` is that of bending stiffness for all of an index."""
     drawn = 0
@@ -78,7 +82,7 @@ def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSett
         if together is None:
             continue
         drawn += 1
-        shown = drawn <= settings.pooled_types_drawn
+        shown = drawn <= DRAWN
         rests = [rows[number].pre_curvature for number, _ in group]
         known = [rest for rest in rests if rest is not None and rest[1] > 0.0]
         scatters = {"f_EI": together.stiffness} | ({"K0": scattered(known)} if len(known) == len(rests) else {})

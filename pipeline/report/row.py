@@ -145,7 +145,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         worst="" if worst is None else worst.code,
         reason=None if worst is None else worst.said,
         shapes=_shapes(result),
-        curve=None if curve is None else _thinned(curve, settings.index_curve_points),
+        curve=None if curve is None else _thinned(curve, POINTS),
     )
 
 
@@ -153,6 +153,10 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
     """The first error, else the first warning."""
     levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
     return levels["error"] or levels["warning"]
+
+
+POINTS = 24
+"""Of a characteristic kept in the index; a spline of few control points needs no more."""
 
 
 def _thinned(curve: Visited, points: int) -> RowCurve:

@@ -12,7 +12,7 @@ import pytest
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
 from pipeline.report.index import write_index
-from pipeline.report.row import as_entry, from_entry, index_row
+from pipeline.report.row import POINTS, as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart
 from pipeline.settings import ReportSettings
@@ -98,7 +98,7 @@ def test_overlay_data_are_the_curves(batch, tmp_path):
     data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
     assert data["rows"][3] is None
     kappa, value, std = data["rows"][0]
-    assert len(kappa) == len(value) == len(std) == ReportSettings().index_curve_points
+    assert len(kappa) == len(value) == len(std) == POINTS
     assert value[0] == pytest.approx(1e3 * batch[0].inverse.curve.tangent_Nm2[0], rel=1e-3)  # four digits
 
 
