@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from pipeline.records import Array
 from pipeline.settings.intake import IntakeSettings
@@ -154,7 +153,9 @@ def _p_value(rss: float, freedom: int, rss_more: float, freedom_more: int) -> fl
     added = freedom - freedom_more
     if added <= 0 or freedom_more <= 0 or rss_more <= 0.0:
         return 1.0
-    return float(special.fdtrc(added, freedom_more, (rss - rss_more) / added / (rss_more / freedom_more)))
+    from scipy.special import fdtrc  # takes a quarter of a second, and who only hands out specimens reads no log
+
+    return float(fdtrc(added, freedom_more, (rss - rss_more) / added / (rss_more / freedom_more)))
 
 
 def _left_over(holds: Sequence[Hold], fits: Sequence[_Fit], sigmas: Sequence[float], degree: int) -> float:
@@ -202,10 +203,12 @@ def _sigmas(fits: Sequence[_Fit], floor: float) -> list[float]:
     used = freedom > 0
     variances = np.maximum(rss[used] / freedom[used], floor**2)
     if np.count_nonzero(used) > 1:
+        from scipy.special import chdtrc
+
         nu, groups = freedom[used], int(np.count_nonzero(used))
         correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (groups - 1))
         statistic = (nu.sum() * math.log(pooled) - float(np.sum(nu * np.log(variances)))) / correction
-        if special.chdtrc(groups - 1, max(statistic, 0.0)) < 0.01:
+        if chdtrc(groups - 1, max(statistic, 0.0)) < 0.01:
             weight = 4.0
             return [math.sqrt(v) for v in (rss + weight * pooled) / (freedom + weight)]
     return [math.sqrt(pooled)] * len(fits)

@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from scipy.integrate import cumulative_trapezoid
 
 from pipeline.messages import UNREADABLE, Message, ended, free_text
 from pipeline.records import Level
@@ -205,7 +204,8 @@ class Widening(Part):
         relative = [np.interp(kappa, self.kappa_per_m, column) for column in np.array(self.tangent_factor).T]
         by_f = tangent[:, None] * np.column_stack(relative)
         by_rest = np.array(self.pre_curvature_factor_per_m)
-        by_m = cumulative_trapezoid(by_f, kappa, axis=0, initial=0) - tangent[0] * by_rest
+        rise = np.cumsum(np.diff(kappa)[:, None] * (by_f[1:] + by_f[:-1]) / 2.0, axis=0)
+        by_m = np.vstack([np.zeros_like(by_rest), rise]) - tangent[0] * by_rest
         tangent_std, moment_std = (
             np.hypot(std, np.linalg.norm(more, axis=1))
             for std, more in ((curve.tangent_std_Nm2, by_f), (curve.moment_std_Nm, by_m))
