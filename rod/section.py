@@ -181,16 +181,16 @@ class Section:
         return with_friction
 
     def _set_response(self, memory: Memory) -> Response:
-        law, K0 = self.law, self.pre_curvature
-        profile = np.ones(1) if self.profile is None else self.profile
+        elastic, K0 = _elastic(self), self.pre_curvature
 
         def with_set(K: Array) -> tuple[Array, Array]:
             growing = self.plastic_rate * np.greater(K - K0, memory.reached)
             m, tangent = np.zeros((2, *K.shape))
             for read in self.read(K, self.set_at(K, memory)):
-                m += read.share * law.moment(read.at, K0)
-                tangent += read.share * (read.by_K + read.by_set * growing) * law.tangent(read.at, K0)
-            return profile * m, profile * tangent
+                moment, by_read = elastic(read.at)
+                m += read.share * moment
+                tangent += read.share * (read.by_K + read.by_set * growing) * by_read
+            return m, tangent
 
         return with_set
 
