@@ -85,7 +85,7 @@ def parametric(law: MomentCurve) -> TypeGuard[ParametricCurve]:
 class Characteristic:
     """Natural cubic spline f through control points, and the moment curve that it means.
 
-    Made by `from_ordinates`, `constant`, `from_table` or `from_law`.
+    Made by `from_ordinates`, `constant` or `from_table`.
 
     Attributes
     ----------
@@ -142,21 +142,6 @@ class Characteristic:
     def constant(cls, bending_stiffness: float) -> Characteristic:
         """Linear cable: f = ``bending_stiffness`` (EI, N m^2) everywhere, both readings."""
         return cls(np.zeros(1), np.array([bending_stiffness], float))
-
-    @classmethod
-    def from_law(
-        cls,
-        law: Callable[[Array], ArrayLike],
-        knots: ArrayLike,
-        *,
-        reading: Reading = "tangent",
-        even: bool = False,
-        abscissa: Abscissa = "curvature",
-    ) -> Characteristic:
-        """Spline through the values of a function ``law(knots)``, N m^2, of the abscissa in 1/m."""
-        at = np.asarray(knots, float)
-        ordinates = np.broadcast_to(np.asarray(law(at), float), at.shape)
-        return cls(at, ordinates.copy(), reading, even, abscissa)
 
     @classmethod
     def from_table(

@@ -119,7 +119,7 @@ def test_noisy_table_stays_within_its_noise() -> None:
 def test_law_function_is_met_at_the_knots() -> None:
     law = StickSlip(6e-3, 2e-3, 4.0)
     knots = np.linspace(0.0, 12.0, 40)
-    spline = Characteristic.from_law(lambda D: law.tangent(D, 0.0), knots, abscissa="excess")
+    spline = Characteristic.from_ordinates(knots, law.tangent(knots, 0.0), abscissa="excess")
     K = np.linspace(2.0, 13.0, 200)
     assert np.allclose(spline.tangent(K, 2.0), law.tangent(K, 2.0), rtol=2e-3)  # natural end at the peak of f
     assert np.allclose(spline.moment(K, 2.0), law.moment(K, 2.0), rtol=1e-3)
