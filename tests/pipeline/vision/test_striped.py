@@ -1,0 +1,50 @@
+"""A striped wire of known diameter is one cable, two wires of that diameter side by side are not."""
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.records import Centerline
+from pipeline.vision import trace_photo
+
+TABLE, WHITE, BLUE = (150, 165, 175), (225, 225, 225), (160, 80, 40)
+WIDTH, FINER, SIZE = 14.0, 4, (810, 405)
+
+
+def drawn(folder, middles):
+    """Wires ``middles`` px beside a bow; beyond a sixth of the width from the first one's middle they are blue."""
+    u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
+    t = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u))
+    inside = np.any([np.abs(t - middle) < 0.5 * WIDTH for middle in middles], axis=0) & (u > 93.0) & (u < 716.0)
+    sheath = np.where((t > middles[0] + WIDTH / 6.0)[..., None], BLUE, WHITE)
+    picture = np.where(inside[..., None], sheath, TABLE).astype(np.float32)
+    pixels = cv2.GaussianBlur(cv2.resize(picture, SIZE, interpolation=cv2.INTER_AREA), (0, 0), 0.8)
+    noise = np.random.default_rng(3).normal(0.0, 2.0, pixels.shape)
+    path = folder / "wire.jpg"
+    cv2.imwrite(str(path), np.clip(pixels + noise, 0, 255).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 85])
+    return path
+
+
+def bow(u):
+    return 200.0 + 93.0 * np.sin(np.pi * (u - 93.0) / 623.0)
+
+
+def beside(line):
+    u, v = np.asarray(line.u_px), np.asarray(line.v_px)
+    inner = (u > 120.0) & (u < 690.0)
+    return ((v - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u)))[inner]
+
+
+def test_a_wire_of_two_colours_is_one_cable(tmp_path):
+    line = trace_photo(drawn(tmp_path, [0.0]), diameter_px=WIDTH)
+    assert isinstance(line, Centerline)
+    # the wider colour alone is a strip whose middle lies 2.3 px beside the wire's
+    assert np.sqrt(np.mean(beside(line) ** 2)) < 0.5
+    assert line.width_m == pytest.approx(WIDTH, rel=0.1)
+
+
+def test_two_wires_are_not_one(tmp_path):
+    line = trace_photo(drawn(tmp_path, [0.0, 1.3 * WIDTH]), diameter_px=WIDTH)
+    if isinstance(line, Centerline):  # one of them, and not what lies between
+        off = np.abs(np.median(beside(line)) - np.array([0.0, 1.3 * WIDTH]))
+        assert off.min() < 0.1 * WIDTH
