@@ -57,10 +57,10 @@ class Standout:
             return np.abs(self.residual[..., 0]) * np.float32(whitener[0, 0])
         return np.asarray(np.sqrt(np.einsum("ijc,ijc->ij", white, white)), np.float32)
 
-    def along(self, weights: Array) -> Image:
-        """Picture ``(h, w)``: residual along one colour projection, in standard deviations of the ground."""
-        std = float(np.sqrt(weights @ self.covariance @ weights))
-        return np.asarray(self.residual @ (weights / std).astype(np.float32))
+    def brightness(self) -> Image:
+        """Picture ``(h, w)``: mean residual of the channels, in standard deviations of the ground."""
+        std = float(np.sqrt(self.covariance.mean()))
+        return np.asarray(self.residual.mean(axis=2) / np.float32(std))
 
     def to_cells(self, uv: Array) -> Array:
         """Cells (n, 2) of photo pixels (n, 2), ``(u, v)``."""

@@ -1,8 +1,7 @@
 """Which strip is the cable: levels, polarities and widths tried until one reading of the photo makes sense.
 
 The first reading, everything that differs from the ground at Otsu's level, serves most photos. Others are tried only
-where it finds nothing long enough: other levels, one polarity (a shadow of the other one melts into the cable), one
-colour difference (a grey shadow beside a coloured cable).
+where it finds nothing long enough: other levels, one polarity (a shadow of the other one melts into the cable).
 All lengths in cells of the reduced photo.
 """
 
@@ -153,18 +152,13 @@ def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tu
     for level in (*higher, *(factor * otsu for factor in settings.level_factors)):
         if level > settings.lowest_level:
             yield distance, level
-    channels = standout.residual.shape[2]
-    directions = [np.full(channels, 1.0 / channels)]
-    if channels == 3:  # blue, green, red
-        directions += [np.array([0.0, -0.5, 0.5]), np.array([0.5, -0.25, -0.25])]
-    for direction in directions:
-        signed = standout.along(direction)
-        for sign in (-1.0, 1.0):
-            picture = np.maximum(np.float32(sign) * signed, 0.0)
-            level, *higher = _levels(picture, settings)
-            if level > settings.least_level:
-                for tried in (level, *higher, 0.5 * level):
-                    yield picture, tried
+    brightness = standout.brightness()
+    for sign in (-1.0, 1.0):
+        picture = np.maximum(np.float32(sign) * brightness, 0.0)
+        level, *higher = _levels(picture, settings)
+        if level > settings.least_level:
+            for tried in (level, *higher, 0.5 * level):
+                yield picture, tried
     for level in (settings.least_level, settings.lowest_level):
         yield distance, level
 
