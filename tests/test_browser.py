@@ -20,6 +20,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from pipeline.messages import free_text
 from pipeline.report.document import write_report
 from pipeline.report.index import write_index, write_rows
 from pipeline.report.row import index_row
@@ -76,7 +77,8 @@ def many_rows(result):
     row = index_row(result, ReportSettings())
     hostile = "<img src=x onerror=alert(1)></script>"
     for number in range(MANY):
-        faulty = {"usable": False, "fault": f"the forces of {hostile} are in mN"} if number % 100 == 50 else {}
+        fault = free_text(f"the forces of {hostile} are in mN")
+        faulty = {"usable": False, "fault": fault} if number % 100 == 50 else {}
         low = (row.low[0], (2.0 - number / MANY) * row.low[1], row.low[2])
         yield replace(row, id=f"cable-{number}", type="HV", low=low, report=f"cable-{number}/report.html", **faulty)
 
