@@ -145,7 +145,7 @@ def _pair_width(
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / settings.pair_width_std) ** 2)
         return float(tried[np.argmax(totals * (settings.pair_width_doubt + (1.0 - settings.pair_width_doubt) * trust))])
-    return float(tried[np.flatnonzero(totals > settings.pair_width_share * totals.max())[-1]])
+    return float(tried[np.flatnonzero(totals >= settings.pair_width_share * totals.max())[-1]])
 
 
 def _steepest(slope: Array, offsets: Array, about: Array, reach: float, least: float) -> Array:

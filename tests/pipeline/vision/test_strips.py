@@ -6,6 +6,8 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from pipeline.settings.vision import VisionSettings
+from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import find_strips, thick_part
 
 SETTINGS = VisionSettings().segmentation
@@ -44,3 +46,9 @@ def test_branch_is_what_leaves_the_longest_path_by_more_than_a_width(branch):
     (strip,) = find_strips(mask, np.zeros_like(mask), width, SETTINGS)
     assert strip.length == pytest.approx(460, abs=2 * width)
     assert strip.branch == pytest.approx(max(branch - width, 0), abs=width)
+
+
+def test_a_flat_strip_of_unknown_width_shows_no_edges():
+    offsets = np.arange(-22.0, 22.1)
+    flanks = find_flanks(np.zeros((90, 45), np.float32), offsets, 10.0, 1.0, SegmentationSettings(), known=False)
+    assert np.isnan(flanks.left).all() and np.isnan(flanks.right).all()
