@@ -189,6 +189,55 @@ def _cumulated(rates: Array, xi: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Pieces:
+    """A moment curve through (bend, moment) points with the tangents there, cubic between, straight beyond them.
+
+    Attributes
+    ----------
+    bends : (g,) 1/m
+    table : (5, g + 1)
+        Rising powers of the moment on each segment and, last, its primitive at the origin. Segment 0 lies below the
+        first point, the last one above the last.
+    origin : (g + 1,) 1/m
+    """
+
+    bends: Array
+    table: Array
+    origin: Array
+
+    def at(self, bend: Array) -> tuple[Array, Array]:
+        """Moment and tangent at bends (n,)."""
+        segment = self.bends.searchsorted(bend)
+        t = bend - self.origin.take(segment)
+        a, b, c, d = self.table[:4].take(segment, axis=1)
+        return ((d * t + c) * t + b) * t + a, (3.0 * d * t + 2.0 * c) * t + b
+
+    def energy(self, bend: Array) -> Array:
+        """Integral of the moment from rest to bends (n,), N."""
+        segment = self.bends.searchsorted(bend)
+        t = bend - self.origin.take(segment)
+        a, b, c, d, energy = self.table.take(segment, axis=1)
+        return np.asarray((((0.25 * d * t + c / 3.0) * t + 0.5 * b) * t + a) * t + energy)
+
+
+def pieces(K: Array, m: Array, f: Array, rest: int) -> Pieces:
+    """The curve through bends K (g,) and moments m (g,) with tangents f (g,); ``rest`` is the place of the origin."""
+    h = np.diff(K)
+    mean = np.diff(m) / h
+    table = np.zeros((5, K.size + 1))
+    table[0, 1:-1], table[1, 1:-1] = m[:-1], f[:-1]
+    table[2, 1:-1] = (3.0 * mean - 2.0 * f[:-1] - f[1:]) / h
+    table[3, 1:-1] = (f[:-1] + f[1:] - 2.0 * mean) / h**2
+    table[0, 0], table[1, 0], table[0, -1], table[1, -1] = m[0], f[0], m[-1], f[-1]
+    a, b, c, d = table[:4, 1:-1]
+    rise = (((0.25 * d * h + c / 3.0) * h + 0.5 * b) * h + a) * h
+    energy = np.concatenate([[0.0], np.cumsum(rise)])
+    energy -= energy[rest]
+    table[4] = np.concatenate([energy[:1], energy])
+    return Pieces(K, table, np.concatenate([K[:1], K]))
+
+
+@dataclass(frozen=True, eq=False)
 class ComplianceLaw:
     """One law: coefficients (p,) of log c on a basis. A moment curve (`rod.characteristic.ParametricCurve`)."""
 
@@ -198,22 +247,22 @@ class ComplianceLaw:
     # Compliance over the moment -----------------------------------------------------------------------------------
 
     @cached_property
-    def _rates(self) -> Array:
+    def _paces(self) -> Array:
         """dK/dxi at ends and middles, (2 g - 1,) 1/m."""
         b = self.basis
         c = np.empty(b.xi.size)
-        c[::2], c[1::2] = self._c, b.unit * np.exp(b.middle @ self.coefficients)
+        c[::2], c[1::2] = self.rates, b.unit * np.exp(b.middle @ self.coefficients)
         return np.asarray(c * b.pace)
 
     @cached_property
-    def _c(self) -> Array:
+    def rates(self) -> Array:
         """Compliance at the ends of the cells, (g,) 1/(N m^2)."""
         return np.asarray(self.basis.unit * np.exp(self.basis.at_ends @ self.coefficients))
 
     @cached_property
     def bends(self) -> Array:
         """K - K0 at the moments of the basis, (g,) 1/m."""
-        rise = _cumulated(self._rates[:, None], self.basis.xi)[:, 0]
+        rise = _cumulated(self._paces[:, None], self.basis.xi)[:, 0]
         return np.asarray(rise - rise[self.basis.rest])
 
     @cached_property
@@ -221,7 +270,7 @@ class ComplianceLaw:
         """Derivative of `bends` by the coefficients, (g, p) 1/m."""
         b = self.basis
         rates = np.empty((b.xi.size, b.size))
-        rates[::2], rates[1::2] = self._rates[::2, None] * b.at_ends, self._rates[1::2, None] * b.middle
+        rates[::2], rates[1::2] = self._paces[::2, None] * b.at_ends, self._paces[1::2, None] * b.middle
         rise = _cumulated(rates, b.xi)
         return np.asarray(rise - rise[b.rest])
 
@@ -249,14 +298,14 @@ class ComplianceLaw:
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""
         m, b = np.asarray(moment, float), self.basis
-        inside = CubicHermiteSpline(b.moments, self.bends, self._c)(np.clip(m, b.moments[0], b.moments[-1]))
+        inside = CubicHermiteSpline(b.moments, self.bends, self.rates)(np.clip(m, b.moments[0], b.moments[-1]))
         below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
-        return np.asarray(inside + self._c[0] * below + self._c[-1] * above)
+        return np.asarray(inside + self.rates[0] * below + self.rates[-1] * above)
 
     def bend_by_coefficients(self, moment: ArrayLike) -> Array:
         """Derivative of `bend`, (n, p) 1/m."""
         m, b = np.asarray(moment, float), self.basis
-        slopes = self._c[:, None] * b.at_ends
+        slopes = self.rates[:, None] * b.at_ends
         inside = CubicHermiteSpline(b.moments, self._bends_by, slopes)(np.clip(m, b.moments[0], b.moments[-1]))
         below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
         return np.asarray(inside + below[:, None] * slopes[0] + above[:, None] * slopes[-1])
@@ -264,30 +313,14 @@ class ComplianceLaw:
     # The moment curve -------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _pieces(self) -> tuple[Array, Array]:
-        """Rising powers (5, g + 1) of the moment and, last, its primitive at the origin, with their origins (g + 1,).
-
-        Segment 0 lies below the first bend, the last above the last one; both are straight.
-        """
-        K, m, f = self.bends, self.basis.moments, 1.0 / self._c
-        h = np.diff(K)
-        mean = np.diff(m) / h
-        table = np.zeros((5, K.size + 1))
-        table[0, 1:-1], table[1, 1:-1] = m[:-1], f[:-1]
-        table[2, 1:-1] = (3.0 * mean - 2.0 * f[:-1] - f[1:]) / h
-        table[3, 1:-1] = (f[:-1] + f[1:] - 2.0 * mean) / h**2
-        table[0, 0], table[1, 0], table[0, -1], table[1, -1] = m[0], f[0], m[-1], f[-1]
-        a, b, c, d = table[:4, 1:-1]
-        rise = (((0.25 * d * h + c / 3.0) * h + 0.5 * b) * h + a) * h
-        energy = np.concatenate([[0.0], np.cumsum(rise)])
-        energy -= energy[self.basis.rest]
-        table[4] = np.concatenate([energy[:1], energy])
-        return table, np.concatenate([K[:1], K])
+    def curve(self) -> Pieces:
+        """The moment over the bend K - K0."""
+        return pieces(self.bends, self.basis.moments, 1.0 / self.rates, self.basis.rest)
 
     @property
     def stiffness_scale(self) -> float:
         """Largest tangent stiffness on the basis, N m^2; used for scaling only."""
-        return float(1.0 / self._c.min())
+        return float(1.0 / self.rates.min())
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m."""
@@ -299,26 +332,11 @@ class ComplianceLaw:
 
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
-        table, origin = self._pieces
-        bends = self.bends
-
-        def moment_and_tangent(K: Array) -> tuple[Array, Array]:
-            D = K - K0
-            segment = bends.searchsorted(D)
-            t = D - origin.take(segment)
-            a, b, c, d = table[:4].take(segment, axis=1)
-            return ((d * t + c) * t + b) * t + a, (3.0 * d * t + 2.0 * c) * t + b
-
-        return moment_and_tangent
+        return lambda K: self.curve.at(K - K0)
 
     def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Energy per length int_{K0}^{K} m dk, N."""
-        table, origin = self._pieces
-        D = np.asarray(K, float) - np.asarray(K0, float)
-        segment = self.bends.searchsorted(D)
-        t = D - origin.take(segment)
-        a, b, c, d, energy = table.take(segment, axis=1)
-        return np.asarray((((0.25 * d * t + c / 3.0) * t + 0.5 * b) * t + a) * t + energy)
+        return self.curve.energy(np.asarray(K, float) - np.asarray(K0, float))
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2: the law moves with K0."""

@@ -58,7 +58,7 @@ def by_chance(rate, draws):
 
 
 def bench_of(test):
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
     assert not isinstance(bench, str), bench
     return bench
 
@@ -166,7 +166,7 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
     names = ("in_plane_load", "stiffness_varying", "displacement_offset", "force_offset")
     causes = [cause for cause in CATALOGUE if cause.name in names]
     test = hidden_test(cable, SIX, largest=LARGEST, seed=15)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
     found = conclude(bench, SETTINGS)
     assert [causes[k].name for k in found.accepted.causes] == ["in_plane_load"] and not found.unmodelled
     fitted = found.accepted.fitted
@@ -182,7 +182,7 @@ def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
     cable = Cable(set_rate=0.08, law_stays=law_stays)
     causes = [cause for cause in CATALOGUE if cause.name in NEEDS_THE_WAY_BACK]
     test = hidden_test(cable, LOOP, largest=LARGEST, seed=16)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
     part = present(bench, conclude(bench, SETTINGS), SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
     assert part.causes[0].estimate == pytest.approx(0.08, abs=4.0 * part.causes[0].std)

@@ -63,13 +63,13 @@ def diagnose(
     faults = faults_of_input(test, settings)
     if not faults.loaded_forces():
         return _nothing_to_compare(Message("diagnosis.no-force-used")), faults.findings
-    bench = prepare(faults, settings, knots=settings.knots)
+    bench = prepare(faults, settings)
     if isinstance(bench, Message):
         return _nothing_to_compare(bench), faults.findings
     fault = _data_at_fault(bench, settings)
     if fault is not None:
         joined = joined_with_outlier(faults, fault, test)
-        again = prepare(joined, settings, knots=settings.knots)
+        again = prepare(joined, settings)
         if not isinstance(again, Message) and again.largest <= again.limit:
             faults, bench = joined, again
     fitted = None if identification is None else identification.inverse
@@ -100,7 +100,7 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
     ):  # scatter is among the error models: where something else is likelier, it is none
         return faults, bench, first
     scattered = with_scatter(faults, std)
-    again = prepare(scattered, settings, knots=settings.knots)
+    again = prepare(scattered, settings)
     if isinstance(again, Message):
         return faults, bench, first
     second = conclude(again, settings)

@@ -17,6 +17,7 @@ from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import Fit, fit
 from pipeline.diagnosis.fits.heldout import measured_gain
+from pipeline.diagnosis.fits.laws import FewPoints
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.observations.observation import Observation, observe
@@ -130,13 +131,13 @@ def _fitted(
     base = start(
         test,
         facts,
-        knots=3 if curved else 1,
+        points=3 if curved else 1,
         elements=settings.grid,
-        smoothness=settings.roughness,
         straight=not bent,
     )
-    if not bent:  # the control points then count from zero curvature
-        base = replace(base, knots=base.knots + (base.knots > 0.0) * base.first)
+    if not bent and isinstance(base.law, FewPoints):  # the control points then count from zero curvature
+        knots = base.law.knots + (base.law.knots > 0.0) * base.first
+        base = replace(base, law=replace(base.law, knots=knots))
     best: Fit | None = None
     for stiffness, bend in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.1 * facts.curvature_scale)):
         found = fit(

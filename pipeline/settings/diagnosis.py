@@ -109,23 +109,9 @@ class DiagnosisSettings(BaseModel):
     separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart")
 
     # base model
-    knots: int = Field(
-        12,
-        description="control points of the base characteristic: a law of any form is followed, none becomes a cause",
-    )
-    knots_identified: int = Field(
-        12,
-        description="control points of the law that is identified again with the causes in the model, smoothness "
-        "averaged over, and the most that may stand for a cause; on fourfold falls in a seventh of the range the band "
-        "covered 74 to 90 % with 9, 98 % with 12",
-    )
     knot_gain: float = Field(
         16.0,
         description="chi-square that another control point must remove, beyond what any cause removes, to be taken",
-    )
-    roughness: float = Field(
-        10.0,
-        description="prior size of d^2 log f / dt^2 over the control points; a sixfold fall by stick and slip has 8",
     )
     grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
     fits: float = Field(

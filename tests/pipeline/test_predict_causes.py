@@ -45,7 +45,7 @@ def result_of(name):
     cable, protocol = CABLES[name]
     test = hidden_test(cable, protocol, largest=LARGEST, seed=21)
     causes = [cause for cause in CATALOGUE if cause.name == name]
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
     part = present(bench, conclude(bench, SETTINGS), SETTINGS)
     specimen = SpecimenPart(id="hidden", length_m=cable.length, diameter_m=0.005, folder=".", moving_bearing="left")
     return Result(status="measured", specimen=specimen, diagnosis=part)

@@ -1,6 +1,6 @@
 """What the characteristic may be beyond the base model: its form, friction between the wires, and set.
 
-nonlinear_stiffness  another control point: f_EI has a form the spline of the base model cannot follow
+nonlinear_stiffness  the law of the base model may have any form; a cause in the paper's own two steps alone
 hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached; the law moves along or stays (see `rod.section`)
 stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.cause import Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
-from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
 Array = NDArray[np.float64]
@@ -43,34 +42,12 @@ class NonlinearStiffness:
         return 0.05 * facts.moment_scale / facts.curvature_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """A change around one of six places of the range of curvatures, off the usual control points."""
-        return tuple(
-            Variant("at a part of the range of curvatures", at=place, tuned=("at",), at_range=(0.02, 0.98))
-            for place in (0.07, 0.22, 0.4, 0.6, 0.8, 0.93)
-        )
+        """None beside a law of any form; see `pipeline.diagnosis.rediscovery`."""
+        return ()
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """One more control point at the share ``at`` of the spline's range, ``amount`` off the spline so far."""
-        law = model.bending.characteristic
-        if not isinstance(law, Characteristic):
-            raise ValueError("only a spline characteristic can be given another control point")
-        low, high = (law.knots[0], law.knots[-1]) if law.knots.size > 1 else (0.0, facts.curvature_scale)
-        here = low + variant.at * (high - low)
-        knots = law.knots if law.knots.size > 1 else np.array([low, high])
-        # a natural spline through points of a natural spline is that spline: without an amount nothing changes
-        ordinates = law.f(np.append(knots, here))
-        ordinates[-1] += amount
-        closest = float(np.min(np.abs(knots - here)))
-        if closest < 1e-3 * (high - low):
-            knots, ordinates = knots.copy(), ordinates[:-1]
-            ordinates[int(np.argmin(np.abs(knots - here)))] += amount
-            changed = Characteristic(knots, ordinates, law.reading, law.even, law.abscissa)
-        else:
-            order = np.argsort(np.append(knots, here))
-            changed = Characteristic(
-                np.append(knots, here)[order], ordinates[order], law.reading, law.even, law.abscissa
-            )
-        return replace(model, bending=replace(model.bending, characteristic=changed))
+        """The model as it is."""
+        return model
 
 
 @dataclass(frozen=True)

@@ -122,8 +122,7 @@ def as_one_form(observation: Observation, fitted: Fit, settings: DiagnosisSettin
         return fitted
     variant, amount, stiffer = spot
     alone = Extension(extension.base, extension.facts, (Term(extension.terms[0].cause, variant),))
-    start = alone.start(fitted.vector, (amount,))
-    start[: len(alone.base.knots)] += np.log1p(stiffer)
+    start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
     one = fit_from(observation, alone, start, fitted, settings)
     as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + worse
     return one if as_well else fitted

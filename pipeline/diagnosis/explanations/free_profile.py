@@ -85,7 +85,7 @@ def in_waves(fitted: Fit, cause: Cause, count: int) -> tuple[Extension, Array]:
     waves = np.column_stack([np.ones_like(position), *(profile(term.variant, position) for term in terms)])
     mean, *amounts = np.linalg.lstsq(waves, deviation(uniform, varying, cause), rcond=None)[0]
     if cause.unit == "-":
-        vector[: len(rest.base.knots)] += np.log1p(max(mean, -0.9))
+        vector = rest.base.stiffer(vector, 1.0 + max(mean, -0.9))
         amounts = [amount / (1.0 + max(mean, -0.9)) for amount in amounts]
     elif (bend := rest.base.pre_curvature_index) is not None:
         vector[bend] += mean

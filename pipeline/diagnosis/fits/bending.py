@@ -1,10 +1,9 @@
 """What bends the cable, in closed form: from the numbers of a model's vector to directions of cable and rig.
 
-Control points of the law, K0, length and the displacements are parameters of `rod.parameters`, profiles along the cable
+Unknowns of the law, K0, length and the displacements are parameters of `rod.parameters`, profiles along the cable
 bases of them. Every other number of a cause (friction between the wires and its slip, friction and springs of the
-bearings, stiff ends, loads, a yielding frame, a set, the place of a control point) is told by what it changes in the
-test when it moves by a millionth of its range (`rod.parameters.Toward`): a cause says in `apply` what it does, and
-nowhere how fast.
+bearings, stiff ends, loads, a yielding frame, a set) is told by what it changes in the test when it moves by a
+millionth of its range (`rod.parameters.Toward`): a cause says in `apply` what it does, and nowhere how fast.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from pipeline.diagnosis.causes.profile import along_cable, is_profile
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.observations.prediction import Facts, Model, end_for_end
 from pipeline.diagnosis.observations.simulation import Run, base_derivatives, freedom
-from rod.characteristic import Characteristic
 from rod.parameters import Parameter, Toward, comparable
 from rod.sensitivity import Derivatives
 
@@ -107,15 +105,13 @@ def combined(here: Run, facts: Facts, bends: Bends) -> tuple[Derivatives, ...]:
 
 
 def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> None:
-    """Control points, K0, errors of displacements and length.
+    """Unknowns of the law, K0, errors of displacements and length.
 
-    The rod knows ordinates of its law in N m^2, K0 and the length; the vector has logarithms of ordinates and a
-    relative error of the length. The error of a step's displacement moves that step alone.
+    The rod knows the parameters of its law, K0 and the length; the vector has a relative error of the length. The error
+    of a step's displacement moves that step alone.
     """
     base, bending = extension.base, here.bending
-    law = bending.characteristic
-    # where a cause has put further control points into the law, a base ordinate moves them along the base spline
-    share = base.law_directions(vector, law.knots if isinstance(law, Characteristic) else base.knots)
+    share = base.law.by(vector[: base.law.size])
     bends.names.append("ordinates")
     bends.rows.extend(np.hstack([share, np.zeros((len(share), bends.size - share.shape[1]))]))
     bends.at.extend(range(share.shape[1]))
@@ -148,9 +144,7 @@ def _of_number(bends: Bends, extension: Extension, vector: Array, base_model: Mo
     trial, step = vector.copy(), SHORT * float(extension.steps[j])
     trial[j] += step
     there = plainly(extension, trial, base_model)
-    laws = [model.bending.characteristic for model in (plain, there)]
-    points = [law.knots.size if isinstance(law, Characteristic) else 0 for law in laws]
-    known = points[0] == points[1] and comparable(plain.bending, there.bending)
+    known = comparable(plain.bending, there.bending)
     if not known or freedom(plain, extension.facts) != freedom(there, extension.facts):
         return False
     bends.travel[:, j] = (there.shift - plain.shift) / step

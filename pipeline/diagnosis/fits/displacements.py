@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
+from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import doubtful
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
 
@@ -55,10 +57,11 @@ def with_exact_displacements(
     ``exact`` is a fit of the base model with exact displacements.
     """
     known, given = exact.extension.base, scattered.extension.base
-    law, moved, first = given.characteristic(scattered.vector), len(given.moved), len(given.knots)
+    law, moved, first = given.characteristic(scattered.vector), len(given.moved), given.law.size
+    assert isinstance(law, StiffnessLaw) and isinstance(known.law, AnyLaw)
     rest = np.delete(scattered.vector[first:], np.arange(moved) + len(given.names) - 2 - moved - first)
     extension = replace(scattered.extension, base=known, facts=exact.extension.facts)
-    found = fit_from(observation, extension, np.r_[known.following(law), rest], exact, settings)
+    found = fit_from(observation, extension, np.r_[known.law.basis.projected(law.rise), rest], exact, settings)
     return None if found.run.prediction is None else found
 
 

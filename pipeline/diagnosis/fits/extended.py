@@ -1,9 +1,9 @@
 """The characteristic of a fitted model as a curve with its band, and how far one model's f_EI lies from another's.
 
 All curves are over the curvature K = K0 + D on the visited range, tangent reading first; bands are 1 sigma from the
-covariance of the fit, correlations between control points and K0 included:
+covariance of the fit, correlations between the coefficients a_i of log f and K0 included:
 
-    df = sum_i (df/df_i) df_i - f'(D) dK0,   dm = sum_i (dm/df_i) df_i - f(D) dK0,   at fixed K, D = K - K0.
+    d log f = sum_i B_i da_i - (d log f / dK) dK0,   dm = sum_i (dm / da_i) da_i - f dK0,   at fixed K.
 
 Amounts and forms of the causes in the model are errors like these: all share one factor of their joint covariance.
 What else is believed widens the band later (`pipeline.diagnosis.posterior.mixture`).
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.result import CauseForm, Curve
-from rod.characteristic import Characteristic
+from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
 
@@ -40,28 +40,27 @@ class Stated(NamedTuple):
 
 
 def stated(fitted: Fit, kappa: Array) -> Stated:
-    """f_EI of a fitted model at curvatures (n,) 1/m; as little as a thousandth of the largest where it falls lower."""
+    """f_EI of a fitted model at curvatures (n,) 1/m."""
     law, K0 = law_of(fitted), fitted.extension.base.pre_curvature(fitted.vector)
     tangent = law.tangent(kappa, K0)
-    tangent = np.maximum(tangent, 1e-3 * np.max(tangent))
     rows = np.zeros((len(kappa) + 1, fitted.extension.size))
-    rows[:-1] = _by_parameters(fitted, law, kappa)[0] / tangent[:, None]
+    rows[:-1] = _by_parameters(fitted, law, kappa)[0]
     if (bend := fitted.extension.base.pre_curvature_index) is not None:
         rows[-1, bend] = 1.0
     return Stated(np.append(np.log(tangent), K0), rows)
 
 
-def _by_parameters(fitted: Fit, law: Characteristic, K: Array) -> tuple[Array, Array]:
-    """Derivatives (n, p) of f_EI and of the moment at curvatures (n,)."""
-    base = fitted.extension.base
-    K0, own = base.pre_curvature(fitted.vector), base.law_directions(fitted.vector, law.knots)
-    by_tangent, by_moment = np.zeros((2, len(K), fitted.extension.size))
-    by_tangent[:, : own.shape[1]] = law.tangent_by_ordinates(K, K0) @ own  # the parameters are logarithms
-    by_moment[:, : own.shape[1]] = law.moment_by_parameters(K, K0) @ own
+def _by_parameters(fitted: Fit, law: StiffnessLaw, K: Array) -> tuple[Array, Array]:
+    """Derivatives (n, p) of log f_EI and of the moment at curvatures (n,)."""
+    base, own = fitted.extension.base, law.parameters
+    K0 = base.pre_curvature(fitted.vector)
+    by_log, by_moment = np.zeros((2, len(K), fitted.extension.size))
+    by_log[:, :own] = law.log_tangent_by_parameters(K, K0)
+    by_moment[:, :own] = law.moment_by_parameters(K, K0)
     if (bend := base.pre_curvature_index) is not None:
-        by_tangent[:, bend] = -_slope(law, K, K0)
+        by_log[:, bend] = -law.log_slope(K, K0)
         by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
-    return by_tangent, by_moment
+    return by_log, by_moment
 
 
 def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: Fit | None = None) -> Curve:
@@ -80,14 +79,15 @@ def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: F
     law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
     low, high = visited(fitted)
     K = np.linspace(max(low, K0), high, points)
-    by_tangent, by_moment = _by_parameters(fitted, law, K)
+    by_log, by_moment = _by_parameters(fitted, law, K)
     bend = base.pre_curvature_index
     used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
     by_rest = np.zeros(fitted.extension.size)
     if bend is not None:
         by_rest[bend] = 1.0
-    apart_f, apart_m, apart_rest = [by_tangent[:, used] @ root], [by_moment[:, used] @ root], [by_rest[used] @ root]
+    apart_f, apart_m = [tangent[:, None] * by_log[:, used] @ root], [by_moment[:, used] @ root]
+    apart_rest = [by_rest[used] @ root]
     if other is not None:
         there, rest = law_of(other), other.extension.base.pre_curvature(other.vector)
         apart_f.append((there.tangent(K, rest) - tangent)[:, None])
@@ -98,14 +98,16 @@ def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: F
     excess = K - K0
     # at K = K0 the secant is the tangent, and so is its band
     far = excess > 1e-3 * (high - K0)
-    secant_std = np.where(far, moment_std / np.where(far, excess, 1.0), tangent_std)
+    excess = np.where(far, excess, 1.0)
+    secant = np.where(far, moment / excess, tangent)
+    secant_std = np.where(far, moment_std / excess, tangent_std)
     return Curve(
         kappa_per_m=K.tolist(),
         moment_Nm=moment.tolist(),
         moment_std_Nm=moment_std.tolist(),
         tangent_Nm2=tangent.tolist(),
         tangent_std_Nm2=tangent_std.tolist(),
-        secant_Nm2=law.secant(K, K0).tolist(),
+        secant_Nm2=secant.tolist(),
         secant_std_Nm2=secant_std.tolist(),
         supported=[True] * points,
         tangent_factor_Nm2=factor.tolist(),
@@ -113,10 +115,11 @@ def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: F
     )
 
 
-def law_of(fitted: Fit) -> Characteristic:
-    """f_EI of a fitted model, with the control point a cause may have put into the spline."""
-    law = fitted.extension.model(fitted.vector).bending.characteristic
-    return law if isinstance(law, Characteristic) else fitted.extension.base.characteristic(fitted.vector)
+def law_of(fitted: Fit) -> StiffnessLaw:
+    """f_EI of a fitted model whose law may have any form."""
+    law = fitted.extension.base.characteristic(fitted.vector)
+    assert isinstance(law, StiffnessLaw)
+    return law
 
 
 def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = None) -> list[CauseForm]:
@@ -152,18 +155,16 @@ def _root(fitted: Fit, covariance: Array | None) -> tuple[list[int], Array]:
     """Positions in the vector of law, K0 and the causes' amounts and forms, and a factor (k, k) of their covariance."""
     base = fitted.extension.base
     bend = base.pre_curvature_index
-    used = [*range(len(base.knots)), *([] if bend is None else [bend])]
+    used = [*range(base.law.size), *([] if bend is None else [bend])]
     used += range(len(base.names), fitted.extension.size)
-    whole = (fitted.covariance if covariance is None else covariance)[np.ix_(used, used)]
-    std = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    values, vectors = np.linalg.eigh(whole / np.outer(std, std))  # amounts and logarithms are of very different size
-    return used, std[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return used, factor_of((fitted.covariance if covariance is None else covariance)[np.ix_(used, used)])
 
 
-def _slope(law: Characteristic, K: Array, K0: float) -> Array:
-    """df/dK, (n,) N m^3."""
-    step = 1e-5 * float(np.ptp(K))
-    return np.asarray((law.tangent(K + step, K0) - law.tangent(K - step, K0)) / (2.0 * step))
+def factor_of(covariance: Array) -> Array:
+    """Factors (..., p, p) of covariances, also where data that hardly tell some unknowns leave them nearly singular."""
+    std = np.sqrt(np.maximum(np.einsum("...ii->...i", covariance), 1e-300))  # unknowns are of very different size
+    values, vectors = np.linalg.eigh(covariance / std[..., :, None] / std[..., None, :])
+    return np.asarray(std[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
 def stiffness_change(before: Fit, after: Fit) -> float:

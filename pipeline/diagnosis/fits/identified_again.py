@@ -1,10 +1,9 @@
-"""f_EI identified again, with the causes in the model that were found: a fine law, averaged over how smooth it may be.
+"""f_EI identified again, with the causes in the model that were found, averaged over what is not known of its form.
 
-The diagnosis looks for causes with a coarse law under one prior, since a law of many control points would eat them.
-What is named is in the model and can be eaten no more, so its law may be as fine as that of the identification: many
-control points, smooth along the curvature or along the moment, how smooth and how steep at rest averaged over by their
-evidence (`pipeline.diagnosis.fits.spline_prior`, `pipeline.diagnosis.fits.spline_average`). Amounts and forms of the
-causes, the bearing axes, scale and length are unknowns beside the law, and their errors are in its band.
+The diagnosis weighs causes beside a law of one wide prior. What is named is in the model, and its law is found as in
+the inverse problem: as the mean over all priors of its form (`rod.law_prior`), along an abscissa that is laid along the
+law found. Amounts and forms of the causes, the bearing axes, scale and length are unknowns beside the law, and their
+errors are in its band.
 
 Where even the extended model leaves more than noise, rows of that kind (forces, chords and shapes) count so much less:
 the misfit then is an error of the model, and neither the law nor its band may take it for knowledge.
@@ -18,19 +17,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
+from pipeline.diagnosis.fits.fit import Fit, evaluated
+from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import suspect
-from pipeline.diagnosis.fits.spline_average import Averaged, average
-from pipeline.diagnosis.fits.spline_prior import FIRST_SIZES, places_of
-from pipeline.diagnosis.fits.workbench import with_knots
+from pipeline.diagnosis.fits.workbench import laid_along
 from pipeline.diagnosis.observations.observation import Observation, of_hold
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.law_prior import Posterior, averaged, priors
 
 Array = NDArray[np.float64]
 
-TAUS = (0.05, 60.0)
-"""Range of the roughness of log f that is averaged over: from nearly straight to a change by a factor e^7."""
+LAYINGS, MOVES, SETTLED = 2, 6, 0.05
+"""Times that the abscissa is laid along the law found, steps to the mean on each, and the standard deviations by which
+the unknowns may still move then."""
+
+LAW_STEP, SHORTER = 1.0, 4
+"""Of log c in one step: a factor e; and halvings of a step that leads to a cable without equilibrium."""
 
 FORGOTTEN = 100.0
 """Plausible sizes: prior of the amount of a cause where data tell nothing of it, so that its band is not infinite."""
@@ -69,32 +71,40 @@ def identified_again(
     *,
     force_errors: Sequence[Array] = (),
 ) -> Identified:
-    """The law of a fitted model identified again, or the fit as it is where a finer law has no equilibrium.
-
-    Two fits: one under a wide prior, whose linearisation tells along what and how smooth the law is; then one under the
-    likeliest prior, from whose linearisation mean and covariance over all priors follow.
+    """The law of a fitted model identified again; the fit as it is where that has no equilibrium.
 
     ``force_errors`` (n,) N each are errors of one standard deviation that the forces of all steps share.
     """
-    if fitted.extension.base.straight or len(fitted.extension.base.knots) < 3:
-        return Identified(fitted, fitted.covariance)
-    tau, slope = FIRST_SIZES
-    extension, vector = with_knots(fitted, settings.knots_identified)
-    base = replace(extension.base, roughness=tau, rest_slope=slope, places=None)
-    rich = _fit(observation, replace(extension, base=base), vector, fitted, settings)
-    if rich is None:
-        return Identified(fitted, fitted.covariance)
-    likely = _averaged(observation, rich).prior
-    base = replace(base, roughness=likely.tau, rest_slope=likely.slope, places=likely.places)
-    settled = _fit(observation, replace(extension, base=base), rich.vector, rich, settings) or rich
-    posterior = _averaged(observation, settled)
-    mean = _at(observation, settled, posterior.mean)
-    found = settled if mean is None else mean
-    covariance = posterior.covariance
+    found = fitted
+    for _ in range(LAYINGS):
+        extension, vector = laid_along(found)
+        there = _at(observation, replace(found, extension=extension), vector)
+        if there is None:
+            break
+        found = _at_mean(observation, there)
+    covariance = _averaged(observation, found).covariance
     for errors in force_errors:
         moved = _moved_by_forces(observation, found, covariance, errors)
         covariance = covariance + np.outer(moved, moved)
     return _with_other_forms(observation, Identified(found, covariance), settings)
+
+
+def _at_mean(observation: Observation, start: Fit) -> Fit:
+    """The model at the mean over all priors of its law, by whole steps as in `rod.inverse.fit`."""
+    here = start
+    for _ in range(MOVES):
+        posterior = _averaged(observation, here)
+        move = posterior.mean - here.vector
+        if np.all(np.abs(move) <= SETTLED * np.sqrt(np.diag(posterior.covariance))):
+            break
+        law = here.extension.base.law
+        move = move * min(1.0, LAW_STEP / max(float(np.abs(move[: law.size]).max()), 1e-300))
+        trials = (here.extension.brought_inside(here.vector + 0.5**k * move) for k in range(SHORTER))
+        there = next((one for one in (_at(observation, here, trial) for trial in trials) if one is not None), None)
+        if there is None:
+            break
+        here = there
+    return here
 
 
 def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, errors: Array) -> Array:
@@ -108,14 +118,6 @@ def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, err
     shift = np.zeros(count)
     shift[observation.rows.force] = np.concatenate(rows)
     return np.asarray(response @ (fitted.jacobian[:count].T @ (_weights(observation, fitted) ** 2 * shift)))
-
-
-def _fit(
-    observation: Observation, extension: Extension, vector: Array, near: Fit, settings: DiagnosisSettings
-) -> Fit | None:
-    """Fit from a vector; None where that has no equilibrium."""
-    found = fit_from(observation, extension, vector, near, settings)
-    return None if found.run.prediction is None else found
 
 
 def _with_other_forms(observation: Observation, again: Identified, settings: DiagnosisSettings) -> Identified:
@@ -164,16 +166,15 @@ def _other_forms(observation: Observation, fitted: Fit, settings: DiagnosisSetti
     return names, np.hstack(columns)
 
 
-def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = None) -> Averaged:
-    """Posterior over all priors of the law's form, from the linearisation of a fit; see `spline_average`.
+def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = None) -> Posterior:
+    """Posterior over all priors of the law's form, from the linearisation of a fit.
 
     ``beside`` (N, j) are traces of further unknowns, each of standard deviation one and mean zero.
     """
-    base = fitted.extension.base
-    law, K0 = base.characteristic(fitted.vector), base.pre_curvature(fitted.vector)
+    law = fitted.extension.base.law
+    assert isinstance(law, AnyLaw)
     value, J = _data_rows(observation, fitted, np.zeros((len(fitted.residual), 0)) if beside is None else beside)
-    unknowns = np.r_[fitted.vector, np.zeros(J.shape[1] - len(fitted.vector))]
-    return average(value, J, unknowns, places_of(law, base.knots + K0, K0), TAUS)
+    return averaged(value, J, np.r_[fitted.vector, np.zeros(J.shape[1] - len(fitted.vector))], priors(law.basis))
 
 
 def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:

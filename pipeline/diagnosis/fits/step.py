@@ -1,10 +1,9 @@
 """One step of a fit: the least squares of the linear model within what a cable can be.
 
-Bounds are rows G d >= h of the step d: amounts of one sign, places within their range, how far one step may reach, and
-a law that stays positive. A law is a spline through positive control points, and between two that differ much it swings
-below zero, where no cable has an equilibrium. A step that is cut at such a bound leaves all other numbers where they
-would be without it: the fit creeps along the bound, and where its patience ends is chance. The least squares with the
-bounds in them have one solution, and so has a fit whose minimum lies on a bound.
+Bounds are rows G d >= h of the step d: amounts of one sign, places within their range, how far one step may reach. A
+step that is cut at such a bound leaves all other numbers where they would be without it: the fit creeps along the
+bound, and where its patience ends is chance. The least squares with the bounds in them have one solution, and so has a
+fit whose minimum lies on a bound.
 
 Source: Lawson and Hanson, *Solving Least Squares Problems*, ch. 23 (least distance programming by NNLS).
 """
@@ -22,13 +21,10 @@ from pipeline.diagnosis.fits.extension import Extension
 Array = NDArray[np.float64]
 
 LAW_REACH = 0.7
-"""Logarithm by which one step may move an ordinate of the law at most: a factor two."""
+"""Logarithm by which one step may move an unknown of the law at most: a factor two."""
 
 BEND_REACH = 0.2
 """Of the curvature scale: how far one step may move K0 at most."""
-
-SWING = 0.1
-"""Share of the lower of two neighbouring control points below which the law between them is held."""
 
 INSIDE = 1e-9
 """Of a bound's own scale; what exceeds it by less is rounding."""
@@ -46,7 +42,7 @@ class Bounds(NamedTuple):
 
 
 def lasting(extension: Extension, vector: Array) -> Bounds:
-    """What no cable goes beyond (m, p): the signs of amounts, the ranges of places, a positive law."""
+    """What no cable goes beyond (m, p): the signs of amounts, the ranges of places."""
     rows, least = [], []
     for at, term in zip(extension.amounts_at, extension.terms, strict=True):
         if term.cause.sign:
@@ -59,26 +55,12 @@ def lasting(extension: Extension, vector: Array) -> Bounds:
                 [np.eye(1, extension.size, j)[0] / (high - low), -np.eye(1, extension.size, j)[0] / (high - low)]
             )
             least.extend([(low - vector[j]) / (high - low), (vector[j] - high) / (high - low)])
-    own = Bounds(np.array(rows).reshape(-1, extension.size), np.minimum(least, 0.0))
-    return own.joined(_positive_law(extension, vector))
-
-
-def _positive_law(extension: Extension, vector: Array) -> Bounds:
-    """The law between two control points no lower than a share of the lower one, or than it is."""
-    base = extension.base
-    if len(base.knots) < 3:
-        return Bounds(np.zeros((0, extension.size)), np.zeros(0))
-    ordinates = base.ordinates(vector)
-    moves = base.between * ordinates
-    lower = np.repeat(np.minimum(ordinates[1:], ordinates[:-1]), len(moves) // (len(ordinates) - 1))
-    law, moves = moves.sum(axis=1) / lower, moves / lower[:, None]
-    rows = np.hstack([moves, np.zeros((len(moves), extension.size - moves.shape[1]))])
-    return Bounds(rows, np.minimum(SWING - law, 0.0))
+    return Bounds(np.array(rows).reshape(-1, extension.size), np.minimum(least, 0.0))
 
 
 def reach(extension: Extension) -> Bounds:
     """How far one step may go (m, p)."""
-    far = dict.fromkeys(range(len(extension.base.knots)), LAW_REACH)
+    far = dict.fromkeys(range(extension.base.law.size), LAW_REACH)
     if (bend := extension.base.pre_curvature_index) is not None:
         far[bend] = BEND_REACH * extension.facts.curvature_scale
     unit = np.eye(extension.size)[list(far)] / np.array(list(far.values()))[:, None]

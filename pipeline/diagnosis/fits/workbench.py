@@ -18,7 +18,7 @@ from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit, fit, fit_from
-from pipeline.diagnosis.fits.knots import place_knots
+from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
@@ -26,7 +26,9 @@ from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.compliance_law import refreshed
 from rod.measurement import MeasuredTest
+from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
 
@@ -70,9 +72,7 @@ def prepare(
     faults: Faults,
     settings: DiagnosisSettings,
     *,
-    knots: int,
     causes: Sequence[Cause] = SUSPECTS,
-    straight: bool = False,
 ) -> Workbench | Message:
     """Fit the base model and score all causes.
 
@@ -81,11 +81,7 @@ def prepare(
     faults : Faults
         The test and what of it is not to be used.
     settings : DiagnosisSettings
-    knots : int
-        Control points of the base characteristic.
     causes : sequence of Cause
-    straight : bool
-        Hold K0 at zero.
 
     Returns
     -------
@@ -95,15 +91,7 @@ def prepare(
     test = faults.test
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
-    base = start(
-        test,
-        facts,
-        knots=knots,
-        elements=settings.grid,
-        smoothness=settings.roughness,
-        straight=straight,
-        exact=settings.displacement_std,
-    )
+    base = start(test, facts, elements=settings.grid, exact=settings.displacement_std)
     fitted = _robust_fit(observation, base, facts, settings)
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
@@ -120,11 +108,7 @@ def prepare(
         observation = observe(
             test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
         )
-        spread = with_knots(fitted, len(base.knots)) if len(base.knots) > 2 else (fitted.extension, fitted.vector)
-        again = fit_from(observation, *spread, fitted, settings)
-        if again.run.prediction is None:  # knots elsewhere may let the moment fall between them
-            again = fit_from(observation, fitted.extension, fitted.vector, fitted, settings)
-        fitted = again
+        fitted = fit_from(observation, *laid_along(fitted), fitted, settings)
     suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
     return scored(test, observation, fitted, suspicion, settings)
 
@@ -166,12 +150,14 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
     return found if best is None else best
 
 
-def with_knots(fitted: Fit, count: int) -> tuple[Extension, Array]:
-    """The model with ``count`` control points on the range it visits, and its vector along the spline so far."""
-    knots, base = place_knots(0.0, float(fitted.excess.max()), count), fitted.extension.base
-    moved = replace(base, knots=knots)
-    ordinates = moved.following(base.characteristic(fitted.vector))
-    return replace(fitted.extension, base=moved), np.r_[ordinates, fitted.vector[len(base.knots) :]]
+def laid_along(fitted: Fit) -> tuple[Extension, Array]:
+    """The model with the abscissa of its law laid along the law found, over the bends visited, and its vector there."""
+    base, count = fitted.extension.base, fitted.extension.base.law.size
+    law, bends = base.characteristic(fitted.vector), fitted.excess
+    assert isinstance(law, StiffnessLaw)
+    basis = refreshed(law.rise, fitted.covariance[:count, :count], float(bends.min()), float(bends.max()))
+    extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis)))
+    return extension, np.r_[basis.projected(law.rise), fitted.vector[count:]]
 
 
 def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
@@ -183,7 +169,7 @@ def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSe
     base = fitted.extension.base
     if "mounted" in fitted.extension.facts.branch or base.pre_curvature_index is None:
         return fitted
-    best, count = fitted, len(base.knots)
+    best, count = fitted, base.law.size
     for shift in (OTHER_SIDE, -OTHER_SIDE):
         vector = fitted.vector.copy()
         vector[:count] = np.maximum.accumulate(vector[:count][::-1])[::-1]

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import fit
-from pipeline.diagnosis.fits.knots import place_knots
+from pipeline.diagnosis.fits.laws import following
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe
@@ -195,19 +195,19 @@ def planned_bench(plan: Plan, settings: DiagnosisSettings) -> Workbench:
 def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
     """The planned test made without noise, its base model fitted and all causes scored."""
     law = plan.law or StickSlip(plan.stiffness, plan.stiffness_bent, plan.transition)
+    bends = np.linspace(0.0, 1.3 * facts.curvature_scale, 400)
+    tangent = law.tangent(bends + plan.pre_curvature, plan.pre_curvature)
+    form, coefficients = following(tangent, bends, unit=plan.stiffness_bent)
     base = Base(
-        knots=place_knots(0.0, 1.3 * facts.curvature_scale, settings.knots),
-        stiffness=plan.stiffness_bent,
+        law=form,
         length=plan.length,
         scale_std=plan.scale_std,
         length_std=1e-3 * plan.length_std_mm / plan.length,
         elements=settings.grid,
-        roughness=settings.roughness,
         first=plan.pre_curvature,
     )
     vector = base.neutral()
-    tangent = law.tangent(base.knots + plan.pre_curvature, plan.pre_curvature)
-    vector[: len(base.knots)] = np.log(tangent / base.stiffness)
+    vector[: form.size] = coefficients
     made = run(base.model(vector), facts)
     if made.prediction is None:
         raise ValueError(f"the planned test cannot be made: {made.failed and made.failed.advice}")
@@ -235,7 +235,7 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         tolerance=settings.tolerance,
         near=made,
     )
-    suspicion = suspect(observation, fitted, CATALOGUE, visible=settings.visible, trace=settings.trace)
+    suspicion = suspect(observation, fitted, SUSPECTS, visible=settings.visible, trace=settings.trace)
     return scored(test, observation, fitted, suspicion, settings)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr
 
-from pipeline.diagnosis.fits.extended import stated
+from pipeline.diagnosis.fits.extended import factor_of, stated
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
@@ -108,7 +108,7 @@ def _refits(
             own = found.rest == rest
             share = np.exp(found.log_weight[own] - logsumexp(found.log_weight[own]))
             kept = np.flatnonzero(own)[share > NEGLIGIBLE]
-            root = here.rows @ _root(found.covariance[kept])
+            root = here.rows @ factor_of(found.covariance[kept])
             mean = here.values + shifts.get((id(fitted), rest), 0.0) - centre.values + found.move[kept] @ here.rows.T
             yield _Parts(probability * share[share > NEGLIGIBLE], mean, root)
 
@@ -119,7 +119,7 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Cen
     size = np.linalg.norm(base.jacobian, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     pseudo = np.linalg.pinv(base.jacobian / size, rcond=1e-7) / size[:, None]
-    own = here.rows @ _root(base.covariance)
+    own = here.rows @ factor_of(base.covariance)
     weight, mean, root = [], [], []
     for one in posterior.believed:
         if one.found or len(one.causes) != 1 or one.something_else or one.probability < NEGLIGIBLE:
@@ -140,13 +140,6 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Cen
     if not weight:
         return _Parts(np.zeros(0), np.zeros((0, len(centre.values))), np.zeros((0, len(centre.values), 1)))
     return _Parts(np.concatenate(weight), np.vstack(mean), np.vstack(root))
-
-
-def _root(covariance: Array) -> Array:
-    """Factors (..., p, p) of covariances, also where data that hardly tell some unknowns leave them nearly singular."""
-    std = np.sqrt(np.maximum(np.einsum("...ii->...i", covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / std[..., :, None] / std[..., None, :])
-    return np.asarray(std[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
 def _half_width(weight: Array, mean: Array, std: Array) -> Array:

@@ -29,7 +29,7 @@ BY_NAME = {cause.name: cause for cause in CATALOGUE}
 def bench():
     test = hidden_test(Cable(), LOOP, largest=0.0138, seed=2)
     facts = facts_of(test)
-    base = start(test, facts, knots=5, elements=60, smoothness=10.0)
+    base = start(test, facts, elements=60)
     model = base.model(base.neutral())
     return facts, model, run(model, facts)
 

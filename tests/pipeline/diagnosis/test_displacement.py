@@ -35,7 +35,7 @@ def unlogged(test):
 
 
 def bench_of(test):
-    return prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=5)
+    return prepare(faults_of_input(test, SETTINGS), SETTINGS)
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)

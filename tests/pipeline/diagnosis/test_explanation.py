@@ -27,7 +27,7 @@ ELEMENTS = Slipping((2e-3, 1.3e-3), (1.0, 3.0))
 
 
 def prepared(cable, seed):
-    return prepare(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=seed), SETTINGS), SETTINGS, knots=5)
+    return prepare(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=seed), SETTINGS), SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_form_stands_beside_itself_only_where_its_place_is_its_own(plain):
 def test_a_steep_tilt_is_one_to_the_noise(tilt):
     """6.5 degrees from 0.86 m foreshorten by 0.64 %: the perspective alone left several times the noise."""
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=3, reading=Reading(tilt=tilt, distance=0.86))
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
     index = [cause.name for cause in SUSPECTS].index("camera_tilt")
     found = refit_one(bench.observation, bench.base, bench.suspicion, index, SETTINGS)
     amount, std = found.amount(SUSPECTS[index])
@@ -128,7 +128,7 @@ def test_rows_left_out_of_a_refit_do_not_matter(plain):
 
 
 def test_the_band_holds_the_distance_to_another_answer(plain):
-    count = len(plain.base.extension.base.knots)
+    count = plain.base.extension.base.law.size
     other = replace(
         plain.base, vector=plain.base.vector + np.r_[np.full(count, 0.03), np.zeros(len(plain.base.vector) - count)]
     )

@@ -32,7 +32,7 @@ def spoiled(test, change):
 
 
 def fault(test):
-    return _data_at_fault(prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=5), SETTINGS)
+    return _data_at_fault(prepare(faults_of_input(test, SETTINGS), SETTINGS), SETTINGS)
 
 
 @pytest.mark.parametrize("protocol", ["six", "loop"])

@@ -33,7 +33,7 @@ def three_waves(amount):
 def benched(cable, protocol, name, seed):
     causes = [cause for cause in CATALOGUE if cause.name == name]
     test = hidden_test(cable, protocol, largest=0.0138, seed=seed)
-    return prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    return prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
 
 
 @pytest.mark.parametrize(

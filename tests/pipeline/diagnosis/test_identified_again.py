@@ -22,7 +22,7 @@ def off(cable, name, protocol, largest, seed):
     """Relative rms error of f_EI, rms band, rms error in standard deviations; sizes of causes whose forms add up."""
     test = hidden_test(cable, protocol, largest=largest, seed=seed)
     causes = [cause for cause in CATALOGUE if cause.name == name]
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=SETTINGS.knots, causes=causes)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
     accepted = refit_one(bench.observation, bench.base, bench.suspicion, 0, SETTINGS)
     again = identified_again(bench.observation, accepted.fitted, SETTINGS)
     found = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)

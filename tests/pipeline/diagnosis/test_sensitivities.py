@@ -26,7 +26,7 @@ def test_place_and_width_of_a_spot_move_the_data_as_whole_simulations_say(turned
     facts, kinds = facts_of(test), {cause.name: cause for cause in CATALOGUE}
     held = [("stiffness_varying", 5, -0.1), ("nonlinear_stiffness", 4, 0.1), ("pre_curvature_varying", 4, 0.1)]
     terms = tuple(Term(kinds[name], kinds[name].variants(facts)[form]) for name, form, _ in held)
-    base = start(test, facts, knots=5, elements=120, smoothness=SETTINGS.roughness)
+    base = start(test, facts, elements=120)
     extension = Extension(base, facts, terms, turned=turned)
     amounts = tuple(share * 10.0 * kinds[name].plausible(facts) for name, _, share in held)
     vector, observation = extension.start(base.neutral(), amounts), observe(test, SETTINGS)
@@ -57,7 +57,7 @@ def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name,
     (cause,) = (cause for cause in CATALOGUE if cause.name == name)
     beside = next(one for one in CATALOGUE if one.name == ("in_plane_load" if name == "hysteresis" else "hysteresis"))
     terms = (Term(cause, cause.variants(FACTS)[form]), Term(beside, beside.variants(FACTS)[0]))
-    extension = Extension(start(TEST, FACTS, knots=5, elements=120, smoothness=SETTINGS.roughness), FACTS, terms)
+    extension = Extension(start(TEST, FACTS, elements=120), FACTS, terms)
     vector = extension.start(extension.base.neutral(), (cause.plausible(FACTS), 0.2 * beside.plausible(FACTS)))
     observation, base_model = observe(TEST, SETTINGS), extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), FACTS)

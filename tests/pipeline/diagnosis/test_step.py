@@ -43,7 +43,7 @@ def at_the_border():
 
 def test_a_law_at_the_border_of_what_has_an_equilibrium_is_a_minimum_like_any_other():
     test = at_the_border()
-    bench, moved = (prepare(faults_of_input(t, SETTINGS), SETTINGS, knots=6) for t in (test, nudged(test)))
+    bench, moved = (prepare(faults_of_input(t, SETTINGS), SETTINGS) for t in (test, nudged(test)))
     fitted = bench.base
     # creeping along the border, a fit ended at a chi-square of 142 with one processor, and of 223 with another
     assert fitted.converged

@@ -49,7 +49,7 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
     reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
     test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=4)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     scale, decay, lens = (names.index(n) for n in ("scale_error", "relaxation", "lens_distortion"))
     given = Pair(bench.suspicion.best(scale), bench.suspicion.best(decay), 0.0)
@@ -63,7 +63,7 @@ def test_each_half_of_a_pair_has_all_its_forms():
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
     cable = Cable(load=(-0.06, 0.06))
     test = hidden_test(cable, steps, largest=0.0138, seed=21, reading=Reading(lens=0.012))
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, knots=4)
+    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
     given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)

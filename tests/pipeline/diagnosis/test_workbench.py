@@ -59,7 +59,7 @@ def test_every_cause_leaves_a_trace_beside_a_base_model_at_its_limits():
     Without a trace the friction was never refitted, and a displacement offset named alone (probability 1).
     """
     trial = Trial(kind="hidden", protocol="three", seed=30000, names=("bearing_friction",), times=4.0)
-    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS, knots=SETTINGS.knots)
+    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS)
     assert not isinstance(bench, str), bench
     suspicion = bench.suspicion
     for name in ("bearing_friction", "bearing_stiffness"):

@@ -1,0 +1,128 @@
+"""The law of a base model as unknowns: of any form (`AnyLaw`), or the paper's spline through few points (`FewPoints`).
+
+Both turn unknowns of order one into a law and say what is known of them beforehand, as rows of unit variance. A law of
+any form has coefficients of log f_EI on the abscissa of both ways to the characteristic (`rod.stiffness_law`), positive
+whatever they are. Its prior here is a wide one, the same for all causes, so that none is preferred for what it leaves
+to the law: `rough` of `rod.law_prior` with tau of `ROUGHNESS`. A law of few points is for the paper's two steps alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.characteristic import Characteristic, ParametricCurve
+from rod.compliance_law import LawBasis, moment_basis
+from rod.law_prior import priors
+from rod.stiffness_law import StiffnessLaw
+
+Array = NDArray[np.float64]
+
+COEFFICIENTS = 16
+"""Of log f_EI: enough for a law of any form about which causes are weighed."""
+
+ROUGHNESS = 10.0
+"""Prior size of d^2 log f / dxi^2: a sixfold fall by stick and slip has 8."""
+
+REST_SLOPE = 1.0
+"""Prior size of d log f / dxi at rest: a cable that bends alike to both sides has none."""
+
+
+class Law(Protocol):
+    """What a base model asks of the unknowns of its law."""
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+
+    def curve(self, unknowns: Array) -> ParametricCurve:
+        """The law at unknowns (size,)."""
+
+    def by(self, unknowns: Array) -> Array:
+        """Change (k, size) of the curve's own k parameters with the unknowns."""
+
+    def stiffer(self, factor: float) -> Array:
+        """Change (size,) of the unknowns that makes the law so much stiffer."""
+
+    def prior(self) -> Array:
+        """Rows (m, size) of unit variance about zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnyLaw:
+    """Coefficients of log f_EI on a basis of bends."""
+
+    basis: LawBasis
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return self.basis.size
+
+    def curve(self, unknowns: Array) -> StiffnessLaw:
+        """The law at coefficients (size,)."""
+        return StiffnessLaw(self.basis.law(unknowns))
+
+    def by(self, unknowns: Array) -> Array:
+        """The coefficients are the law's own parameters."""
+        return np.eye(self.size)
+
+    def stiffer(self, factor: float) -> Array:
+        """B-splines of equal coefficients are a constant."""
+        return np.full(self.size, np.log(factor))
+
+    def prior(self) -> Array:
+        """A rough law that is flat at rest, as far as `ROUGHNESS` and `REST_SLOPE` let it."""
+        return self._prior
+
+    @cached_property
+    def _prior(self) -> Array:
+        rough = priors(self.basis)[0]
+        slope = self.basis.spline(self.basis.xi[2 * self.basis.rest], 1) / REST_SLOPE
+        weight, mode = np.linalg.eigh(rough.form / ROUGHNESS**2 + np.outer(slope, slope))
+        kept = weight > 1e-9 * weight[-1]  # the level has no prior
+        return np.asarray(np.sqrt(weight[kept])[:, None] * mode.T[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class FewPoints:
+    """Logarithms of the ordinates of a natural spline over a reference stiffness (N m^2); knots (p,) in 1/m.
+
+    ``abscissa`` as of `rod.characteristic.Characteristic`.
+    """
+
+    knots: Array
+    stiffness: float
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return len(self.knots)
+
+    def curve(self, unknowns: Array) -> Characteristic:
+        """The spline at unknowns (size,)."""
+        ordinates = self.stiffness * np.exp(unknowns)
+        return Characteristic.from_ordinates(self.knots, ordinates, reading="tangent", abscissa="excess")
+
+    def by(self, unknowns: Array) -> Array:
+        """The law's own parameters are its ordinates."""
+        return np.diag(self.stiffness * np.exp(unknowns))
+
+    def stiffer(self, factor: float) -> Array:
+        """All ordinates."""
+        return np.full(self.size, np.log(factor))
+
+    def prior(self) -> Array:
+        """Nothing."""
+        return np.zeros((0, self.size))
+
+
+def following(tangent: Array, bend: Array, *, unit: float) -> tuple[AnyLaw, Array]:
+    """A law of any form near a given one: f_EI (n,) N m^2 at rising bends (n,) 1/m from 0, and its coefficients."""
+    basis = moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS)
+    log_f = np.interp(basis.moments, bend, np.log(tangent / unit))
+    return AnyLaw(basis), np.asarray(np.linalg.lstsq(basis.at_ends, log_f, rcond=None)[0])

@@ -1,0 +1,87 @@
+"""A positive law of any form as one of the bend: log f_EI as a spline.
+
+It is `rod.compliance_law` with moment and bend exchanged:
+
+    log(f / unit) = sum_i a_i B_i(xi),    m = int_0^(K - K0) f dD,    f_EI = dm/dK = f
+
+It is the same family of laws on the same abscissa, but what stays when a coefficient changes is the law at all other
+bends, not at all other moments. So it is the one to fit where something else carries a part of the moment (friction
+between the wires): the curvatures of the cable are as the photos say, whoever carries how much.
+
+Units: bends in 1/m, stiffness in N m^2. Beyond the bends of its basis the stiffness is that of the nearer end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rod.compliance_law import ComplianceLaw, LawBasis, Pieces, pieces
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessLaw:
+    """One law: coefficients (p,) of log f on a basis of bends. A moment curve (`rod.characteristic.ParametricCurve`).
+
+    ``rise`` is the moment over the bend, told as `rod.compliance_law` tells the bend over the moment.
+    """
+
+    rise: ComplianceLaw
+
+    @property
+    def basis(self) -> LawBasis:
+        """Of the bends."""
+        return self.rise.basis
+
+    @cached_property
+    def curve(self) -> Pieces:
+        """The moment over the bend K - K0."""
+        return pieces(self.basis.moments, self.rise.bends, self.rise.rates, self.basis.rest)
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Largest tangent stiffness on the basis, N m^2; used for scaling only."""
+        return float(self.rise.rates.max())
+
+    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
+        return lambda K: self.curve.at(K - K0)
+
+    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Bending moment m(K, K0), N m."""
+        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[0]
+
+    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Tangent dm/dK, N m^2."""
+        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[1]
+
+    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Energy per length int_{K0}^{K} m dk, N."""
+        return self.curve.energy(np.asarray(K, float) - np.asarray(K0, float))
+
+    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative dm/dK0, N m^2: the law moves with K0."""
+        return -self.tangent(K, K0)
+
+    @property
+    def parameters(self) -> int:
+        """Number of coefficients."""
+        return self.basis.size
+
+    def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of the moment by the coefficients at fixed curvature, (n, p) N m."""
+        return self.rise.bend_by_coefficients(np.asarray(K, float) - np.asarray(K0, float))
+
+    def log_tangent_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of log f by the coefficients at fixed curvature, (n, p)."""
+        return self.basis.at(np.asarray(K, float) - np.asarray(K0, float))
+
+    def log_slope(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """D log f / dK, (n,) m."""
+        return self.rise.log_slope(np.asarray(K, float) - np.asarray(K0, float))
