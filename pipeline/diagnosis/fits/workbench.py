@@ -161,19 +161,21 @@ def laid_along(fitted: Fit) -> tuple[Extension, Array]:
 
 
 def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
-    """The model fitted from both sides of its K0 as well, where no photo shows the force-free cable; the best of all.
+    """The model fitted from both sides of its K0, and from a cable bent the other way at rest, where no photo shows it.
 
-    A law that rises from rest beside a K0 that is too small can fit three photos nearly as well as one that falls from
-    the true K0. So the starts have a law that rises nowhere: nothing less is known of it near rest than that.
+    A law that rises from rest beside a K0 that is too small, or of the other sign, can fit three photos nearly as well
+    as one that falls from the true K0. So the starts have a law that rises nowhere: nothing less is known of it near
+    rest than that. The best of all.
     """
     base = fitted.extension.base
     if "mounted" in fitted.extension.facts.branch or base.pre_curvature_index is None:
         return fitted
     best, count = fitted, base.law.size
-    for shift in (OTHER_SIDE, -OTHER_SIDE):
+    apart = OTHER_SIDE * fitted.extension.facts.curvature_scale
+    for shift in (apart, -apart, -2.0 * base.pre_curvature(fitted.vector)):
         vector = fitted.vector.copy()
         vector[:count] = np.maximum.accumulate(vector[:count][::-1])[::-1]
-        vector[base.pre_curvature_index] += shift * fitted.extension.facts.curvature_scale
+        vector[base.pre_curvature_index] += shift
         found = fit_from(observation, fitted.extension, vector, fitted, settings)
         if found.run.prediction is not None and found.chi2 < best.chi2:
             best = found

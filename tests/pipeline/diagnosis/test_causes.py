@@ -50,7 +50,7 @@ def test_signs_are_those_that_can_be_hidden():
     assert {cause.name for cause in CATALOGUE if cause.sign} == ONE_SIDED
 
 
-@pytest.mark.parametrize("name", sorted(CONTRACT))
+@pytest.mark.parametrize("name", sorted(CONTRACT - {"nonlinear_stiffness"}))  # the base law has any form
 def test_amount_zero_changes_nothing_and_a_plausible_one_something(bench, name):
     facts, model, before = bench
     cause = BY_NAME[name]

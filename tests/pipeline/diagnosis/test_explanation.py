@@ -124,7 +124,9 @@ def test_rows_left_out_of_a_refit_do_not_matter(plain):
     # both end within the tolerance of the same minimum: a thirtieth of a standard deviation
     std = np.sqrt(np.diag(plain.base.covariance))
     assert np.all(np.abs(found[0].vector - found[1].vector) < 0.1 * std)
-    assert np.all(found[1].residual[:rows][plain.observation.rows.step == 3] > 40.0)
+    apart = (found[1].residual - found[0].residual)[:rows]
+    # what was added to the rows left out is all there, as far as the two fits agree on them
+    assert np.allclose(apart, spoilt.added, atol=0.5)
 
 
 def test_the_band_holds_the_distance_to_another_answer(plain):

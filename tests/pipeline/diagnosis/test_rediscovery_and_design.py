@@ -28,6 +28,7 @@ def plans():
         "loading": design(plan),
         "both ways": design(replace(plan, unload=True)),
         "forces alone": design(replace(plan, photos=False)),
+        "no photo at rest": design(replace(plan, mounted=False)),
         "coarse": design(replace(plan, px_per_mm=5.5)),
     }
 
@@ -49,7 +50,8 @@ def test_nothing_is_asked_for_that_is_in_the_plan(plans):
     for name, made in (("loading", ["force-free cable"]), ("both ways", ["force-free cable", "unload"])):
         asked = [str(cause.separated_by) for cause in plans[name].causes]
         assert not [text for text in asked for what in made if what in text and "after the test" not in text]
-    assert any(str(cause.separated_by) == "a photo of the force-free cable" for cause in plans["forces alone"].causes)
+    asked = row(plans["no photo at rest"], "pre_curvature_varying").separated_by
+    assert str(asked) == "a photo of the force-free cable"
     assert row(plans["loading"], "pre_curvature_varying").nearest_twin == "in_plane_load"
     assert str(row(plans["loading"], "pre_curvature_varying").separated_by) == "a spirit level on the table"
 
