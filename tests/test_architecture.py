@@ -79,7 +79,8 @@ INSIDE = {
     ],
     "pipeline.diagnosis.explanations": [
         ("candidates", "refit", "effort"),
-        ("forms", "free_profile"),
+        ("forms",),
+        ("free_profile",),
         ("single_cause", "pair_fits"),
         ("exchange",),
         ("search",),

@@ -14,7 +14,7 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input
-from pipeline.diagnosis.fits.force_breaks import force_break
+from pipeline.diagnosis.fits.force_breaks import EXPLAINED, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
@@ -83,7 +83,7 @@ def diagnose(
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
     """Refit suspects and pairs of them, and say what is believed; displacements are as exact as the log tells."""
-    return conclusion_of(bench, searched(bench, settings), settings)
+    return conclusion_of(bench, searched(bench, settings))
 
 
 def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> tuple[Faults, Workbench, Conclusion]:
@@ -93,7 +93,7 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
     leaves for scatter.
     """
     search = searched(bench, settings)
-    first = conclusion_of(bench, search, settings)
+    first = conclusion_of(bench, search)
     chance, std = _scatter(bench, first)
     if (
         first.unmodelled or chance < 0.5
@@ -105,9 +105,9 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
         return faults, bench, first
     second = conclude(again, settings)
     if second.accepted is not None:
-        exact = with_exact_displacements(bench.observation, bench.base, second.accepted.fitted, settings)
+        exact = with_exact_displacements(bench.observation, bench.base, second.accepted.fitted)
         search.add([explanation_of(second.accepted.causes, bench.base, exact)] if exact else [])
-        first = conclusion_of(bench, search, settings)
+        first = conclusion_of(bench, search)
         if not first.unmodelled and _scatter(bench, first)[0] < 0.5:
             return faults, bench, first
     return scattered, again, second
@@ -158,7 +158,6 @@ def _data_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | No
         cosines(scores.unit),
         bench.suspicion.sign,
         bench.suspicion.owner,
-        collinear=settings.pair_collinear,
     )
     by_cause = max(bench.largest**2, float(pairs.max(initial=0.0)))
     return force_break(bench, settings, by_cause=by_cause) or _item_at_fault(bench, settings, by_cause=by_cause)
@@ -170,7 +169,7 @@ def _item_at_fault(bench: Workbench, settings: DiagnosisSettings, *, by_cause: f
     if item is None or item.gain - item.rows < settings.fault_sigma**2:
         return None
     freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
-    fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + settings.explained_share * item.gain
+    fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * item.gain
     better = item.gain - item.rows > by_cause + settings.fault_sigma**2
     return outlier_fault(bench.test, item) if fits and better else None
 

@@ -15,7 +15,7 @@ from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import faults_of_input
-from pipeline.diagnosis.fits.fit import Fit, fit
+from pipeline.diagnosis.fits.fit import ITERATIONS, Fit, fit
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.laws import FewPoints
 from pipeline.diagnosis.fits.search import suspect
@@ -28,6 +28,9 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
 from rod.characteristic import Characteristic
 from rod.measurement import MeasuredTest
+
+POINT_GAIN = 16.0
+"""Chi-square that a form of the law or K0 must remove to be taken (4 sigma)."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
             if not bent:
                 offers["pre_curvature"] = _fitted(faults.test, observation, facts, settings, curved=curved, bent=True)
             best = min(offers, key=lambda name: _cost(offers[name]))
-            if _cost(before) - _cost(offers[best]) < settings.knot_gain:
+            if _cost(before) - _cost(offers[best]) < POINT_GAIN:
                 break
             curved, bent = curved or best == LAW, bent or best == "pre_curvature"
             gain = _gain(faults.test, observation, facts, settings, before, offers[best])
@@ -144,8 +147,7 @@ def _fitted(
             observation,
             Extension(base, facts),
             base.neutral(stiffness=stiffness, bend=bend),
-            iterations=2 * settings.iterations,
-            tolerance=settings.tolerance,
+            iterations=2 * ITERATIONS,
         )
         if best is None or _cost(found) < _cost(best):
             best = found
@@ -159,6 +161,6 @@ def _gain(
     """Held-out gain of a step."""
     if before.run.prediction is None:
         return None
-    suspicion = suspect(observation, before, (), visible=settings.visible, trace=settings.trace)
+    suspicion = suspect(observation, before, ())
     bench = Workbench(test, facts, observation, before, suspicion, np.zeros(1), 0.0)
     return measured_gain(bench, after, settings)

@@ -7,10 +7,15 @@ import numpy as np
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
-from pipeline.settings.diagnosis import DiagnosisSettings
+
+LEAST, MARGIN = 30.0, 0.35
+"""Chi-square, and share of the best linear gain, that a cause may fall short of the best and still be refitted."""
+
+MOST = 8
+"""Causes refitted at most, best linear scores first; time."""
 
 
-def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: bool = False) -> list[int]:
+def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = MARGIN, most: int = MOST) -> list[int]:
     """Causes worth a refit: by linear chi-square gain, within a margin of the best.
 
     A cause whose forms may act together counts with its best two: a load at an angle to the chord scores little along
@@ -22,15 +27,15 @@ def candidates(suspicion: Suspicion, settings: DiagnosisSettings, *, any_sign: b
     gains = np.zeros(len(suspicion.causes))
     np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
     best = gains.max(initial=0.0)
-    needed = best - max(settings.refit_least, settings.refit_margin * best)
+    needed = best - max(LEAST, margin * best)
     for k, cause in enumerate(suspicion.causes):
         if cause.combines:
-            gains[k] = max(gains[k], _best_two_forms(suspicion, k, settings))
+            gains[k] = max(gains[k], _best_two_forms(suspicion, k))
     order = np.argsort(-gains, kind="stable")
-    return [int(k) for k in order[: settings.refit_most] if gains[k] > max(needed, 0.0)]
+    return [int(k) for k in order[:most] if gains[k] > max(needed, 0.0)]
 
 
-def _best_two_forms(suspicion: Suspicion, cause: int, settings: DiagnosisSettings) -> float:
+def _best_two_forms(suspicion: Suspicion, cause: int) -> float:
     """Linear chi-square gain of the best two forms of a cause together."""
     own = suspicion.of(cause)
     gains = pair_gains(
@@ -38,6 +43,5 @@ def _best_two_forms(suspicion: Suspicion, cause: int, settings: DiagnosisSetting
         cosines(suspicion.scores.unit[:, own]),
         suspicion.sign[own],
         np.arange(own.size),
-        collinear=settings.pair_collinear,
     )
     return float(gains.max(initial=0.0))

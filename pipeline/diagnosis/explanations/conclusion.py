@@ -12,7 +12,6 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Posterior
 from pipeline.diagnosis.statistics.twins import between_causes, cosines
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ class Conclusion:
         return [one.found for one in self.posterior.credible() if one.found and set(one.causes) != own]
 
 
-def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings) -> Conclusion:
+def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
     """The conclusion that the hypotheses of a search allow."""
     believed = search.posterior
     word = believed.word
@@ -64,7 +63,7 @@ def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings)
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
     refits = believed.explanations()
     first = next((one for one in refits if len(one.causes) == count or unmodelled), None)
-    accepted = None if first is None or first.found is None else in_deeper_valley(bench, first.found, settings)
+    accepted = None if first is None or first.found is None else in_deeper_valley(bench, first.found)
     if accepted is None or unmodelled:
         alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)
         return Conclusion(believed, search.grid, accepted, alone, unmodelled=True, curtailed=search.curtailed)
@@ -72,9 +71,9 @@ def conclusion_of(bench: Workbench, search: Search, settings: DiagnosisSettings)
     return Conclusion(believed, search.grid, accepted, classes, unmodelled=False, curtailed=search.curtailed)
 
 
-def in_deeper_valley(bench: Workbench, found: Explanation, settings: DiagnosisSettings) -> Explanation:
+def in_deeper_valley(bench: Workbench, found: Explanation) -> Explanation:
     """The explanation fitted from both sides of its K0 as well, where no photo shows the force-free cable."""
-    fitted = from_both_sides(bench.observation, found.fitted, settings)
+    fitted = from_both_sides(bench.observation, found.fitted)
     return replace(found, fitted=fitted, gain=bench.base.chi2 - fitted.chi2)
 
 

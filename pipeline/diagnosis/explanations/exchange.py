@@ -14,15 +14,15 @@ from pipeline.diagnosis.fits.fit import Fit, evaluated
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.settings.diagnosis import DiagnosisSettings
+
+MARGIN, MOST = 0.15, 4
+"""Share of the score beside the other cause that a rival may fall short of, and rivals refitted at most; time."""
 
 EXCHANGES = 2
 """Rounds at most; the second is for what the first has put right."""
 
 
-def exchanged(
-    bench: Workbench, found: list[Explanation], settings: DiagnosisSettings, effort: Effort = TO_THE_END
-) -> list[Explanation]:
+def exchanged(bench: Workbench, found: list[Explanation], effort: Effort = TO_THE_END) -> list[Explanation]:
     """What comes of exchanging either cause of the best pair, until no exchange makes it better."""
     every, done = list(found), set[frozenset[int]]()
     for _ in range(EXCHANGES):
@@ -31,41 +31,36 @@ def exchanged(
             break
         done.add(frozenset(best.causes))
         if not best.fitted.converged:
-            best = settled(bench, best, settings)
+            best = settled(bench, best)
             every.append(best)
         for place in (0, 1):
-            every += _in_place_of(bench, best, place, settings, effort)
+            every += _in_place_of(bench, best, place, effort)
     return every[len(found) :]
 
 
-def _in_place_of(
-    bench: Workbench, pair: Explanation, place: int, settings: DiagnosisSettings, effort: Effort
-) -> list[Explanation]:
+def _in_place_of(bench: Workbench, pair: Explanation, place: int, effort: Effort) -> list[Explanation]:
     """The pair with one of its causes replaced by whatever scores nearly as much beside the other."""
     suspicion, other, found = bench.suspicion, pair.causes[1 - place], []
     rest = _without(bench, pair.fitted, pair.causes[place])
     if rest is None:
         return []
-    beside = suspect(bench.observation, rest, suspicion.causes, visible=settings.visible, trace=settings.trace)
+    beside = suspect(bench.observation, rest, suspicion.causes)
     if beside.statistic.size == 0:
         return []
-    near = settings.model_copy(update={"refit_margin": settings.exchange_margin, "refit_most": settings.exchange_most})
-    for cause in candidates(beside, near):
+    for cause in candidates(beside, margin=MARGIN, most=MOST):
         direction = beside.best(cause)
         if effort.spent:
             break
         if cause in pair.causes or direction is None:
             continue  # itself, or further forms of the other cause: that is a single cause
-        fitted = fit_terms(bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2)
+        fitted = fit_terms(bench.observation, rest, beside, (direction,), hopeless=pair.fitted.chi2)
         if fitted is not None and not fitted.converged:  # kinks: the form as it is scored does not stall
-            held = fit_terms(
-                bench.observation, rest, beside, (direction,), settings, hopeless=pair.fitted.chi2, tuned=False
-            )
+            held = fit_terms(bench.observation, rest, beside, (direction,), hopeless=pair.fitted.chi2, tuned=False)
             fitted = held if held is not None and held.chi2 < fitted.chi2 else fitted
         if fitted is not None:
             causes = (cause, other) if place == 0 else (other, cause)
             new = explanation_of(causes, bench.base, fitted)
-            found.append(with_own_forms(bench, new, settings, rival=pair.fitted.chi2))
+            found.append(with_own_forms(bench, new, rival=pair.fitted.chi2))
     return found
 
 

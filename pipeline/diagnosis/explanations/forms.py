@@ -18,7 +18,12 @@ from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.score import descending
-from pipeline.settings.diagnosis import DiagnosisSettings
+
+SHAPES_MOST = 3
+"""Forms of one cause that are combined in a refit at most."""
+
+SHAPE_GAIN = 16.0
+"""Chi-square by which a further form of the same cause must pay (4 sigma)."""
 
 LEAST_SHARE = 0.02
 """Of what a model leaves: far above the noise any form removes a little, and models that none of them brings to it were
@@ -30,7 +35,6 @@ def with_more_forms(
     fitted: Fit,
     cause: Cause,
     setting: str,
-    settings: DiagnosisSettings,
     *,
     hopeless: float,
 ) -> Fit:
@@ -47,13 +51,12 @@ def with_more_forms(
         One whose forms may act together.
     setting : str
         Of the forms that may act together (`causes.cause.Variant`).
-    settings : DiagnosisSettings
     hopeless : float
         Chi-square above which the result is of no use.
     """
-    while len(fitted.extension.terms_of(cause)) < settings.shapes_most:
-        least = max(settings.shape_gain, LEAST_SHARE * fitted.chi2)
-        more = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
+    while len(fitted.extension.terms_of(cause)) < SHAPES_MOST:
+        least = max(SHAPE_GAIN, LEAST_SHARE * fitted.chi2)
+        more = suspect(observation, fitted, [cause])
         fitting = np.array([may_join(term, fitted, setting) for term in more.terms], dtype=bool)
         fresh = fitting & np.array([term not in fitted.extension.terms for term in more.terms], dtype=bool)
         if fitted.chi2 - _loudest(more.statistic, fitting) ** 2 >= hopeless:
@@ -63,12 +66,12 @@ def with_more_forms(
         for eligible in (fresh, fitting):
             if _loudest(more.statistic, eligible) ** 2 >= least:
                 loudest = int(descending(more.statistic * eligible)[0])
-                added = fit_terms(observation, fitted, more, (loudest,), settings)
+                added = fit_terms(observation, fitted, more, (loudest,))
             if added is not None and fitted.chi2 - added.chi2 >= least:
                 break
         if added is None or fitted.chi2 - added.chi2 < least:
             break
-        fitted = without_needless_forms(observation, added, cause, settings)
+        fitted = without_needless_forms(observation, added, cause)
     return fitted
 
 
@@ -89,15 +92,15 @@ def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> flo
     return float(statistic[eligible].max(initial=0.0))
 
 
-def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings) -> Fit:
+def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) -> Fit:
     """Drop the forms of a cause that later ones have made needless: each removes less than ``shape_gain``.
 
     A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
     """
     while len(own := fitted.extension.terms_of(cause)) > 1:
-        enough = fitted.chi2 + settings.shape_gain
+        enough = fitted.chi2 + SHAPE_GAIN
         shorter = [
-            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, settings, hopeless=enough)
+            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, hopeless=enough)
             for form in own
         ]
         simplest = min(shorter, key=lambda one: one.chi2 if one.run.prediction is not None else np.inf)
@@ -107,7 +110,7 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause, 
     return fitted
 
 
-def as_one_form(observation: Observation, fitted: Fit, settings: DiagnosisSettings, *, worse: float) -> Fit:
+def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:
     """One spot or step in the place of several forms along the cable, if its chi-square is ``worse`` by no more.
 
     A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
@@ -123,6 +126,6 @@ def as_one_form(observation: Observation, fitted: Fit, settings: DiagnosisSettin
     variant, amount, stiffer = spot
     alone = Extension(extension.base, extension.facts, (Term(extension.terms[0].cause, variant),))
     start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
-    one = fit_from(observation, alone, start, fitted, settings)
+    one = fit_from(observation, alone, start, fitted)
     as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + worse
     return one if as_well else fitted

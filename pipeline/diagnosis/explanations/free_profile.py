@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import WAVE_COST, deviation, is_profile, position_of, profile, wave
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
+from pipeline.diagnosis.fits.search import VISIBLE
 from pipeline.diagnosis.fits.sensitivities import profile_columns
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.score import span
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,7 @@ EACH = 2.0 * WAVE_COST
 """Chi-square for each further number that a block must remove besides ``shape_gain``."""
 
 
-def with_free_profile(
-    observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings, *, hopeless: float = np.inf
-) -> Fit:
+def with_free_profile(observation: Observation, fitted: Fit, cause: Cause, *, hopeless: float = np.inf) -> Fit:
     """The model with the forms of a cause along the cable replaced by waves, where these explain the data better.
 
     Parameters
@@ -43,21 +42,20 @@ def with_free_profile(
         With the cause in it.
     cause : Cause
         Any; one that is no profile along the cable leaves the model as it is.
-    settings : DiagnosisSettings
     hopeless : float
         Chi-square above which the result is of no use.
     """
-    if not is_profile(cause) or not _may_pay(observation, fitted, cause, settings, hopeless):
+    if not is_profile(cause) or not _may_pay(observation, fitted, cause, hopeless):
         return fitted
     best, most = fitted, fitted.chi2 - (1.0 - SHARED) * _excess(fitted)
     for count in BLOCKS:
         extension, start = in_waves(best, cause, count)
-        found = fit_from(observation, extension, start, best, settings)
-        if found.run.prediction is not None and best.chi2 - found.chi2 > price(found, best, settings):
+        found = fit_from(observation, extension, start, best)
+        if found.run.prediction is not None and best.chi2 - found.chi2 > price(found, best):
             best = found
         elif best is not fitted:
             break  # what replaces spots may need more waves than the first block has
-        if best is not fitted and best.converged and _left_by_all(observation, best, cause, settings) > most:
+        if best is not fitted and best.converged and _left_by_all(observation, best, cause) > most:
             return fitted
     return best if _excess(best) < SHARED * _excess(fitted) else fitted
 
@@ -92,31 +90,31 @@ def in_waves(fitted: Fit, cause: Cause, count: int) -> tuple[Extension, Array]:
     return Extension(rest.base, rest.facts, (*rest.terms, *terms)), np.r_[vector, amounts]
 
 
-def price(found: Fit, simpler: Fit, settings: DiagnosisSettings) -> float:
+def price(found: Fit, simpler: Fit) -> float:
     """Chi-square that a model must remove for its further numbers."""
-    return _price(found.extension.size - simpler.extension.size, settings)
+    return _price(found.extension.size - simpler.extension.size)
 
 
-def _price(further: int, settings: DiagnosisSettings) -> float:
-    return settings.shape_gain + EACH * max(further, 0)
+def _price(further: int) -> float:
+    return SHAPE_GAIN + EACH * max(further, 0)
 
 
-def _may_pay(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings, hopeless: float) -> bool:
+def _may_pay(observation: Observation, fitted: Fit, cause: Cause, hopeless: float) -> bool:
     """Whether waves beside what is fitted would remove enough, by the linear model."""
     further = BLOCKS[0] - sum(fitted.extension.terms[k].size for k in fitted.extension.terms_of(cause))
-    if _excess(fitted) < _price(further, settings):
+    if _excess(fitted) < _price(further):
         return False
-    removed = fitted.chi2 - _left_by_all(observation, fitted, cause, settings)
+    removed = fitted.chi2 - _left_by_all(observation, fitted, cause)
     if not fitted.converged:  # what is left then says little of what waves would leave
         return fitted.chi2 - removed < max(hopeless, 0.5 * fitted.chi2) or not np.isfinite(hopeless)
-    return removed > _price(further, settings) and fitted.chi2 - removed < hopeless
+    return removed > _price(further) and fitted.chi2 - removed < hopeless
 
 
-def _left_by_all(observation: Observation, fitted: Fit, cause: Cause, settings: DiagnosisSettings) -> float:
+def _left_by_all(observation: Observation, fitted: Fit, cause: Cause) -> float:
     """Chi-square that all waves beside what is fitted would leave, by the linear model."""
     terms = [Term(cause, wave(k)) for k in range(1, BLOCKS[-1] + 1)]
     columns = profile_columns(observation, fitted.extension, fitted.vector, fitted.run, terms)
     known = span(fitted.jacobian)
     beside = columns - known @ (known.T @ columns)
-    seen = np.linalg.norm(beside, axis=0) > settings.visible * np.linalg.norm(columns, axis=0)
+    seen = np.linalg.norm(beside, axis=0) > VISIBLE * np.linalg.norm(columns, axis=0)
     return fitted.chi2 - float(np.sum((span(beside[:, seen]).T @ fitted.residual) ** 2))

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.candidates import LEAST, MARGIN, candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
-from pipeline.diagnosis.explanations.forms import with_more_forms
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.fit import fit_from
@@ -25,26 +25,24 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 
-def linear_pairs(bench: Workbench, settings: DiagnosisSettings) -> list[Pair]:
+def linear_pairs(bench: Workbench) -> list[Pair]:
     """Best pairs of the exhaustive linear search about the base model that are worth a refit."""
     suspicion = bench.suspicion
     cosine = cosines(suspicion.scores.unit)
-    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner, collinear=settings.pair_collinear)
+    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner)
     # a tuned place or width costs two of chi-square (Akaike): a smooth form that does nearly as well comes first
     cost = 2.0 * np.array([len(term.variant.tuned) for term in suspicion.terms])
     gains = np.maximum(gains - cost[:, None] - cost, 0.0)
-    pairs = best_pairs(gains, suspicion.owner, count=settings.pairs_refitted)
-    least = pairs[0].gain - max(settings.refit_least, settings.refit_margin * pairs[0].gain) if pairs else 0.0
+    pairs = best_pairs(gains, suspicion.owner, count=PAIRS)
+    least = pairs[0].gain - max(LEAST, MARGIN * pairs[0].gain) if pairs else 0.0
     return [pair for pair in pairs if pair.gain > least]
 
 
 def refitted_pairs(
     bench: Workbench,
     pairs: list[Pair],
-    settings: DiagnosisSettings,
     *,
     hopeless: float,
     effort: Effort = TO_THE_END,
@@ -60,31 +58,27 @@ def refitted_pairs(
         amounts = tuple(
             float((z[own] - c * z[rest]) / (1.0 - c * c) / norm[own]) for own, rest in ((one, other), (other, one))
         )
-        fitted = fit_terms(
-            bench.observation, bench.base, suspicion, (one, other), settings, amounts=amounts, hopeless=hopeless
-        )
+        fitted = fit_terms(bench.observation, bench.base, suspicion, (one, other), amounts=amounts, hopeless=hopeless)
         if fitted is not None:
             causes = (int(suspicion.owner[one]), int(suspicion.owner[other]))
             found.append(explanation_of(causes, bench.base, fitted))
     return found
 
 
-def beside_best(
-    bench: Workbench, best: Explanation, second: Suspicion, settings: DiagnosisSettings
-) -> list[Explanation]:
+def beside_best(bench: Workbench, best: Explanation, second: Suspicion) -> list[Explanation]:
     """The best single cause with each of the two that score most beside it."""
     found = []
-    for cause in candidates(second, settings)[:2]:
+    for cause in candidates(second)[:2]:
         direction = second.best(cause)
         if cause == best.causes[0] or direction is None:
             continue
-        fitted = fit_terms(bench.observation, best.fitted, second, (direction,), settings)
+        fitted = fit_terms(bench.observation, best.fitted, second, (direction,))
         if fitted is not None:
             found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found
 
 
-def with_all_forms(bench: Workbench, found: list[Explanation], settings: DiagnosisSettings) -> list[Explanation]:
+def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:
     """The pairs with further forms of their causes, the best first; one that stays far above it is left as it is.
 
     A load at an angle to the chord is no better than half of itself beside another cause, as it is alone.
@@ -93,28 +87,27 @@ def with_all_forms(bench: Workbench, found: list[Explanation], settings: Diagnos
     for pair in sorted(found, key=lambda e: -e.worth):
         if frozenset(pair.causes) not in every:
             rival = min((e.fitted.chi2 for e in every.values()), default=np.inf)
-            every[frozenset(pair.causes)] = with_own_forms(bench, pair, settings, rival=rival)
+            every[frozenset(pair.causes)] = with_own_forms(bench, pair, rival=rival)
     return list(every.values())
 
 
-def with_own_forms(bench: Workbench, pair: Explanation, settings: DiagnosisSettings, *, rival: float) -> Explanation:
+def with_own_forms(bench: Workbench, pair: Explanation, *, rival: float) -> Explanation:
     """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square.
 
     Of causes whose forms are directions (a load, a tilt); a form with a place of its own is tuned instead.
     """
-    fitted, hopeless, facts = pair.fitted, rival + settings.refit_least, bench.facts
+    fitted, hopeless, facts = pair.fitted, rival + LEAST, bench.facts
     for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
         if not kind.combines or any(form.has_place for form in kind.variants(facts)):
             continue
         for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
-            fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
+            fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)
     return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
 
 
 def in_any_form(
     bench: Workbench,
     found: Sequence[Explanation],
-    settings: DiagnosisSettings,
     *,
     rivals: Sequence[Explanation] = (),
     effort: Effort = TO_THE_END,
@@ -128,33 +121,36 @@ def in_any_form(
         if effort.spent:
             break
         rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
-        fitted, hopeless = pair.fitted, rival + settings.refit_least
+        fitted, hopeless = pair.fitted, rival + LEAST
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             if effort.spent:
                 break
-            fitted = with_free_profile(bench.observation, fitted, kind, settings, hopeless=hopeless)
+            fitted = with_free_profile(bench.observation, fitted, kind, hopeless=hopeless)
             if is_profile(kind) or not kind.combines:
                 continue
             for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
-                fitted = with_more_forms(bench.observation, fitted, kind, setting, settings, hopeless=hopeless)
+                fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)
         if fitted is not pair.fitted:
             new.append(explanation_of(pair.causes, bench.base, fitted))
     return new
 
 
+PAIRS = 6
+"""Best pairs of the exhaustive linear search that are refitted; time."""
+
 IN_ANY_FORM = 2
 """Pairs, the best first, that get forms with a place of their own; time."""
 
 
-def settled(bench: Workbench, pair: Explanation, settings: DiagnosisSettings) -> Explanation:
+def settled(bench: Workbench, pair: Explanation) -> Explanation:
     """An explanation whose fit ran out of steps, fitted on: beside a half-way cause scores mislead."""
     fitted = pair.fitted
     if fitted.converged:
         return pair
     for _ in range(ATTEMPTS):
-        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted, settings)
+        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted)
         gained, fitted = fitted.chi2 - further.chi2, further
-        if fitted.converged or gained < settings.shape_gain:
+        if fitted.converged or gained < SHAPE_GAIN:
             break
     return explanation_of(pair.causes, bench.base, fitted)
 

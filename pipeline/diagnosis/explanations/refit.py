@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
-from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]
 
@@ -45,15 +44,12 @@ class Addition:
         Linear estimate of each, in the unit of its cause.
     columns : (N, terms)
         Their whitened traces per unit of amount.
-    trace : float
-        Share of the plausible size at which traces were computed.
     """
 
     base: Fit
     terms: tuple[Term, ...]
     amounts: tuple[float, ...]
     columns: Array
-    trace: float
 
     @property
     def extension(self) -> Extension:
@@ -66,7 +62,7 @@ class Addition:
         facts, parts = self.base.extension.facts, [vector]
         for term, amount in zip(self.terms, self.amounts, strict=True):
             limit = SANE * term.cause.plausible(facts)
-            traced = self.trace * abs(term.variant.trace) * term.cause.plausible(facts)
+            traced = TRACE * abs(term.variant.trace) * term.cause.plausible(facts)
             # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
             bent = np.sign(share * amount) * traced * abs(share * amount / traced) ** (1.0 / term.variant.power)
             value = float(np.clip(bent, -limit, limit))
@@ -79,7 +75,6 @@ def fit_terms(
     base: Fit,
     suspicion: Suspicion,
     directions: tuple[int, ...],
-    settings: DiagnosisSettings,
     *,
     amounts: tuple[float, ...] | None = None,
     hopeless: float = np.inf,
@@ -96,7 +91,6 @@ def fit_terms(
         Scores about that model.
     directions : tuple of int
         Of ``suspicion``, each to become a term.
-    settings : DiagnosisSettings
     amounts : tuple of float or None
         Linear estimates, where the directions share them; else each as it is scored alone.
     hopeless : float
@@ -114,10 +108,10 @@ def fit_terms(
         terms = tuple(Term(term.cause, replace(term.variant, tuned=())) for term in terms)
     if amounts is None:
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
-    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)], settings.trace)
+    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
     best: Fit | None = None
     for start in (linear_start(observation, added), *_other_valleys(added)):
-        found = fit_from(observation, added.extension, start, base, settings, hopeless=hopeless)
+        found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
     return best

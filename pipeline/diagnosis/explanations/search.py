@@ -47,6 +47,10 @@ ALSO = 0.01
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides."""
 
+MASKED = 20.0
+"""Chi-square that the best pair must remove beyond the best single score for pairs to be refitted where no cause is
+likely by itself; time."""
+
 NEEDED = 2.5
 """Standard deviations from nothing that each member of a pair must have to be left in it."""
 
@@ -77,17 +81,17 @@ class Search:
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        best = [settled(self.bench, one, self.settings) for _, one in new[:LIKELIEST]]
+        best = [settled(self.bench, one) for _, one in new[:LIKELIEST]]
         self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
         self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
         return [*best, *(one for _, one in new[LIKELIEST:])]
 
     def singles(self) -> list[Explanation]:
         """Refit causes that matter or come near the best score; all where none explains what it promised."""
-        bench, settings = self.bench, self.settings
+        bench = self.bench
         linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
         loading_only = "mounted" not in bench.facts.branch
-        near = candidates(bench.suspicion, settings, any_sign=loading_only)
+        near = candidates(bench.suspicion, any_sign=loading_only)
         found = list(self._each([*near, *sorted(linear - set(near))]))
         best = max(found, key=lambda e: e.gain, default=None)
         if best is None or best.gain < CONFIRMED * bench.largest**2 or (loading_only and not _foreseen(bench, best)):
@@ -101,35 +105,31 @@ class Search:
         for cause in causes:
             if not self.bench.suspicion.of(cause).size:
                 continue
-            one = refit_one(
-                self.bench.observation, self.bench.base, self.bench.suspicion, cause, self.settings, rival=rival
-            )
+            one = refit_one(self.bench.observation, self.bench.base, self.bench.suspicion, cause, rival=rival)
             if one is not None and one.gain > 0.0:
                 rival = min(rival, one.fitted.chi2)
                 yield one
 
     def beside(self, best: Explanation) -> Suspicion:
         """Scores of all causes about the best single cause."""
-        settings, causes = self.settings, self.bench.suspicion.causes
-        return suspect(self.bench.observation, best.fitted, causes, visible=settings.visible, trace=settings.trace)
+        return suspect(self.bench.observation, best.fitted, self.bench.suspicion.causes)
 
     def pairs(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> None:
         """Refit pairs: of the linear search, and what scores beside the best single cause."""
-        bench, settings = self.bench, self.settings
-        self.effort = Effort.of(settings.search_newton_steps)
+        bench, self.effort = self.bench, Effort.of(self.settings.search_newton_steps)
         hopeless = bench.base.chi2 if best is None else best.fitted.chi2
-        found = refitted_pairs(bench, linear, settings, hopeless=hopeless, effort=self.effort)
+        found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
         if best is not None and second is not None:
-            found += beside_best(bench, best, second, settings)
+            found += beside_best(bench, best, second)
         found = self.add(found)
         self.add(list(self._pruned(found)))
         if self.posterior.total(count=2) < PAIRS_MATTER and best is not None and len(best.fitted.extension.terms) == 1:
             return
-        forms = with_all_forms(bench, found, settings)
+        forms = with_all_forms(bench, found)
         new = [one for one in forms if one not in found]
-        new += in_any_form(bench, forms, settings, effort=self.effort)
-        new += (swapped := exchanged(bench, [*forms, *new], settings, self.effort))
-        new += in_any_form(bench, swapped, settings, rivals=[*forms, *new], effort=self.effort)
+        new += in_any_form(bench, forms, effort=self.effort)
+        new += (swapped := exchanged(bench, [*forms, *new], self.effort))
+        new += in_any_form(bench, swapped, rivals=[*forms, *new], effort=self.effort)
         new = self.add(new)
         self.add(list(self._pruned(new)))
         self.curtailed |= self.effort.spent
@@ -144,7 +144,7 @@ class Search:
             if known or pair.sigma(kind) > NEEDED:
                 continue
             extension, vector = pair.fitted.extension.without(pair.fitted.vector, pair.fitted.extension.terms_of(kind))
-            rest = fit_from(self.bench.observation, extension, vector, pair.fitted, self.settings)
+            rest = fit_from(self.bench.observation, extension, vector, pair.fitted)
             if rest.run.prediction is not None and rest.chi2 < self.bench.base.chi2:
                 reached[left] = min(rest.chi2, reached.get(left, np.inf))
                 yield explanation_of(left, self.bench.base, rest)
@@ -195,8 +195,8 @@ def _foreseen(bench: Workbench, found: Explanation) -> bool:
 def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
     """All hypotheses about a specimen that are worth it, weighed."""
     search = Search(bench, settings)
-    every = linear_pairs(bench, settings)
-    linear = [pair for pair in every if pair.gain > bench.largest**2 + settings.masked_least]
+    every = linear_pairs(bench)
+    linear = [pair for pair in every if pair.gain > bench.largest**2 + MASKED]
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     if silent and first.word == "base" and not linear and bench.largest < bench.limit:

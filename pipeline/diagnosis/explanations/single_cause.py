@@ -11,15 +11,18 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
+from pipeline.diagnosis.explanations.candidates import LEAST
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
-from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
-from pipeline.settings.diagnosis import DiagnosisSettings
+
+HOPELESS = 0.02
+"""Share of the base model's chi-square that a refit may lie above the best one and still be worked on; time."""
 
 NEARLY_AS_LOUD = 0.75
 """Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
@@ -30,7 +33,6 @@ def refit_one(
     base: Fit,
     suspicion: Suspicion,
     cause: int,
-    settings: DiagnosisSettings,
     *,
     rival: float = np.inf,
 ) -> Explanation | None:
@@ -40,25 +42,23 @@ def refit_one(
     from other starts and with further forms.
     """
     kind = suspicion.causes[cause]
-    hopeless = rival + settings.refit_least + settings.hopeless * base.chi2
-    found = _in_any_form(observation, base, suspicion, cause, settings, hopeless) if is_profile(kind) else None
+    hopeless = rival + LEAST + HOPELESS * base.chi2
+    found = _in_any_form(observation, base, suspicion, cause, hopeless) if is_profile(kind) else None
     if found is None:
-        best = _by_setting(observation, base, suspicion, cause, settings, hopeless=hopeless)
+        best = _by_setting(observation, base, suspicion, cause, hopeless=hopeless)
         if kind.combines:
             for setting, one in best.items():
-                best[setting] = _several(observation, one, kind, setting, settings, hopeless=hopeless)
+                best[setting] = _several(observation, one, kind, setting, hopeless=hopeless)
         found = min(best.values(), key=_cost, default=None)
     return None if found is None else explanation_of((cause,), base, found)
 
 
-def _several(
-    observation: Observation, one: Fit, kind: Cause, setting: str, settings: DiagnosisSettings, *, hopeless: float
-) -> Fit:
+def _several(observation: Observation, one: Fit, kind: Cause, setting: str, *, hopeless: float) -> Fit:
     """A model with one form of a cause, with whatever further forms pay for themselves."""
-    several = with_more_forms(observation, one, kind, setting, settings, hopeless=hopeless)
-    worse = settings.shape_gain * (len(several.extension.terms) - 1)
-    several = as_one_form(observation, several, settings, worse=worse)
-    return with_free_profile(observation, several, kind, settings, hopeless=hopeless)
+    several = with_more_forms(observation, one, kind, setting, hopeless=hopeless)
+    worse = SHAPE_GAIN * (len(several.extension.terms) - 1)
+    several = as_one_form(observation, several, worse=worse)
+    return with_free_profile(observation, several, kind, hopeless=hopeless)
 
 
 def _in_any_form(
@@ -66,7 +66,6 @@ def _in_any_form(
     base: Fit,
     suspicion: Suspicion,
     cause: int,
-    settings: DiagnosisSettings,
     hopeless: float,
 ) -> Fit | None:
     """A strong profile along the cable, by waves where its loudest form leaves more than noise and these do not.
@@ -75,19 +74,19 @@ def _in_any_form(
     them left ten times the noise after five times the work. Where fewer forms do as well, they are the explanation.
     """
     kind, direction = suspicion.causes[cause], suspicion.best(cause)
-    to_the_noise = settings.fits * (len(base.residual) - base.extension.size)
+    to_the_noise = FITS * (len(base.residual) - base.extension.size)
     if direction is None or base.chi2 < STRONG * to_the_noise:
         return None
-    first = fit_terms(observation, base, suspicion, (direction,), settings)
+    first = fit_terms(observation, base, suspicion, (direction,))
     if first is None or first.chi2 < to_the_noise:
         return None
-    free = with_free_profile(observation, first, kind, settings)
+    free = with_free_profile(observation, first, kind)
     if free.chi2 > to_the_noise:
         # what no profile does no few forms will do, nor will they do better where waves have taken most away
         return free if free.chi2 > hopeless or free.chi2 < MOSTLY * first.chi2 else None
-    worse = price(free, first, settings)
-    spot = as_one_form(observation, free, settings, worse=worse)
-    few = with_more_forms(observation, first, kind, "", settings, hopeless=free.chi2 + worse)
+    worse = price(free, first)
+    spot = as_one_form(observation, free, worse=worse)
+    few = with_more_forms(observation, first, kind, "", hopeless=free.chi2 + worse)
     return min((free, spot, few), key=_cost)
 
 
@@ -103,12 +102,11 @@ def _by_setting(
     base: Fit,
     suspicion: Suspicion,
     cause: int,
-    settings: DiagnosisSettings,
     *,
     hopeless: float,
 ) -> dict[str, Fit]:
     """The best fit of a single form of a cause for each setting; empty where no form can be simulated."""
-    to_the_noise = settings.fits * (len(base.residual) - base.extension.size)
+    to_the_noise = FITS * (len(base.residual) - base.extension.size)
     best: dict[str, Fit] = {}
     enough: set[str] = set()
     for direction in _first_forms(suspicion, cause):
@@ -116,7 +114,7 @@ def _by_setting(
         label = suspicion.terms[direction].variant.label
         if label in enough:
             continue
-        found = _fit_form(observation, base, suspicion, direction, settings, hopeless=hopeless)
+        found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
         if found.converged and found.chi2 < to_the_noise:
@@ -133,7 +131,6 @@ def _fit_form(
     base: Fit,
     suspicion: Suspicion,
     direction: int,
-    settings: DiagnosisSettings,
     *,
     hopeless: float,
 ) -> Fit | None:
@@ -141,10 +138,10 @@ def _fit_form(
 
     Where the trace has kinks (slip), a form that is tuned may stall; the form as it is scored does not.
     """
-    found = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless)
+    found = fit_terms(observation, base, suspicion, (direction,), hopeless=hopeless)
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
-    held = fit_terms(observation, base, suspicion, (direction,), settings, hopeless=hopeless, tuned=False)
+    held = fit_terms(observation, base, suspicion, (direction,), hopeless=hopeless, tuned=False)
     return held if held is not None and _cost(held) < _cost(found) else found
 
 

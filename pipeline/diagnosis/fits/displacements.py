@@ -20,7 +20,6 @@ from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
 from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.records import doubtful
-from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
@@ -49,9 +48,7 @@ def displacement_columns(observation: Observation, fitted: Fit) -> Array:
     return columns
 
 
-def with_exact_displacements(
-    observation: Observation, exact: Fit, scattered: Fit, settings: DiagnosisSettings
-) -> Fit | None:
+def with_exact_displacements(observation: Observation, exact: Fit, scattered: Fit) -> Fit | None:
     """A model fitted beside displacements that scatter, fitted to the same test with exact ones; None where it cannot.
 
     ``exact`` is a fit of the base model with exact displacements.
@@ -61,7 +58,7 @@ def with_exact_displacements(
     assert isinstance(law, StiffnessLaw) and isinstance(known.law, AnyLaw)
     rest = np.delete(scattered.vector[first:], np.arange(moved) + len(given.names) - 2 - moved - first)
     extension = replace(scattered.extension, base=known, facts=exact.extension.facts)
-    found = fit_from(observation, extension, np.r_[known.law.basis.projected(law.rise), rest], exact, settings)
+    found = fit_from(observation, extension, np.r_[known.law.basis.projected(law.rise), rest], exact)
     return None if found.run.prediction is None else found
 
 

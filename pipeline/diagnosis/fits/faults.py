@@ -105,10 +105,9 @@ def faults_of_input(test: MeasuredTest, settings: DiagnosisSettings) -> Faults:
         _displacement,
         _traced_length,
         _forces,
-        _stuck,
     ):
         found = found.joined(check(found, settings))
-    return found
+    return found.joined(_stuck(found))
 
 
 def _with_both(found: Faults) -> list[int]:
@@ -262,7 +261,7 @@ def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
     return Faults(test)
 
 
-def _stuck(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _stuck(found: Faults) -> Faults:
     """Forces that stand still while the bearing moves."""
     test = found.test
     stuck = stuck_forces(test.steps)

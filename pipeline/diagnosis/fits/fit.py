@@ -23,9 +23,14 @@ from pipeline.diagnosis.fits.step import Linearised, lasting, reach
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Model
 from pipeline.diagnosis.observations.simulation import Run, run
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 Array = NDArray[np.float64]
+
+ITERATIONS, TOLERANCE = 15, 1e-3
+"""Gauss-Newton steps at most, where three to five are usual; change of chi-square at which a fit is done."""
+
+FITS = 1.4
+"""Reduced chi-square up to which a model explains the data: above it other starts and forms are tried."""
 
 CRAWL, PATIENCE = 2e-3, 4
 """Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
@@ -101,8 +106,8 @@ def fit(
     extension: Extension,
     start: Array,
     *,
-    iterations: int,
-    tolerance: float,
+    iterations: int = ITERATIONS,
+    tolerance: float = TOLERANCE,
     near: Run | None = None,
     cutoff: float = 1e-7,
     begin: Fit | None = None,
@@ -180,20 +185,11 @@ def fit_from(
     extension: Extension,
     start: Array,
     near: Fit,
-    settings: DiagnosisSettings,
     *,
     hopeless: float = np.inf,
 ) -> Fit:
-    """A fit as the settings ask for it, its equilibria sought from those of a fitted neighbour; see `fit`."""
-    return fit(
-        observation,
-        extension,
-        start,
-        iterations=settings.iterations,
-        tolerance=settings.tolerance,
-        near=near.run,
-        hopeless=hopeless,
-    )
+    """A fit whose equilibria are sought from those of a fitted neighbour; see `fit`."""
+    return fit(observation, extension, start, near=near.run, hopeless=hopeless)
 
 
 def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:

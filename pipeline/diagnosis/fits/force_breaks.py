@@ -36,6 +36,9 @@ from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
 
+EXPLAINED = 0.10
+"""Share of the excess misfit that a fault of the data may leave."""
+
 ZEROED = 4.0
 """Standard deviations: a force-free step that reads less shows that the load cell was zeroed before the break."""
 
@@ -87,7 +90,7 @@ def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: floa
 
     ``by_cause`` is the chi-square that a cause or a pair of causes removes.
     """
-    told = _Told.by_photos(bench, settings)
+    told = _Told.by_photos(bench)
     if told is None:
         return None
     whole, single = told.whole(), told.without_one()
@@ -100,7 +103,7 @@ def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: floa
     if turned is None and best.gain < whole.rest - single.rest + fault:
         return None
     best = turned or best
-    noise = best.freedom + 4.0 * np.sqrt(2.0 * best.freedom) + settings.explained_share * best.gain
+    noise = best.freedom + 4.0 * np.sqrt(2.0 * best.freedom) + EXPLAINED * best.gain
     if best.rest > noise:
         return None
     others = (one for one in found if one.steps == best.steps and one.kind not in ("sign", best.kind))
@@ -152,7 +155,7 @@ class _Told:
     loaded: NDArray[np.bool_]
 
     @classmethod
-    def by_photos(cls, bench: Workbench, settings: DiagnosisSettings) -> _Told | None:
+    def by_photos(cls, bench: Workbench) -> _Told | None:
         """Fit the base model to all but the forces; None where that does not settle.
 
         Photos leave the factor of the forces open: one force, the nearest to the base model's, sets it.
@@ -175,8 +178,6 @@ class _Told:
                 observation,
                 base.extension,
                 vector,
-                iterations=settings.iterations,
-                tolerance=settings.tolerance,
                 near=base.run,
                 begin=begin,
                 kept=kept,

@@ -13,6 +13,15 @@ from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 
+SAME_LEVEL = 0.01
+"""Share of the travel; loading and unloading steps closer than this are left out together."""
+
+DRAWS = 2000
+"""Behind the interval of the gain; its ends are then known to 2 %."""
+
+STEPS_WITHOUT = 4
+"""Gauss-Newton steps of a refit without one level, from the fit with it; two settle it usually."""
+
 
 def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) -> GainPart | None:
     """Share of the excess misfit that the extension removes on steps it has not seen, with its interval.
@@ -21,17 +30,17 @@ def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) 
     """
     observation = bench.observation
     groups = folds_by_level(
-        bench.facts.displacement, bench.facts.branch, same=settings.same_level * max(bench.facts.travel, 1e-12)
+        bench.facts.displacement, bench.facts.branch, same=SAME_LEVEL * max(bench.facts.travel, 1e-12)
     )
     if len(groups) < 2:
         return None
     folds, errors = [], []
     for group in groups:
         left_out = np.isin(observation.rows.step, group)
-        before, after = (_refit(observation, model, left_out, settings) for model in (bench.base, extended))
+        before, after = (_refit(observation, model, left_out) for model in (bench.base, extended))
         folds.append(_fold(before, after, left_out))
         errors.append([rms_errors(observation, model, group) for model in (before, after)])
-    found = held_out(folds, draws=settings.gain_draws, rng=np.random.default_rng(settings.seed))
+    found = held_out(folds, draws=DRAWS, rng=np.random.default_rng(settings.seed))
     if found is None or not np.isfinite(found.removed):
         return None
     force = [_rms(np.concatenate([error[k][0] for error in errors])) for k in (0, 1)]
@@ -44,15 +53,14 @@ def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) 
     )
 
 
-def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_], settings: DiagnosisSettings) -> Fit:
+def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_]) -> Fit:
     """The model fitted to the rows that stay, from where it was with all."""
     priors = np.ones(len(model.residual) - len(left_out), dtype=bool)
     return fit(
         observation,
         model.extension,
         model.vector,
-        iterations=settings.gain_iterations,
-        tolerance=settings.tolerance,
+        iterations=STEPS_WITHOUT,
         cutoff=1e-4,  # what the remaining steps cannot tell stays where it was, and counts for neither model
         begin=model,
         kept=np.r_[~left_out, priors],

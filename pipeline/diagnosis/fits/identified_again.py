@@ -22,7 +22,6 @@ from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import laid_along
 from pipeline.diagnosis.observations.observation import Observation, of_hold
-from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.law_prior import Posterior, averaged, priors
 
 Array = NDArray[np.float64]
@@ -67,7 +66,6 @@ class Identified:
 def identified_again(
     observation: Observation,
     fitted: Fit,
-    settings: DiagnosisSettings,
     *,
     force_errors: Sequence[Array] = (),
 ) -> Identified:
@@ -86,7 +84,7 @@ def identified_again(
     for errors in force_errors:
         moved = _moved_by_forces(observation, found, covariance, errors)
         covariance = covariance + np.outer(moved, moved)
-    return _with_other_forms(observation, Identified(found, covariance), settings)
+    return _with_other_forms(observation, Identified(found, covariance))
 
 
 def _at_mean(observation: Observation, start: Fit) -> Fit:
@@ -120,7 +118,7 @@ def _moved_by_forces(observation: Observation, fitted: Fit, response: Array, err
     return np.asarray(response @ (fitted.jacobian[:count].T @ (_weights(observation, fitted) ** 2 * shift)))
 
 
-def _with_other_forms(observation: Observation, again: Identified, settings: DiagnosisSettings) -> Identified:
+def _with_other_forms(observation: Observation, again: Identified) -> Identified:
     """Where the law lies if the forms of a cause that add up may be any: part of the band, and no better answer.
 
     A sum of few elements stands for a loop of friction whose true form nobody knows (Bouc and Wen's or Dahl's is none).
@@ -129,7 +127,7 @@ def _with_other_forms(observation: Observation, again: Identified, settings: Dia
     The size of the cause is known no better than the sum over all of them is, see `SPREAD`.
     """
     fitted = again.fitted
-    causes, beside = _other_forms(observation, fitted, settings)
+    causes, beside = _other_forms(observation, fitted)
     if beside.shape[1] == 0:
         return again
     law = len(fitted.extension.base.names)
@@ -154,13 +152,13 @@ def _amounts_of(fitted: Fit, name: str) -> list[int]:
     return [at for at, term in zip(extension.amounts_at, extension.terms, strict=True) if term.cause.name == name]
 
 
-def _other_forms(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> tuple[list[str], Array]:
+def _other_forms(observation: Observation, fitted: Fit) -> tuple[list[str], Array]:
     """Names (j,) and traces (N, j) of further forms of the causes whose forms add up, each as large as its cause."""
     names: list[str] = []
     columns = [np.zeros((len(fitted.residual), 0))]
     for cause in {term.cause.name: term.cause for term in fitted.extension.terms if term.cause.additive}.values():
         size = abs(float(np.sum(fitted.vector[_amounts_of(fitted, cause.name)])))
-        seen = suspect(observation, fitted, [cause], visible=settings.visible, trace=settings.trace)
+        seen = suspect(observation, fitted, [cause])
         names += [cause.name] * seen.columns.shape[1]
         columns.append(size * seen.columns)
     return names, np.hstack(columns)

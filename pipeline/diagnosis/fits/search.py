@@ -23,6 +23,12 @@ from pipeline.diagnosis.statistics.score import Scores, admissible, descending, 
 
 Array = NDArray[np.float64]
 
+VISIBLE = 1e-3
+"""Surviving fraction below which a cause counts as invisible."""
+
+TRACE = 0.2
+"""Share of its plausible size at which a cause's trace is computed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Suspicion:
@@ -69,9 +75,7 @@ class Suspicion:
         return int(own[descending(statistic)[0]])
 
 
-def suspect(
-    observation: Observation, fitted: Fit, causes: Sequence[Cause], *, visible: float, trace: float
-) -> Suspicion:
+def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause]) -> Suspicion:
     """Score every form of every cause about a fitted model.
 
     Causes that are in the model already are scored with forms of theirs only if forms may be combined.
@@ -82,10 +86,6 @@ def suspect(
     fitted : Fit
         With a prediction.
     causes : sequence of Cause
-    visible : float
-        Surviving fraction below which a direction counts as invisible.
-    trace : float
-        Share of the plausible size.
     """
     present = {term.cause.name for term in fitted.extension.terms}
     facts = fitted.extension.facts
@@ -95,12 +95,12 @@ def suspect(
             continue
         for variant in cause.variants(facts):
             term = Term(cause, variant)
-            amount = trace * variant.trace * cause.plausible(facts)
+            amount = TRACE * variant.trace * cause.plausible(facts)
             columns.append(direction(observation, fitted, term, amount=amount))
             terms.append(term)
             owner.append(index)
     table = np.column_stack(columns) if columns else np.zeros((len(fitted.residual), 0))
-    scores = score(fitted.residual, fitted.jacobian, table, visible=visible)
+    scores = score(fitted.residual, fitted.jacobian, table, visible=VISIBLE)
     sign = np.array([float(term.cause.sign) for term in terms])
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 

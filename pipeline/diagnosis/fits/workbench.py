@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.faults import Faults
-from pipeline.diagnosis.fits.fit import Fit, fit, fit_from
+from pipeline.diagnosis.fits.fit import FITS, ITERATIONS, Fit, fit, fit_from
 from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
@@ -31,6 +31,9 @@ from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
+
+NULL_DRAWS = 20_000
+"""Draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma."""
 
 OTHER_SIDE = 0.15
 """Of the curvature scale: how far to both sides of a fitted K0 it is put to look for a deeper valley. The false one of
@@ -92,7 +95,7 @@ def prepare(
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
     base = start(test, facts, elements=settings.grid, exact=settings.displacement_std)
-    fitted = _robust_fit(observation, base, facts, settings)
+    fitted = _robust_fit(observation, base, facts)
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
         return ended(fitted.run.failed)
@@ -101,15 +104,12 @@ def prepare(
             [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in observation.photos],
             [photo.sections for photo in observation.photos],
             [photo.basis for photo in observation.photos],
-            stretches=settings.noise_stretches,
-            stretch_spread=settings.noise_stretch_spread,
-            prior_weight=settings.noise_prior_weight,
         )
         observation = observe(
             test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
         )
-        fitted = fit_from(observation, *laid_along(fitted), fitted, settings)
-    suspicion = suspect(observation, fitted, causes, visible=settings.visible, trace=settings.trace)
+        fitted = fit_from(observation, *laid_along(fitted), fitted)
+    suspicion = suspect(observation, fitted, causes)
     return scored(test, observation, fitted, suspicion, settings)
 
 
@@ -120,7 +120,7 @@ def scored(
     maxima = null_maxima(
         suspicion.scores.unit,
         suspicion.sign,
-        draws=settings.null_draws,
+        draws=NULL_DRAWS,
         rng=np.random.default_rng(settings.seed),
         estimated=observation.estimated(len(fitted.residual)),
     )
@@ -128,7 +128,7 @@ def scored(
     return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
 
 
-def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: DiagnosisSettings) -> Fit:
+def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
     """The best of several starts: a wrong base model has false minima, and a start may lack equilibrium."""
     best: Fit | None = None
     shift = 0.1 * facts.curvature_scale
@@ -138,14 +138,13 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts, settings: Di
             observation,
             Extension(base, facts),
             base.neutral(stiffness=stiffness, bend=bend),
-            iterations=2 * settings.iterations,
-            tolerance=settings.tolerance,
+            iterations=2 * ITERATIONS,
         )
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
         # only then K0 is seen directly; else it has a second valley, which may fit nearly as well
         at_rest = "mounted" in facts.branch
-        if at_rest and best is not None and (best.chi2 < settings.fits * freedom or best.converged):
+        if at_rest and best is not None and (best.chi2 < FITS * freedom or best.converged):
             break
     return found if best is None else best
 
@@ -160,7 +159,7 @@ def laid_along(fitted: Fit) -> tuple[Extension, Array]:
     return extension, np.r_[basis.projected(law.rise), fitted.vector[count:]]
 
 
-def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSettings) -> Fit:
+def from_both_sides(observation: Observation, fitted: Fit) -> Fit:
     """The model fitted from both sides of its K0, and from a cable bent the other way at rest, where no photo shows it.
 
     A law that rises from rest beside a K0 that is too small, or of the other sign, can fit three photos nearly as well
@@ -176,7 +175,7 @@ def from_both_sides(observation: Observation, fitted: Fit, settings: DiagnosisSe
         vector = fitted.vector.copy()
         vector[:count] = np.maximum.accumulate(vector[:count][::-1])[::-1]
         vector[base.pre_curvature_index] += shift
-        found = fit_from(observation, fitted.extension, vector, fitted, settings)
+        found = fit_from(observation, fitted.extension, vector, fitted)
         if found.run.prediction is not None and found.chi2 < best.chi2:
             best = found
     return best

@@ -40,6 +40,13 @@ from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
 
+HOLD_NOISE_LEVEL = 1e-3
+"""Probability; holds have noise levels of their own only if equality is refuted at this level."""
+
+SECTION_BLOCKS, SHAPE_FUNCTIONS = 96, 20
+"""Block means a photo, four per shape function, so that noise and misfit are measured apart; Legendre polynomials a
+photo, which resolve a kink to L / 20, and seven photos stay a problem of 150 rows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Row:
@@ -192,7 +199,7 @@ def observe(
     """
     noise = photo_noise or PhotoNoise()
     scale = max(abs(step.force) for step in test.steps)
-    level = force_noise(test.steps, floor=settings.force_floor * scale, distinct=settings.hold_noise_level)
+    level = force_noise(test.steps, floor=settings.force_floor * scale, distinct=HOLD_NOISE_LEVEL)
     forces, photos = [], []
     kind: list[Array] = []
     where: list[Array] = []
@@ -218,8 +225,8 @@ def observe(
 def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:
     step = test.steps[index]
     assert step.shape is not None and step.chord is not None
-    sections = block_means(step.shape, blocks=settings.section_blocks)
-    functions = min(settings.shape_functions, len(sections.s) // 2)
+    sections = block_means(step.shape, blocks=SECTION_BLOCKS)
+    functions = min(SHAPE_FUNCTIONS, len(sections.s) // 2)
     basis = smooth_basis(sections.s, float(step.shape.s[-1]), functions=functions)
     stated = step.chord_std if step.chord_std is not None else settings.chord_std * step.chord
     whiten = _whitening(step.chord, stated, sections, basis, settings, noise)

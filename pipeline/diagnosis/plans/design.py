@@ -231,11 +231,9 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         observation,
         Extension(base, facts),
         vector,
-        iterations=settings.iterations,
-        tolerance=settings.tolerance,
         near=made,
     )
-    suspicion = suspect(observation, fitted, SUSPECTS, visible=settings.visible, trace=settings.trace)
+    suspicion = suspect(observation, fitted, SUSPECTS)
     return scored(test, observation, fitted, suspicion, settings)
 
 
@@ -261,9 +259,7 @@ def _cause_plan(
         )
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
-    smallest = detectable_amount(
-        bench.observation, bench.base, suspicion, index, power=settings.power, trace=settings.trace
-    )
+    smallest = detectable_amount(bench.observation, bench.base, suspicion, index, power=settings.power)
     bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
     twin, closeness = nearest(table)
     separated = None

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 
 from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.fits.search import Suspicion, direction
+from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.evidence import log_gain
 from pipeline.diagnosis.posterior.hypotheses import SHARES
@@ -41,7 +41,7 @@ def sigma_needed(plausible: float, *, forms: int, causes: int, sign: int, power:
     return float(brentq(short, 0.0, LOUDEST)) + float(ndtri(power))
 
 
-def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float) -> dict[int, float]:
+def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) -> dict[int, float]:
     """Smallest amount of every form of a cause (direction -> amount) that is found with the given power.
 
     By the trace of each form as it was computed; infinite where the data do not show it, or only at more than
@@ -56,7 +56,7 @@ def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float,
             continue
         forms, causes = len(own), len(set(suspicion.owner.tolist()))
         needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=kind.sign, power=power)
-        at = trace * variant.trace * plausible
+        at = TRACE * variant.trace * plausible
         amount = at * (needed / (norm * at)) ** (1.0 / variant.power) if norm > 0.0 else np.inf
         found[k] = float(amount) if amount <= POSSIBLE * plausible else np.inf
     return found
@@ -66,20 +66,20 @@ POSSIBLE = 30.0
 """Plausible sizes: no rig has more of a cause."""
 
 
-def in_any_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float) -> float:
+def in_any_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) -> float:
     """Smallest amount of a cause that is found whatever form it has; infinite if some form never is."""
-    return max(in_each_form(fitted, suspicion, cause, power=power, trace=trace).values(), default=np.inf)
+    return max(in_each_form(fitted, suspicion, cause, power=power).values(), default=np.inf)
 
 
 def detectable_amount(
-    observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, power: float, trace: float
+    observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, power: float
 ) -> float:
     """Smallest amount of a cause, in its clearest form, that is found with the given power; infinite if none is.
 
     A trace that grows otherwise than in proportion (stiff ends: with the square) is computed anew at the amount found,
     by fixed-point steps in the logarithm; three reach a few per cent.
     """
-    each = in_each_form(fitted, suspicion, cause, power=power, trace=trace)
+    each = in_each_form(fitted, suspicion, cause, power=power)
     if not each:
         return float("inf")
     # forms that all lack a trace at their usual size may have one at a larger
@@ -91,7 +91,7 @@ def detectable_amount(
     forms, causes = len(suspicion.of(cause)), len(set(suspicion.owner.tolist()))
     sign = suspicion.causes[cause].sign
     needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=sign, power=power)
-    amount, at = needed / norm, trace * plausible
+    amount, at = needed / norm, TRACE * plausible
     basis = span(fitted.jacobian)
     for _ in range(3):
         if not LINEAR[0] * at < amount < LINEAR[1] * at or amount > POSSIBLE * plausible:

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
-from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
@@ -21,13 +21,12 @@ def named_causes(
     conclusion: Conclusion,
     again: Identified | None,
     extended: Curve | None,
-    settings: DiagnosisSettings,
 ) -> list[CausePart]:
     """One entry for each cause that was found, with its class of names, and its forms in the extended model.
 
     Where forms add up, the size is that of the extended model, whose std allows for other forms than were found.
     """
-    parts = _classes(bench, conclusion, settings)
+    parts = _classes(bench, conclusion)
     if again is None or extended is None:
         return parts
     columns = len(extended.tangent_factor_Nm2[0])
@@ -39,12 +38,12 @@ def named_causes(
     return found
 
 
-def _classes(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> list[CausePart]:
+def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     """The causes of the accepted explanation, each with whatever the data allow in its place."""
     accepted = conclusion.accepted
     if accepted is None:
         return []
-    catalogue, twins = bench.suspicion.causes, _twins(bench, conclusion, settings)
+    catalogue, twins = bench.suspicion.causes, _twins(bench, conclusion)
     parts = []
     for cause, names in zip(accepted.causes, conclusion.classes, strict=True):
         kind = catalogue[cause]
@@ -63,12 +62,12 @@ def _classes(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettin
     return parts
 
 
-def _twins(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> list[TwinPart]:
+def _twins(bench: Workbench, conclusion: Conclusion) -> list[TwinPart]:
     """Other single causes that leave no more than noise, the likeliest first; none where two causes were found."""
     believed, accepted = conclusion.posterior, conclusion.accepted
     if conclusion.unmodelled or accepted is None or len(accepted.causes) > 1:
         return []
-    fits = [one.causes[0] for one in conclusion.singles if one.fitted.reduced_chi2 < settings.fits]
+    fits = [one.causes[0] for one in conclusion.singles if one.fitted.reduced_chi2 < FITS]
     found = [(believed.of(k), bench.suspicion.causes[k]) for k in dict.fromkeys(fits) if k not in accepted.causes]
     return [
         TwinPart(name=cause.name, probability=chance, settled_by=str(entry("settled", cause.name)))

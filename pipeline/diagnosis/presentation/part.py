@@ -46,9 +46,9 @@ def present(
             np.array([error.get(step.step, 0.0) for step in bench.test.steps])
             for error in bench.test.common_force_errors
         ]
-        again = identified_again(bench.observation, accepted.fitted, settings, force_errors=errors)
+        again = identified_again(bench.observation, accepted.fitted, force_errors=errors)
     extended = None if again is None else extended_curve(again, settings)
-    causes = named_causes(bench, conclusion, again, extended, settings)
+    causes = named_causes(bench, conclusion, again, extended)
     word = verdict(
         found=accepted is not None,
         unmodelled=conclusion.unmodelled,
@@ -91,7 +91,7 @@ def present(
         leftover=leftover,
         residuals_before=residual_map(bench.test, bench.observation, bench.base),
         residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
-        twins=confusable(bench, conclusion, settings),
+        twins=confusable(bench, conclusion),
         left_out_photos=photos,
         left_out_forces=forces,
     )

@@ -26,6 +26,10 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 Array = NDArray[np.float64]
 
 
+TWINS_SHOWN = 8
+"""Causes in the table of cosines; more cannot be read."""
+
+
 def table(
     bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, gain: GainPart | None
 ) -> list[CauseRow]:
@@ -42,10 +46,8 @@ def table(
             continue
         found = refitted.get(index)
         size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found, loudest)
-        detectable = detectable_amount(
-            bench.observation, bench.base, suspicion, index, power=settings.power, trace=settings.trace
-        )
-        whatever = in_any_form(bench.base, suspicion, index, power=settings.power, trace=settings.trace)
+        detectable = detectable_amount(bench.observation, bench.base, suspicion, index, power=settings.power)
+        whatever = in_any_form(bench.base, suspicion, index, power=settings.power)
         accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
         rows.append(
             CauseRow(
@@ -143,14 +145,14 @@ def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSetti
     return sorted(spots, key=lambda spot: -spot.stiffness_bias_at_plausible_size)
 
 
-def confusable(bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings) -> dict[str, dict[str, float]]:
+def confusable(bench: Workbench, conclusion: Conclusion) -> dict[str, dict[str, float]]:
     """Cosines among the loudest causes and whatever is in the set of names."""
     suspicion, closeness = bench.suspicion, _closeness(bench)
     loudness = np.zeros(len(suspicion.causes))
     np.maximum.at(loudness, suspicion.owner, suspicion.statistic)
     chosen = list(dict.fromkeys(cause for names in conclusion.classes for cause in names))
     chosen += [int(k) for k in np.argsort(-loudness) if int(k) not in chosen and closeness[k, k] > 0.0]
-    chosen = chosen[: settings.twins_shown]
+    chosen = chosen[:TWINS_SHOWN]
     names = [suspicion.causes[k].name for k in chosen]
     return {
         name: {other: float(closeness[k, j]) for other, j in zip(names, chosen, strict=True) if j != k}

@@ -31,7 +31,11 @@ class Pair:
     gain: float
 
 
-def pair_gains(z: Array, cosine: Array, sign: Array, owner: NDArray[np.int_], *, collinear: float) -> Array:
+COLLINEAR = 0.985
+"""|cos| above which the split between two causes is noise."""
+
+
+def pair_gains(z: Array, cosine: Array, sign: Array, owner: NDArray[np.int_], *, collinear: float = COLLINEAR) -> Array:
     """Chi-square removed by each pair (k, k); 0 where a pair is not allowed.
 
     Not allowed: two directions of one cause, pairs closer than ``collinear`` (their split would be noise), and pairs

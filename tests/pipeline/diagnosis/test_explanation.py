@@ -52,7 +52,7 @@ def test_a_steep_tilt_is_one_to_the_noise(tilt):
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=3, reading=Reading(tilt=tilt, distance=0.86))
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
     index = [cause.name for cause in SUSPECTS].index("camera_tilt")
-    found = refit_one(bench.observation, bench.base, bench.suspicion, index, SETTINGS)
+    found = refit_one(bench.observation, bench.base, bench.suspicion, index)
     amount, std = found.amount(SUSPECTS[index])
     assert amount == pytest.approx(sum(tilt), abs=3.0 * std) and std < 0.02
     assert found.fitted.chi2 < 1.3 * (len(bench.base.residual) - found.fitted.extension.size)
@@ -62,7 +62,7 @@ def test_two_elements_that_slip_are_found_as_two():
     """Truth by collocation; each slip within four of its standard deviations, and the law is itself again."""
     bench = prepared(Cable(memory=ELEMENTS), 6)
     index = [cause.name for cause in SUSPECTS].index("hysteresis")
-    found = refit_one(bench.observation, bench.base, bench.suspicion, index, SETTINGS)
+    found = refit_one(bench.observation, bench.base, bench.suspicion, index)
     own = found.fitted.extension.amounts_at
     assert len(own) == 2
     slip = sorted((found.fitted.vector[at + 1], np.sqrt(found.fitted.covariance[at + 1, at + 1])) for at in own)
@@ -76,9 +76,7 @@ def test_a_bearing_that_yields_before_it_slips_is_no_friction_of_wires():
     """Three sigma apart at the least, and the moment at which it slips is the hidden one within four sigma."""
     bench = prepared(Cable(bearing_friction=1.8e-3, stick_angle=0.03), 34)
     friction, wires = (
-        refit_one(
-            bench.observation, bench.base, bench.suspicion, [cause.name for cause in SUSPECTS].index(name), SETTINGS
-        )
+        refit_one(bench.observation, bench.base, bench.suspicion, [cause.name for cause in SUSPECTS].index(name))
         for name in ("bearing_friction", "hysteresis")
     )
     assert friction.gain > wires.gain + 9.0
@@ -101,7 +99,7 @@ def test_a_start_is_a_possible_cable_where_none_tried_has_an_equilibrium(plain, 
     monkeypatch.setattr(refit, "run", lambda *_, **__: SimpleNamespace(prediction=None))
     direction = int(plain.suspicion.of([cause.name for cause in SUSPECTS].index("hysteresis"))[0])
     term = plain.suspicion.terms[direction]
-    added = Addition(plain.base, (term,), (1.0,), 1e9 * plain.suspicion.columns[:, [direction]], 0.2)
+    added = Addition(plain.base, (term,), (1.0,), 1e9 * plain.suspicion.columns[:, [direction]])
     assert added.extension.admissible(linear_start(plain.observation, added))
 
 

@@ -14,7 +14,7 @@ from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.faults import faults_of_input
-from pipeline.diagnosis.fits.fit import evaluated
+from pipeline.diagnosis.fits.fit import FITS, evaluated
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -54,9 +54,9 @@ def benched(cable, protocol, name, seed):
 def test_a_profile_of_no_form_is_found_to_the_noise_and_f_comes_back(name, cable, protocol):
     """Three spots left many times the noise of the first three, and put f_EI 2 to 31 % off."""
     bench = benched(cable, protocol, name, seed=60400)
-    found = in_deeper_valley(bench, refit_one(bench.observation, bench.base, bench.suspicion, 0, SETTINGS), SETTINGS)
-    assert found.fitted.reduced_chi2 < SETTINGS.fits
-    again = identified_again(bench.observation, found.fitted, SETTINGS)
+    found = in_deeper_valley(bench, refit_one(bench.observation, bench.base, bench.suspicion, 0))
+    assert found.fitted.reduced_chi2 < FITS
+    again = identified_again(bench.observation, found.fitted)
     law = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)
     assert f_error(law, cable)[0] < 0.02
     extension, vector = found.fitted.extension, found.fitted.vector
@@ -70,7 +70,7 @@ def test_a_profile_of_no_form_is_found_to_the_noise_and_f_comes_back(name, cable
 def test_f_is_told_where_the_cable_was_bent_beyond_its_rest():
     """Where K0 varies by 3 1/m the largest curvature is one at rest: f_EI beyond the excess was a guess, 6 % off."""
     bench = benched(Cable(K0_profile=step(3.0, 0.5)), SIX, PROFILES[0], seed=60401)
-    fitted = refit_one(bench.observation, bench.base, bench.suspicion, 0, SETTINGS).fitted
+    fitted = refit_one(bench.observation, bench.base, bench.suspicion, 0).fitted
     bent = max(float(one.kappa.max()) for one in fitted.run.steps)
     assert visited(fitted)[1] < bent - 2.0
 

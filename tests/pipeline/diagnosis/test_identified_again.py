@@ -23,8 +23,8 @@ def off(cable, name, protocol, largest, seed):
     test = hidden_test(cable, protocol, largest=largest, seed=seed)
     causes = [cause for cause in CATALOGUE if cause.name == name]
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
-    accepted = refit_one(bench.observation, bench.base, bench.suspicion, 0, SETTINGS)
-    again = identified_again(bench.observation, accepted.fitted, SETTINGS)
+    accepted = refit_one(bench.observation, bench.base, bench.suspicion, 0)
+    again = identified_again(bench.observation, accepted.fitted)
     found = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)
     kappa, tangent, std = (np.array(v) for v in (found.kappa_per_m, found.tangent_Nm2, found.tangent_std_Nm2))
     truth = cable.law(kappa - cable.K0)[1]

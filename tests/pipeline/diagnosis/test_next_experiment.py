@@ -20,7 +20,7 @@ def refits(protocol, amount, names, hidden):
     cable, reading = HIDE[hidden](amount, Form())
     test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=3, reading=reading)
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
-    found = [refit_one(bench.observation, bench.base, bench.suspicion, NAMES.index(n), SETTINGS) for n in names]
+    found = [refit_one(bench.observation, bench.base, bench.suspicion, NAMES.index(n)) for n in names]
     return bench, found
 
 

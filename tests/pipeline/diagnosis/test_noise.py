@@ -51,7 +51,6 @@ def test_block_means_lie_on_the_curve(shape):
 
 @pytest.mark.parametrize(("factor", "stretch"), [(1.0, 1.0), (1.4, 1.0), (1.0, 2.8), (0.7, 0.6)])
 def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
-    settings = DiagnosisSettings()
     blocks = block_means(shape, blocks=96)
     basis = smooth_basis(blocks.s, 0.181, functions=20)
     smooth = np.linalg.qr(basis)[0]
@@ -64,9 +63,6 @@ def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
             [root @ rng.standard_normal(len(blocks.s)) + misfit for _ in range(7)],
             [blocks] * 7,
             [basis] * 7,
-            stretches=settings.noise_stretches,
-            stretch_spread=settings.noise_stretch_spread,
-            prior_weight=settings.noise_prior_weight,
         )
         doubt.append(found.doubt)
         slow.append(np.sum(smooth * (section_covariance(blocks, factor=found.factor, stretch=found.stretch) @ smooth)))

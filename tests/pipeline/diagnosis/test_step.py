@@ -6,6 +6,7 @@ import pytest
 from fixtures.effects import HIDE, LARGEST, Form
 from fixtures.hidden import THREE, hidden_test, nudged
 from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.diagnosis.fits.fit import TOLERANCE
 from pipeline.diagnosis.fits.step import Bounds, Linearised, lasting, least_distance, reach
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -47,7 +48,7 @@ def test_a_law_at_the_border_of_what_has_an_equilibrium_is_a_minimum_like_any_ot
     fitted = bench.base
     # creeping along the border, a fit ended at a chi-square of 142 with one processor, and of 223 with another
     assert fitted.converged
-    assert moved.base.chi2 == pytest.approx(fitted.chi2, abs=SETTINGS.tolerance)
+    assert moved.base.chi2 == pytest.approx(fitted.chi2, abs=TOLERANCE)
     assert moved.limit == pytest.approx(bench.limit, abs=1e-3)  # it falls with sigma: a thousandth changes nothing
     # no step from there goes lower or farther than it may
     bounds, within = lasting(fitted.extension, fitted.vector), reach(fitted.extension)

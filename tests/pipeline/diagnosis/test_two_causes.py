@@ -11,6 +11,7 @@ from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.exchange import exchanged
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import refitted_pairs, with_all_forms
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
@@ -22,7 +23,7 @@ SETTINGS = DiagnosisSettings()
 
 
 def test_a_search_whose_effort_is_spent_begins_nothing():
-    assert exchanged(SimpleNamespace(), [SimpleNamespace(causes=(0, 1), worth=1.0)], SETTINGS, Effort.of(-1)) == []
+    assert exchanged(SimpleNamespace(), [SimpleNamespace(causes=(0, 1), worth=1.0)], Effort.of(-1)) == []
     assert not Effort().spent
 
 
@@ -53,8 +54,8 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     names = [cause.name for cause in SUSPECTS]
     scale, decay, lens = (names.index(n) for n in ("scale_error", "relaxation", "lens_distortion"))
     given = Pair(bench.suspicion.best(scale), bench.suspicion.best(decay), 0.0)
-    (wrong,) = refitted_pairs(bench, [given], SETTINGS, hopeless=bench.base.chi2)
-    best = max(exchanged(bench, [wrong], SETTINGS), key=lambda pair: pair.gain)
+    (wrong,) = refitted_pairs(bench, [given], hopeless=bench.base.chi2)
+    best = max(exchanged(bench, [wrong]), key=lambda pair: pair.gain)
     assert best.causes == (lens, decay) and best.gain > wrong.gain + 16.0
 
 
@@ -67,9 +68,9 @@ def test_each_half_of_a_pair_has_all_its_forms():
     names = [cause.name for cause in SUSPECTS]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
     given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)
-    (half,) = refitted_pairs(bench, [given], SETTINGS, hopeless=np.inf)
-    (whole,) = with_all_forms(bench, [half], SETTINGS)
-    assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SETTINGS.shape_gain
+    (half,) = refitted_pairs(bench, [given], hopeless=np.inf)
+    (whole,) = with_all_forms(bench, [half])
+    assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SHAPE_GAIN
     amount, std = whole.amount(SUSPECTS[lens])
     assert abs(amount - 0.012) < 4.0 * std
 
