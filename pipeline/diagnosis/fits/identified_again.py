@@ -26,7 +26,7 @@ from rod.law_prior import Posterior, averaged, priors
 
 Array = NDArray[np.float64]
 
-LAYINGS, MOVES, SETTLED = 2, 6, 0.05
+LAYINGS, MOVES, SETTLED = 3, 6, 0.05
 """Times that the abscissa is laid along the law found, steps to the mean on each, and the standard deviations by which
 the unknowns may still move then."""
 
