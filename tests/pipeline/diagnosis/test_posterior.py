@@ -198,8 +198,7 @@ def test_displacements_that_scatter_are_no_misfit_that_nothing_explains(protocol
     assert part.verdict == "adequate", part.headline
     (told,) = (finding for finding in findings if finding.code == "log/displacement-scatter")
     # six errors of which a line was taken: their scatter is known to a third, 95 % within 0.35 to 1.7 of it
-    seen = 1e-6 * float(told.message.split("by about ")[1].split(" um")[0])
-    assert 0.35 * SCATTER < seen < 1.7 * SCATTER
+    assert 0.35 * SCATTER < told.said.values["std_m"] < 1.7 * SCATTER
 
 
 def test_a_cause_is_named_beside_displacements_that_scatter():

@@ -25,7 +25,7 @@ def test_the_photo_whose_absence_heals_is_to_blame() -> None:
     assert jointly("ab", (1.0, 2.0), total) == ((1.0, 2.0), 3.0)
     (first, second), found = jointly("ab", (1.0, 0.0), total)
     assert (first, found) == (1.0, 1.0) and isinstance(second, Rejected)
-    assert second.image == "b" and "b: the tracing failed (AssertionError: a zero)" in second.reason
+    assert second.image == "b" and "the tracing failed (AssertionError: a zero)" in second.reason
     assert jointly("ab", (0.0, 0.0), total) == ((0.0, 0.0), None)
 
 
