@@ -45,6 +45,24 @@ class SegmentationSettings(StageSettings):
     opening_widths: float = Field(
         0.3, ge=0, lt=1, description="widths; specks removed: texture is finer than the cable"
     )
+    cover_hole_widths: tuple[float, float] = Field(
+        (0.5, 3.2), description="widths; radii of holes that the rims of covers leave: covers are 2 to 6 diameters wide"
+    )
+    ring_roundness: float = Field(
+        0.85,
+        gt=0,
+        le=1,
+        description="share of its smallest circle that a hole fills; a disc in cells 0.93 and more, a square 0.64",
+    )
+    ring_wall_widths: float = Field(
+        0.6, gt=0, description="widths; how thick the rim of a cover may be: loops of cable are one width thick"
+    )
+    ring_free_share: float = Field(
+        0.6,
+        gt=0,
+        lt=1,
+        description="of the directions in which the ring is thinner: the cable takes a tenth, a shadow a third of them",
+    )
     thick_widths: float = Field(
         1.7, gt=1, description="widths; wider things are objects: a soft shadow widens the mask by up to a half"
     )

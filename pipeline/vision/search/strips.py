@@ -56,17 +56,39 @@ class Strip:
 
 
 def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSettings) -> Mask:
-    """Mask of what stands out, closed over highlights and filled where writing leaves holes."""
+    """Mask of what stands out, closed over highlights and filled where writing and covers' rims leave holes."""
     mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(settings.closing_widths * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
         for contour, (_, _, _, parent) in zip(contours, tree[0] if tree is not None else (), strict=True)
-        if parent >= 0 and cv2.contourArea(contour) < width**2
+        if parent >= 0 and (cv2.contourArea(contour) < width**2 or _in_ring(contour, mask, width, settings))
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
     return _morphology(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
+
+
+def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float, settings: SegmentationSettings) -> bool:
+    """True for the hole of a ring that is as large as a cover and thinner than the cable: the rim of a cover.
+
+    A cable that runs into it would make a loop of it, as if it crossed itself; a loop of cable is as thick as that.
+    """
+    center, radius = cv2.minEnclosingCircle(contour)
+    low, high = settings.cover_hole_widths
+    if not low * width <= radius <= high * width:
+        return False
+    if cv2.contourArea(contour) < settings.ring_roundness * np.pi * radius**2:
+        return False
+    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    beyond = np.asarray(center)[:, None] + (radius + settings.ring_wall_widths * width) * np.stack(
+        [np.cos(angle), np.sin(angle)]
+    )
+    u, v = np.rint(beyond).astype(int)
+    inside = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+    free = np.ones(len(angle), dtype=bool)
+    free[inside] = mask[v[inside], u[inside]] == 0
+    return bool(np.mean(free) >= settings.ring_free_share)
 
 
 def thick_part(mask: Mask, least: float) -> Mask:
