@@ -20,7 +20,7 @@ from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
-from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
 from pipeline.vision.search.ends import led_on, straight_body
 from pipeline.vision.search.strips import Strip, end_direction, thick_part
 
@@ -55,6 +55,8 @@ def fades(standout: Standout, cut: CrossCut, width: float, settings: Segmentatio
     if len(ahead) < near.stop or before <= 0.0:
         return False
     ahead = ahead[: near.stop + round(width)]
+    if not _may_fade(standout, cut, ahead, near, width, settings.fading_share * before, settings):
+        return False
     more = cut_across(standout, ahead, width, settings, known=True, weights=cut.weights)
     same = np.abs(more.width[near] / width - 1.0) < settings.beyond_width_off
     faint = median(more.step[near]) > settings.fading_share * before
@@ -164,7 +166,7 @@ def _ahead(
     best, scraps = None, 0
     for lead in settings.beyond_leads_widths:
         led, ahead = _led_into_picture(standout, path, width, lead, settings)
-        if len(ahead) < settings.beyond_least_widths * width:
+        if not _may_go_on(standout, cut, ahead, width, usual, settings):
             continue
         for known in {True, cut.known}:
             more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
@@ -193,6 +195,49 @@ def _end_of_more(
     # edges are lost at the rounded corners of an end, a width of it at most
     faint = np.flatnonzero(more.step[stop : stop + round(width)] < settings.seen_share * contrast)
     return min(stop + (int(faint[0]) if len(faint) else round(width)), len(alike))
+
+
+def _may_go_on(
+    standout: Standout, cut: CrossCut, ahead: Array, width: float, usual: float, settings: SegmentationSettings
+) -> bool:
+    """False where so little stands out of the ground about a lead that, cut across, it could show no more of the same.
+
+    Sections alike hold a core, at least half a width broad, that stands out as `_alike` asks in its median: a quarter
+    of a width then stands out so far, wherever it lies.
+    """
+    least = settings.beyond_least_widths * width
+    if len(ahead) < least:
+        return False
+    _, normal = path_normals(ahead)
+    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
+    light, _, _ = straighten(standout.picture, ahead, normal, width, settings)
+    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
+    darkest = np.maximum(light.mean(axis=2).min(axis=1), settings.beyond_darkest)
+    strong = (-relief if cut.dark else relief) > (settings.beyond_contrast[0] * usual) * darkest[:, None]
+    enough = 0.25 * width / (offsets[1] - offsets[0])
+    length = float(np.hypot(*np.diff(ahead, axis=0).T).sum())
+    return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * length / (len(rows) - 1) > least)
+
+
+def _may_fade(
+    standout: Standout,
+    cut: CrossCut,
+    ahead: Array,
+    near: slice,
+    width: float,
+    least: float,
+    settings: SegmentationSettings,
+) -> bool:
+    """False where so little stands out of the ground by ``least`` about a lead that it shows no cable that only fades.
+
+    Half of the sections ``near`` would hold a core half a width broad (edges a width apart to 15 %, a pair's to 20 % of
+    that) that stands out so far in its median: a fifth of a width does then, on two fifths of them at the very least.
+    """
+    _, normal = path_normals(ahead)
+    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
+    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
+    strong = ((-relief if cut.dark else relief) > least).sum(axis=1) >= 0.2 * width / (offsets[1] - offsets[0])
+    return bool(np.count_nonzero(strong) * len(ahead) / len(rows) >= 0.4 * (near.stop - near.start))
 
 
 def _led_into_picture(
