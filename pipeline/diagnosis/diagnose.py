@@ -10,8 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.search import searched
+from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
 from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, force_break
@@ -31,6 +33,9 @@ from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
+
+REFITTED = 3
+"""Causes, best linear scores first, that are refitted before a photo or a force is blamed."""
 
 
 def diagnose(
@@ -170,8 +175,15 @@ def _item_at_fault(bench: Workbench, settings: DiagnosisSettings, *, by_cause: f
         return None
     freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
     fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * item.gain
-    better = item.gain - item.rows > by_cause + settings.fault_sigma**2
-    return outlier_fault(bench.test, item) if fits and better else None
+    least = item.gain - item.rows - settings.fault_sigma**2
+    if not fits or by_cause >= least:
+        return None
+    # scores are linear ones: about a base model that is far off, a cause explains more than they promise
+    for cause in candidates(bench.suspicion)[:REFITTED]:
+        one = refit_one(bench.observation, bench.base, bench.suspicion, cause)
+        if one is not None and one.gain >= least:
+            return None
+    return outlier_fault(bench.test, item)
 
 
 def _nothing_to_compare(reason: Message) -> DiagnosisPart:

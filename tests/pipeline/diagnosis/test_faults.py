@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import SIX, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -167,3 +167,10 @@ def test_a_log_that_stands_still_drives_no_simulation(honest, displacement):
     steps = tuple(replace(step, displacement=displacement) for step in honest.steps)
     part, findings = diagnose(replace(honest, steps=steps), None, SETTINGS)
     assert part.verdict == "underpowered" and "one displacement for all steps" in part.headline and findings == ()
+
+
+def test_a_cause_beside_a_steep_law_is_no_photo_at_fault():
+    """About a base model far off linear scores promise less than leaving out the force-free photo; a refit does not."""
+    cable = Cable(EI0=0.02, EI1=0.0025, kc=0.6, form="exponential", compliance=8.39e-05)
+    part, findings = diagnose(hidden_test(cable, LOOP, largest=0.0138, seed=900), None, SETTINGS)
+    assert [cause.name for cause in part.causes] == ["rig_compliance"] and findings == (), part.headline
