@@ -31,6 +31,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
+from rod.moment_curve import LawOfBend, MomentCurve, moment_curve
+
 Array = NDArray[np.float64]
 
 DEGREE = 3
@@ -189,56 +191,7 @@ def _cumulated(rates: Array, xi: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
-    """A moment curve through (bend, moment) points with the tangents there, cubic between, straight beyond them.
-
-    Attributes
-    ----------
-    bends : (g,) 1/m
-    table : (5, g + 1)
-        Rising powers of the moment on each segment and, last, its primitive at the origin. Segment 0 lies below the
-        first point, the last one above the last.
-    origin : (g + 1,) 1/m
-    """
-
-    bends: Array
-    table: Array
-    origin: Array
-
-    def at(self, bend: Array) -> tuple[Array, Array]:
-        """Moment and tangent at bends (n,)."""
-        segment = self.bends.searchsorted(bend)
-        t = bend - self.origin.take(segment)
-        a, b, c, d = self.table[:4].take(segment, axis=1)
-        return ((d * t + c) * t + b) * t + a, (3.0 * d * t + 2.0 * c) * t + b
-
-    def energy(self, bend: Array) -> Array:
-        """Integral of the moment from rest to bends (n,), N."""
-        segment = self.bends.searchsorted(bend)
-        t = bend - self.origin.take(segment)
-        a, b, c, d, energy = self.table.take(segment, axis=1)
-        return np.asarray((((0.25 * d * t + c / 3.0) * t + 0.5 * b) * t + a) * t + energy)
-
-
-def pieces(K: Array, m: Array, f: Array, rest: int) -> Pieces:
-    """The curve through bends K (g,) and moments m (g,) with tangents f (g,); ``rest`` is the place of the origin."""
-    h = np.diff(K)
-    mean = np.diff(m) / h
-    table = np.zeros((5, K.size + 1))
-    table[0, 1:-1], table[1, 1:-1] = m[:-1], f[:-1]
-    table[2, 1:-1] = (3.0 * mean - 2.0 * f[:-1] - f[1:]) / h
-    table[3, 1:-1] = (f[:-1] + f[1:] - 2.0 * mean) / h**2
-    table[0, 0], table[1, 0], table[0, -1], table[1, -1] = m[0], f[0], m[-1], f[-1]
-    a, b, c, d = table[:4, 1:-1]
-    rise = (((0.25 * d * h + c / 3.0) * h + 0.5 * b) * h + a) * h
-    energy = np.concatenate([[0.0], np.cumsum(rise)])
-    energy -= energy[rest]
-    table[4] = np.concatenate([energy[:1], energy])
-    return Pieces(K, table, np.concatenate([K[:1], K]))
-
-
-@dataclass(frozen=True, eq=False)
-class ComplianceLaw:
+class ComplianceLaw(LawOfBend):
     """One law: coefficients (p,) of log c on a basis. A moment curve (`rod.characteristic.ParametricCurve`)."""
 
     basis: LawBasis
@@ -313,34 +266,14 @@ class ComplianceLaw:
     # The moment curve -------------------------------------------------------------------------------------------------
 
     @cached_property
-    def curve(self) -> Pieces:
+    def curve(self) -> MomentCurve:
         """The moment over the bend K - K0."""
-        return pieces(self.bends, self.basis.moments, 1.0 / self.rates, self.basis.rest)
+        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates, self.basis.rest)
 
     @property
     def stiffness_scale(self) -> float:
         """Largest tangent stiffness on the basis, N m^2; used for scaling only."""
         return float(1.0 / self.rates.min())
-
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment m(K, K0), N m."""
-        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[0]
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent dm/dK, N m^2."""
-        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[1]
-
-    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
-        return lambda K: self.curve.at(K - K0)
-
-    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Energy per length int_{K0}^{K} m dk, N."""
-        return self.curve.energy(np.asarray(K, float) - np.asarray(K0, float))
-
-    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative dm/dK0, N m^2: the law moves with K0."""
-        return -self.tangent(K, K0)
 
     @property
     def parameters(self) -> int:

@@ -13,20 +13,20 @@ Units: bends in 1/m, stiffness in N m^2. Beyond the bends of its basis the stiff
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rod.compliance_law import ComplianceLaw, LawBasis, Pieces, pieces
+from rod.compliance_law import ComplianceLaw, LawBasis
+from rod.moment_curve import LawOfBend, MomentCurve, moment_curve
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class StiffnessLaw:
+class StiffnessLaw(LawOfBend):
     """One law: coefficients (p,) of log f on a basis of bends. A moment curve (`rod.characteristic.ParametricCurve`).
 
     ``rise`` is the moment over the bend, told as `rod.compliance_law` tells the bend over the moment.
@@ -40,34 +40,14 @@ class StiffnessLaw:
         return self.rise.basis
 
     @cached_property
-    def curve(self) -> Pieces:
+    def curve(self) -> MomentCurve:
         """The moment over the bend K - K0."""
-        return pieces(self.basis.moments, self.rise.bends, self.rise.rates, self.basis.rest)
+        return moment_curve(self.basis.moments, self.rise.bends, self.rise.rates, self.basis.rest)
 
     @property
     def stiffness_scale(self) -> float:
         """Largest tangent stiffness on the basis, N m^2; used for scaling only."""
         return float(self.rise.rates.max())
-
-    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
-        return lambda K: self.curve.at(K - K0)
-
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment m(K, K0), N m."""
-        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[0]
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent dm/dK, N m^2."""
-        return self.bound(np.asarray(K0, float))(np.asarray(K, float))[1]
-
-    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Energy per length int_{K0}^{K} m dk, N."""
-        return self.curve.energy(np.asarray(K, float) - np.asarray(K0, float))
-
-    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative dm/dK0, N m^2: the law moves with K0."""
-        return -self.tangent(K, K0)
 
     @property
     def parameters(self) -> int:
