@@ -219,13 +219,18 @@ class ComplianceLaw(LawOfBend):
         return np.asarray(rise - rise[self.basis.rest])
 
     @cached_property
-    def _bends_by(self) -> Array:
-        """Derivative of `bends` by the coefficients, (g, p) 1/m."""
+    def _rise(self) -> CubicHermiteSpline:
+        """K - K0 over the moments of the basis, 1/m."""
+        return CubicHermiteSpline(self.basis.moments, self.bends, self.rates)
+
+    @cached_property
+    def _rise_by(self) -> CubicHermiteSpline:
+        """Its derivative by the coefficients, (p,) 1/m: made once for all steps of a test."""
         b = self.basis
         rates = np.empty((b.xi.size, b.size))
         rates[::2], rates[1::2] = self._paces[::2, None] * b.at_ends, self._paces[1::2, None] * b.middle
         rise = _cumulated(rates, b.xi)
-        return np.asarray(rise - rise[b.rest])
+        return CubicHermiteSpline(b.moments, rise - rise[b.rest], self.rates[:, None] * b.at_ends)
 
     def compliance(self, moment: ArrayLike) -> Array:
         """c(m), (n,) 1/(N m^2)."""
@@ -251,17 +256,17 @@ class ComplianceLaw(LawOfBend):
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""
         m, b = np.asarray(moment, float), self.basis
-        inside = CubicHermiteSpline(b.moments, self.bends, self.rates)(np.clip(m, b.moments[0], b.moments[-1]))
+        inside = self._rise(np.clip(m, b.moments[0], b.moments[-1]))
         below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
         return np.asarray(inside + self.rates[0] * below + self.rates[-1] * above)
 
     def bend_by_coefficients(self, moment: ArrayLike) -> Array:
         """Derivative of `bend`, (n, p) 1/m."""
         m, b = np.asarray(moment, float), self.basis
-        slopes = self.rates[:, None] * b.at_ends
-        inside = CubicHermiteSpline(b.moments, self._bends_by, slopes)(np.clip(m, b.moments[0], b.moments[-1]))
+        inside = self._rise_by(np.clip(m, b.moments[0], b.moments[-1]))
         below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
-        return np.asarray(inside + below[:, None] * slopes[0] + above[:, None] * slopes[-1])
+        slopes = self.rates[[0, -1], None] * b.at_ends[[0, -1]]
+        return np.asarray(inside + below[:, None] * slopes[0] + above[:, None] * slopes[1])
 
     # The moment curve -------------------------------------------------------------------------------------------------
 
