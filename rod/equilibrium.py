@@ -24,7 +24,7 @@ from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import PATH_STEPS, followed
-from rod.reduction import Hold, System
+from rod.reduction import Balance, Hold, System
 from rod.section import Memory, Section
 
 __all__ = ["Branch", "Equilibrium", "Outcome", "Start", "solve"]
@@ -57,10 +57,10 @@ class Equilibrium:
         Force of each support on the cable.
     angles : (elements + 2,) rad
         Edge angles, the unknowns; a warm start for the next equilibrium.
-    rod : Rod
-    hold : Hold
-    before, after : Memory
-        Memory at the start of the step, and after it.
+    system : System
+        Of the rod, what was imposed and the memory before; with their ``balance`` at this state.
+    after : Memory
+        Memory after the step.
     iterations : int
         Newton steps, all increments together.
     """
@@ -77,11 +77,25 @@ class Equilibrium:
     right_reaction: Array
     left_reaction: Array
     angles: Array
-    rod: Rod
-    hold: Hold
-    before: Memory
+    system: System
+    balance: Balance
     after: Memory
     iterations: int
+
+    @property
+    def rod(self) -> Rod:
+        """The discrete rod."""
+        return self.system.rod
+
+    @property
+    def hold(self) -> Hold:
+        """What was imposed."""
+        return self.system.hold
+
+    @property
+    def before(self) -> Memory:
+        """Memory at the start of the step."""
+        return self.system.memory
 
     @property
     def good(self) -> bool:
@@ -191,7 +205,7 @@ def _force_free(system: System) -> Trial:
 
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     """Shape at the vertices from the edge angles; the bearing axes join in where rigid pieces are."""
-    rod, memory, angles, R = system.rod, system.memory, trial.angles, trial.R
+    rod, angles, R = system.rod, trial.angles, trial.R
     h, n = rod.edges, rod.edges.size
     path, (theta, kappa, moment) = np.zeros((2, n + 1)), np.zeros((3, n + 1))
     np.cumsum(h * system.directions(trial.balance.edge), axis=1, out=path[:, 1:])
@@ -214,9 +228,8 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
         right_reaction=R,
         left_reaction=-R if load is None else -R - load.sum(axis=0),
         angles=angles,
-        rod=rod,
-        hold=system.hold,
-        before=memory,
-        after=rod.advanced(angles, memory),
+        system=system,
+        balance=trial.balance,
+        after=rod.advanced(angles, system.memory),
         iterations=steps,
     )

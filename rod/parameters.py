@@ -121,6 +121,11 @@ class Directions:
         return weights
 
     @cached_property
+    def vertices(self) -> Array:
+        """Change of the arc lengths of all vertices with the edges, (q, n + 2)."""
+        return np.concatenate((np.zeros((len(self.names), 1)), np.cumsum(self.edges, axis=1)), axis=1)
+
+    @cached_property
     def lawful(self) -> bool:
         """Whether any control point changes."""
         return bool(self.ordinates.any())

@@ -124,6 +124,10 @@ class System:
         self._scale = np.sqrt(units)[:, None]
         self._scales = self._scale * self._scale.T
 
+    def __reduce__(self) -> tuple[type[System], tuple[Rod, Hold, Memory]]:
+        """Made again in another process: functions do not travel."""
+        return System, (self.rod, self.hold, self.memory)
+
     @cached_property
     def mass(self) -> Array:
         """Weight of every angle (n + 2,) in sums of squares of turns: its share of the length.

@@ -58,7 +58,10 @@ class Derivatives:
 
 
 class _Past(NamedTuple):
-    """Derivative of the memory at the start of a step: relaxed (e, q, n), reached (q, n), left and right angle (q,)."""
+    """Derivative of the memory at the start of a step: relaxed (e, q, n), reached (q, n), left and right angle (q,).
+
+    Of the mounted cable they are (1, q, n) and (q, 1).
+    """
 
     relaxed: Array
     reached: Array
@@ -113,13 +116,8 @@ def derivatives(
     """
     moves = directions(test, parameters)
     rest = _mounted(test, moves)
-    elements = 0 if test.friction is None else test.friction.stick.size
-    past = _Past(
-        np.repeat(moves.pre_curvature[None], elements, axis=0),
-        np.repeat(moves.scalar("set_threshold")[:, None], moves.pre_curvature.shape[1], axis=1),
-        rest.angles[:, 0],
-        rest.angles[:, -1],
-    )
+    start = moves.pre_curvature[None], moves.scalar("set_threshold")[:, None]
+    past = _Past(*start, rest.angles[:, 0], rest.angles[:, -1])
     if test.zero == "loaded":
         rest = rest._replace(zero=_step(test, test.free, moves, rest, past)[0].chord)
     found = []
@@ -161,9 +159,7 @@ def _step(
     test: BendingTest, step: Equilibrium, moves: Directions, rest: _Rest, past: _Past
 ) -> tuple[Derivatives, _Past]:
     """Derivatives of one step, and of the memory after it."""
-    rod, R = step.rod, step.right_reaction
-    system = System(rod, step.hold, step.before)
-    balance = system.balance(step.angles, R)
+    rod, system, balance = step.rod, step.system, step.balance
     edge, border = balance.edge, system.border(balance.edge)
     given = _explicit(test, step, balance, moves, rest, past)
     gradient, gap, extent = _residuals(system, step, balance, edge, given, moves)
@@ -262,7 +258,7 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     if support.stiffness:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
         moment = moment - support.stiffness * rest
-    if -1.0 < u < 1.0:
+    if support.friction_moment and -1.0 < u < 1.0:
         slow = slip + u * moves.scalar(f"stick_angle_{side}")
         moment = moment - support.friction_moment / support.stick_angle * slow
     return np.asarray(moment)
@@ -326,7 +322,7 @@ def _derivatives(
     keep = slice(0 if h[0] else 1, size if h[-1] else size - 1)
     return Derivatives(
         names=moves.names,
-        s=_cumulated(moves.edges)[:, keep].T,
+        s=moves.vertices[:, keep].T,
         x=path[0][:, keep].T,
         y=path[1][:, keep].T,
         theta=theta[:, keep].T,
@@ -338,10 +334,10 @@ def _derivatives(
 
 
 def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Past, dangles: Array, dK: Array) -> _Past:
-    """Derivative of the memory after the step."""
+    """Derivative of the memory after the step, of those parts of it that steps to come depend on."""
     section, memory, K = step.rod.section, step.before, balance.K
     reached = past.reached
-    if section.plastic_rate or moves.has("plastic_set"):
+    if section.plastic_rate:
         virgin = np.greater(K - section.pre_curvature, memory.reached)
         reached = np.where(virgin, dK - moves.pre_curvature, past.reached)
     relaxed = past.relaxed
@@ -354,6 +350,7 @@ def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Pas
         (-1, step.rod.right, memory.right_angle, past.right, "right"),
     ):
         turned = float(step.angles[end]) - slip
-        slid = dangles[:, end] - np.sign(turned) * moves.scalar(f"stick_angle_{side}")
-        slips.append(before if abs(turned) < support.stick_angle else slid)
+        if support.friction_moment and abs(turned) >= support.stick_angle:
+            before = dangles[:, end] - np.sign(turned) * moves.scalar(f"stick_angle_{side}")
+        slips.append(before)
     return _Past(relaxed, reached, *slips)
