@@ -9,13 +9,14 @@ load cell that drifts, a camera that looks askew. A cause changes either of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
+from rod.branch import Branch
 from rod.measurement import MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
@@ -52,6 +53,8 @@ class Facts:
         Largest force, and largest force times bow.
     curvature_scale : 1/m
         Range of the curvatures met.
+    rest_side : {"natural", "up", "down"}
+        To which photos show the mounted cable bowed; ``natural`` without such a photo.
     """
 
     branch: tuple[str, ...]
@@ -68,6 +71,7 @@ class Facts:
     force_scale: float
     moment_scale: float
     curvature_scale: float
+    rest_side: Branch = "natural"
 
     @property
     def travel(self) -> float:
@@ -111,7 +115,13 @@ def facts_of(test: MeasuredTest) -> Facts:
         force_scale=force,
         moment_scale=force * bow,
         curvature_scale=bend or 1.0 / test.length,
+        rest_side=_rest_side(steps),
     )
+
+
+def _rest_side(steps: Sequence[MeasuredStep]) -> Branch:
+    bows = [float(np.mean(step.shape.y)) for step in steps if step.branch == "mounted" and step.shape is not None]
+    return ("up" if np.mean(bows) > 0.0 else "down") if bows else "natural"
 
 
 def _range(kappa: Array) -> float:

@@ -1,8 +1,9 @@
 """Running a model: from cable, rig and observers to a prediction, and to how it moves with the base parameters.
 
-The mounted cable lies as it was made; every other step is bowed to the side the photos show (``up``), also where a fit
-tries a pre-curvature of the other sign. Derivatives with respect to control points, K0 and length come from
-`rod.sensitivity`; they are carried through the observers by a short difference, which costs no simulation.
+The mounted cable lies as it was made, or as its photo shows it where a wrong zero presses it; every other step is bowed
+to the side the photos show (``up``), also where a fit tries a pre-curvature of the other sign. Derivatives with respect
+to control points, K0 and length come from `rod.sensitivity`; they are carried through the observers by a short
+difference, which costs no simulation.
 """
 
 from __future__ import annotations
@@ -95,16 +96,23 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
 
     A mounted cable at displacement zero is free of force, also the straight one, whose chord cannot be imposed, and
     also under a load in the plane if displacement is counted from there; else, and with a wrong zero, its chord is
-    imposed like any other.
+    imposed like any other. Pushed together by a wrong zero it may bow to the side away from its own bend, as its photo
+    shows; pulled apart it keeps its own.
     """
     displacement = facts.displacement + model.shift
     mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
     at_rest = model.bending.load == (0.0, 0.0) or model.bending.zero == "loaded"
     free = [i for i in mounted if displacement[i] == 0.0 and at_rest]
-    held = [i for i in mounted if i not in free]
+    pulled = [i for i in mounted if i not in free and displacement[i] <= 0.0]
+    pressed = [i for i in mounted if i not in free and displacement[i] > 0.0]
     pushed = [i for i in range(len(facts.branch)) if i not in mounted]
-    groups: list[tuple[list[int], Branch, bool]] = [(free, "natural", True), (held, "natural", False)]
-    return [group for group in (*groups, (pushed, "up", False)) if group[0]]
+    groups: list[tuple[list[int], Branch, bool]] = [
+        (free, "natural", True),
+        (pulled, "natural", False),
+        (pressed, facts.rest_side, False),
+        (pushed, "up", False),
+    ]
+    return [group for group in groups if group[0]]
 
 
 def freedom(model: Model, facts: Facts) -> list[tuple[list[int], bool]]:

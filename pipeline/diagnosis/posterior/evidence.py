@@ -158,7 +158,8 @@ def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
         known[row, [0, 1 + at]] = (middle - fitted.vector[at]) / width, 1.0 / width
     products = grid.products(np.column_stack([value, jacobian])[:data], known, more[:data])
     H, b = products.own[:, 1:, 1:], products.own[:, 1:, 0]
-    scale = np.sqrt(np.maximum(np.einsum("gii->gi", H), 1e-300))
+    shown = np.einsum("gii->gi", H)
+    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
     root = np.linalg.cholesky(H / scale[:, :, None] / scale[:, None, :] + ROUNDING * np.eye(H.shape[1]))
     half = np.linalg.inv(root) / scale[:, None, :]
     inverse = np.swapaxes(half, 1, 2) @ half

@@ -8,6 +8,7 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
+from pipeline.diagnosis.diagnose import diagnose
 from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import prepare
@@ -94,3 +95,14 @@ def test_columns_of_displacements_against_differences():
         slope = -(ahead - behind) / 2e-6
         # a one-sided difference through the observers and an equilibrium to 1e-9: a thousandth
         assert np.allclose(exact[:, place], slope, atol=2e-3 * np.abs(slope).max()), name
+
+
+def test_a_wrong_zero_that_presses_a_cable_over_to_its_other_side():
+    """Bent down at rest, pressed by a wrong zero and bowed up on its photo: the offset is found, and K0 below zero."""
+    cable = Cable(K0=-1.0, displacement_offset=2e-4)
+    test = hidden_test(cable, SIX, largest=LARGEST, seed=33)
+    assert test.steps[0].shape is not None and np.mean(test.steps[0].shape.y) > 0.0
+    part, _ = diagnose(test, None, SETTINGS)
+    assert (part.verdict, [cause.name for cause in part.causes]) == ("named", ["displacement_offset"])
+    found = part.causes[0]  # offset and K0 act as one on the chord at rest, so the band is wide
+    assert found.unit == "m" and abs(found.estimate - 2e-4) < 2.0 * found.std < 1e-4
