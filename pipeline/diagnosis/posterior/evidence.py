@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr
 
 from pipeline.diagnosis.fits.extension import Term
@@ -160,17 +161,35 @@ def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
     H, b = products.own[:, 1:, 1:], products.own[:, 1:, 0]
     shown = np.einsum("gii->gi", H)
     scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    root = np.linalg.cholesky(H / scale[:, :, None] / scale[:, None, :] + ROUNDING * np.eye(H.shape[1]))
-    half = np.linalg.inv(root) / scale[:, None, :]
-    inverse = np.swapaxes(half, 1, 2) @ half
+    inverse, log_det = _inverses(H / scale[:, :, None] / scale[:, None, :] + ROUNDING * np.eye(H.shape[1]))
+    inverse /= scale[:, :, None] * scale[:, None, :]
     move = np.einsum("gij,gj->gi", inverse, b)
-    log_det = 2.0 * (np.sum(np.log(np.einsum("gii->gi", root)), axis=1) + np.sum(np.log(scale), axis=1))
+    log_det += 2.0 * np.sum(np.log(scale), axis=1)
     chi2 = products.own[:, 0, 0] - np.sum(b * move, axis=1)
     amounts = sum(not np.isfinite(term.variant.known) for term in fitted.extension.terms)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
     normal = 0.5 * amounts * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
     flat = normal - 0.5 * (chi2 + products.log_det + log_det)
     return _Solved(products, inverse, move, flat)
+
+
+def _inverses(matrices: Array) -> tuple[Array, Array]:
+    """Inverses (g, n, n) and log-determinants (g,) of positive definite matrices: a quarter of the work of any others.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If one is not positive definite.
+    """
+    half, pivots = np.empty_like(matrices), np.empty(matrices.shape[:2])
+    for k, matrix in enumerate(matrices):
+        root, failed = dpotrf(matrix)
+        if failed:
+            raise np.linalg.LinAlgError("a matrix is not positive definite")
+        pivots[k] = root.diagonal()
+        half[k] = dpotri(root)[0]  # the upper triangle; the lower one is that of the root, zero
+    half[:, np.arange(half.shape[1]), np.arange(half.shape[1])] *= 0.5
+    return half + np.swapaxes(half, 1, 2), 2.0 * np.sum(np.log(pivots), axis=1)
 
 
 def _places(fitted: Fit) -> tuple[list[int], list[float], list[float]]:
