@@ -19,7 +19,7 @@ from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
 from pipeline.diagnosis.fits.faults import faults_of_input
-from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.presentation.part import present
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
@@ -59,7 +59,7 @@ def by_chance(rate, draws):
 
 def bench_of(test):
     bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
-    assert not isinstance(bench, str), bench
+    assert isinstance(bench, Workbench), bench
     return bench
 
 
