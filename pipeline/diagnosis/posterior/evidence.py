@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr
@@ -178,14 +179,14 @@ def _inverses(matrices: Array) -> tuple[Array, Array]:
 
     Raises
     ------
-    numpy.linalg.LinAlgError
+    LinAlgError
         If one is not positive definite.
     """
     half, pivots = np.empty_like(matrices), np.empty(matrices.shape[:2])
     for k, matrix in enumerate(matrices):
         root, failed = dpotrf(matrix)
         if failed:
-            raise np.linalg.LinAlgError("a matrix is not positive definite")
+            raise LinAlgError("a matrix is not positive definite")
         pivots[k] = root.diagonal()
         half[k] = dpotri(root)[0]  # the upper triangle; the lower one is that of the root, zero
     half[:, np.arange(half.shape[1]), np.arange(half.shape[1])] *= 0.5
