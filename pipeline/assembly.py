@@ -81,7 +81,7 @@ def assemble(
     diagnosis : DiagnosisPart or None
         None where identification left nothing to diagnose.
     findings : iterable of Finding
-        Of the diagnosis; those of the other stages are in their records.
+        Faults of the data, and what the diagnosis noticed; those of the other stages are in their records.
     settings : Settings
     command : str
         The command that reproduces the result.
@@ -185,19 +185,15 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
 
 TOLD_BETTER = {
     "photo/doubled": {"photo/doubled"},
-    "photo/order": {"identify/chord-displacement"},
-    "photo/other-step": {"identify/chord-displacement"},
-    "log/displacement": {"identify/chord-displacement"},
-    "log/unit": {"identify/chord-displacement", "scale/displacement"},
+    "log/unit": {"scale/displacement"},
     "length/traced": {"scale/length", "identify/length", "identify/scale"},
-    "force/sign": {"identify/force-sign"},
 }
-"""Findings of the diagnosis, and those by which earlier rooms noticed the same without knowing what it is."""
+"""Faults of the data, and findings by which other rooms noticed the same without knowing what it is."""
 
 
-def without_those_told_better(earlier: Iterable[Finding], diagnosed: Iterable[Finding]) -> list[Finding]:
-    """Earlier findings but for those that the diagnosis has named."""
-    named = set[str]().union(*(TOLD_BETTER.get(finding.code, set()) for finding in diagnosed))
+def without_those_told_better(earlier: Iterable[Finding], faults: Iterable[Finding]) -> list[Finding]:
+    """Earlier findings but for those that are told as faults."""
+    named = set[str]().union(*(TOLD_BETTER.get(finding.code, set()) for finding in faults))
     return [finding for finding in earlier if finding.code not in named]
 
 

@@ -1,6 +1,6 @@
 """One specimen: the whole pipeline spelled out on one screen.
 
-folder -> `Specimen` -> photos -> `Traces` -> `Identification` -> diagnosis -> `Result` -> files.
+folder -> `Specimen` -> photos -> `Traces` -> `Faults` -> `Identification` -> diagnosis -> `Result` -> files.
 `measure` is what the command line, the batch and the Python API all call; `write` puts what people and programs read
 beside ``result.json``. A bad file of the user raises `InputError`; nature's refusals are values in the result.
 """
@@ -12,11 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.assembly import assemble
-from pipeline.diagnosis import diagnose, with_corrected_forces
-from pipeline.identify import Identification, identify, identify_without
+from pipeline.diagnosis import diagnose
+from pipeline.faults import Faults, faults_of_input
+from pipeline.identify import Identification, identify, measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message
-from pipeline.records import Finding
+from pipeline.records import Finding, Specimen
 from pipeline.report.tables import write_result, write_tables
 from pipeline.result import DiagnosisPart, Result
 from pipeline.settings import Settings
@@ -56,29 +57,34 @@ def measure(
     on_stage("photos")
     traces = trace_series(specimen, settings.vision)
     on_stage("identification")
-    identification = identify(specimen, traces, settings.identify)
+    faults = faults_of_input(measured_test(specimen, traces, settings.identify))
+    specimen = in_order(specimen, faults)
+    images = {step.step: step.image for step in specimen.steps if step.image is not None}
+    identification = identify(faults, images, settings.identify)
     on_stage("diagnosis")
-    diagnosis, findings = _diagnosed(identification, settings)
-    if diagnosis is not None and _faulty(diagnosis):
-        test = with_corrected_forces(identification.test, diagnosis.corrected_forces)
-        wrong = diagnosis.left_out_photos, diagnosis.left_out_forces
-        identification = identify_without(replace(identification, test=test), *wrong, settings.identify)
+    diagnosis, findings, found = _diagnosed(faults, identification, settings)
+    if found is not faults:
+        identification = identify(found, images, settings.identify)
     return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
 
 
-def _faulty(diagnosis: DiagnosisPart) -> bool:
-    """Whether some of the data must not be used as they stand."""
-    return bool(diagnosis.left_out_photos or diagnosis.left_out_forces or diagnosis.corrected_forces)
+def in_order(specimen: Specimen, faults: Faults) -> Specimen:
+    """The specimen with its photos named at the steps to which they belong."""
+    images = {step.step: step.image for step in specimen.steps}
+    steps = (replace(step, image=images[faults.moved.get(step.step, step.step)]) for step in specimen.steps)
+    return replace(specimen, steps=tuple(steps))
 
 
-def _diagnosed(identification: Identification, settings: Settings) -> tuple[DiagnosisPart | None, tuple[Finding, ...]]:
+def _diagnosed(
+    faults: Faults, identification: Identification, settings: Settings
+) -> tuple[DiagnosisPart | None, tuple[Finding, ...], Faults]:
     """The diagnosis; where numbers nobody foresaw break it, both ways still stand and the reader is told."""
     try:
-        return diagnose(identification.test, identification, settings.diagnosis)
+        return diagnose(faults, identification, settings.diagnosis)
     except (ArithmeticError, LookupError, MemoryError, ValueError) as error:
         told = " ".join(str(error).split())[:200]
         said = Message("diagnosis/program-error", error=type(error).__name__, told=told)
-        return None, (Finding(said.code, "error", said),)
+        return None, (*faults.findings, Finding(said.code, "error", said)), faults
 
 
 def write(result: Result, folder: Path, settings: Settings | None = None) -> None:

@@ -21,6 +21,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import pipeline.run
+from pipeline.faults import Faults
 from pipeline.report.maps import answer_map, measured_map
 from pipeline.result import Result, SpecimenPart
 from pipeline.settings import ReportSettings, Settings
@@ -159,7 +160,7 @@ def test_a_diagnosis_that_wants_more_memory_than_there_is_costs_nothing_else(mon
         raise MemoryError("Unable to allocate 298. GiB")  # 200,000 samples in one hold asked for it
 
     monkeypatch.setattr(pipeline.run, "diagnose", broken)
-    part, findings = pipeline.run._diagnosed(SimpleNamespace(test=None), Settings())
+    part, findings, _ = pipeline.run._diagnosed(Faults(SimpleNamespace()), SimpleNamespace(), Settings())
     assert part is None
     assert [finding.code for finding in findings] == ["diagnosis/program-error"]
     assert "298. GiB" in findings[0].message

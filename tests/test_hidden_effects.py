@@ -18,9 +18,9 @@ from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.presentation.part import present
+from pipeline.faults import faults_of_input
 from pipeline.identify import measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
@@ -58,7 +58,7 @@ def by_chance(rate, draws):
 
 
 def bench_of(test):
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    bench = prepare(faults_of_input(test), SETTINGS)
     assert isinstance(bench, Workbench), bench
     return bench
 
@@ -76,7 +76,7 @@ def test_plausible_size_is_named_and_f_comes_back(name):
     size = max(seen.plausible, 1.5 * seen.detectable) * (-1.0 if name == "stiffness_varying" else 1.0)
     cable, reading = HIDE[name](size, USUAL.get(name, seen.form))
     test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=7, reading=reading)
-    part, findings = diagnose(test, None, SETTINGS)
+    part, findings, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert [finding.code for finding in findings if finding.level == "error"] == []
     assert part.verdict in ("named", "class"), part.headline
     assert name in part.causes[0].class_, part.headline
@@ -113,7 +113,9 @@ def test_what_a_protocol_cannot_see_at_a_plausible_size_is_known(protocol):
 def test_friction_on_loading_alone_is_part_of_the_law_and_said_to_be_unseen():
     """A law with the friction in it loads the cable in the same way: nothing is named, unloading would tell."""
     cable, reading = HIDE["hysteresis"](outlook("six")["hysteresis"].plausible, Form())
-    part, _ = diagnose(hidden_test(cable, SIX, largest=LARGEST, seed=31, reading=reading), None, SETTINGS)
+    part, _, _ = diagnose(
+        faults_of_input(hidden_test(cable, SIX, largest=LARGEST, seed=31, reading=reading)), None, SETTINGS
+    )
     assert part.verdict == "adequate", part.headline
     assert "unloading" in {spot.name: spot for spot in part.blind_spots}["hysteresis"].settled_by
 
@@ -139,7 +141,7 @@ def test_nothing_is_named_where_nothing_is_hidden(protocol, seed):
 
 def test_force_gain_is_never_seen_and_said_to_be_invisible():
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=3, reading=Reading(force_gain=0.05))
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "adequate"
     blind = {spot.name: spot for spot in part.blind_spots}
     assert blind["force_gain"].stiffness_bias_at_plausible_size == pytest.approx(0.01, rel=0.02)
@@ -149,7 +151,7 @@ def test_force_gain_is_never_seen_and_said_to_be_invisible():
 def test_three_loading_steps_show_a_growing_pre_curvature():
     cable = Cable(K0=0.6, K0_profile=profile(0.7, PLAIN))
     test = hidden_test(cable, THREE, largest=LARGEST, seed=5)
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "pre_curvature_varying"
     assert part.causes[0].estimate == pytest.approx(0.7, abs=0.01)
     assert part.gain.heldout_excess_removed > 0.9
@@ -166,7 +168,7 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
     names = ("in_plane_load", "stiffness_varying", "displacement_offset", "force_offset")
     causes = [cause for cause in CATALOGUE if cause.name in names]
     test = hidden_test(cable, SIX, largest=LARGEST, seed=15)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     found = conclude(bench, SETTINGS)
     assert [causes[k].name for k in found.accepted.causes] == ["in_plane_load"] and not found.unmodelled
     fitted = found.accepted.fitted
@@ -182,7 +184,7 @@ def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
     cable = Cable(set_rate=0.08, law_stays=law_stays)
     causes = [cause for cause in CATALOGUE if cause.name in NEEDS_THE_WAY_BACK]
     test = hidden_test(cable, LOOP, largest=LARGEST, seed=16)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     part = present(bench, conclude(bench, SETTINGS), SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
     assert part.causes[0].estimate == pytest.approx(0.08, abs=4.0 * part.causes[0].std)
@@ -192,7 +194,7 @@ def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
 
 def test_two_causes_are_both_found():
     cable = Cable(bearing_friction=0.002, displacement_offset=3e-4)
-    part, _ = diagnose(hidden_test(cable, LOOP, largest=LARGEST, seed=8), None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(hidden_test(cable, LOOP, largest=LARGEST, seed=8)), None, SETTINGS)
     assert part.verdict == "two_causes"
     assert {cause.name for cause in part.causes} == {"bearing_friction", "displacement_offset"}
     assert f_error(part.extended, cable)[0] < 0.02
@@ -208,7 +210,7 @@ def test_two_causes_that_hide_each_other_are_found_with_their_twins():
 def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     """Patterns from step to step that no cause makes, twelve sigma beside the best of them; shares are in the study."""
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)
-    part, _ = diagnose(with_alien(test, alien, 12.0 * alien_size("six", alien)), None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(with_alien(test, alien, 12.0 * alien_size("six", alien))), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
     assert {"waves": "shapes", "sticking": "forces"}[alien] in part.leftover.message
 
@@ -230,7 +232,7 @@ def test_through_rendered_photos(tmp_path, name):
     settings = Settings()
     specimen = read_specimen(folder, settings.intake)
     test = measured_test(specimen, trace_series(specimen, settings.vision), settings.identify)
-    part, findings = diagnose(test, None, settings.diagnosis)
+    part, findings, _ = diagnose(faults_of_input(test), None, settings.diagnosis)
     assert findings == ()
     if name == "adequate":
         assert part.verdict == "adequate", part.headline

@@ -1,12 +1,12 @@
 """One specimen: from a measured test to what the simulation gets wrong, named as far as the data allow.
 
-faults of the data -> base model and scores -> hypotheses refitted and weighed -> what is believed -> the same with
-displacements that scatter, where they do -> gain on held-out steps -> the part of the result that says all that.
+base model and scores -> faults of the data that a fitted model shows -> hypotheses refitted and weighed -> what is
+believed -> the same with displacements that scatter, where they do -> gain on held-out steps -> the part of the result.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
-from pipeline.diagnosis.fits.faults import Faults, ForceCorrection, faults_of_input
-from pipeline.diagnosis.fits.force_breaks import EXPLAINED, force_break
+from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
@@ -25,6 +24,7 @@ from pipeline.diagnosis.presentation.findings import search_ended, too_large
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
+from pipeline.faults import Faults, ForceCorrection
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.messages import Message
@@ -38,42 +38,37 @@ REFITTED = 3
 """Causes, best linear scores first, that are refitted before a photo or a force is blamed."""
 
 
+class Diagnosed(NamedTuple):
+    """Part of the result, all findings (faults of the data, how the search went), and what is wrong with the data."""
+
+    part: DiagnosisPart
+    findings: tuple[Finding, ...]
+    faults: Faults
+
+
 def diagnose(
-    test: MeasuredTest, identification: Identification | None, settings: DiagnosisSettings | None = None
-) -> tuple[DiagnosisPart, tuple[Finding, ...]]:
+    faults: Faults,
+    identification: Identification | None,
+    settings: DiagnosisSettings | None = None,
+) -> Diagnosed:
     """Diagnose a measured test.
 
     Parameters
     ----------
-    test : MeasuredTest
+    faults : Faults
+        The test and what shows of its faults without a fit.
     identification : Identification or None
         Its curve, if its fit converged, is what the extended one is held against.
     settings : DiagnosisSettings or None
-
-    Returns
-    -------
-    DiagnosisPart
-    tuple of Finding
-        Faults of the data.
     """
     settings = settings or DiagnosisSettings()
-    if not any(step.shape is not None and step.branch != "mounted" for step in test.steps):
-        return _nothing_to_compare(Message("diagnosis.no-photo")), ()
-    if not any(step.force for step in test.steps):
-        return _nothing_to_compare(Message("diagnosis.no-force")), ()
-    if _stands_still(test, settings):
-        return _nothing_to_compare(Message("diagnosis.no-travel")), ()
-    if identification is not None and identification.inverse.outcome is InverseOutcome.OPPOSITE_FORCES:
-        return _nothing_to_compare(Message("diagnosis.contradiction")), ()
-    faults = faults_of_input(test, settings)
-    if not faults.loaded_forces():
-        return _nothing_to_compare(Message("diagnosis.no-force-used")), faults.findings
-    bench = prepare(faults, settings)
+    reason = _not_to_be_compared(faults, identification, settings)
+    bench = reason or prepare(faults, settings)
     if isinstance(bench, Message):
-        return _nothing_to_compare(bench), faults.findings
-    fault = _data_at_fault(bench, settings)
+        return Diagnosed(_nothing_to_compare(bench), faults.findings, faults)
+    fault = _data_at_fault(bench)
     if fault is not None:
-        joined = joined_with_outlier(faults, fault, test)
+        joined = joined_with_outlier(faults, fault)
         again = prepare(joined, settings)
         if not isinstance(again, Message) and again.largest <= again.limit:
             faults, bench = joined, again
@@ -83,7 +78,22 @@ def diagnose(
     part = present(bench, conclusion, settings, identified=known)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     large = too_large(bench, conclusion) if part.verdict == "unexplained" else ()
-    return part, (*faults.findings, *large, *search_ended(conclusion))
+    return Diagnosed(part, (*faults.findings, *large, *search_ended(conclusion)), faults)
+
+
+def _not_to_be_compared(
+    faults: Faults, identification: Identification | None, settings: DiagnosisSettings
+) -> Message | None:
+    """Why nothing can be held against the simulation; None if something can."""
+    if not faults.loaded_photos():
+        return Message("diagnosis.no-photo")
+    if not any(step.force for step in faults.test.steps):
+        return Message("diagnosis.no-force")
+    if _stands_still(faults.test, settings):
+        return Message("diagnosis.no-travel")
+    if identification is not None and identification.inverse.outcome is InverseOutcome.OPPOSITE_FORCES:
+        return Message("diagnosis.contradiction")
+    return None if faults.loaded_forces() else Message("diagnosis.no-force-used")
 
 
 def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
@@ -124,14 +134,6 @@ def _scatter(bench: Workbench, conclusion: Conclusion) -> tuple[float, float]:
     return weighed(conclusion.grid.plain, fitted).own.moved
 
 
-def with_corrected_forces(test: MeasuredTest, corrections: Sequence[ForceCorrectionPart]) -> MeasuredTest:
-    """The test with its forces as the diagnosis took them."""
-    for part in corrections:
-        errors = tuple(tuple(row) for row in part.errors_N)
-        test = ForceCorrection(tuple(part.steps), part.factor, part.offset_N, errors).applied(test)
-    return test
-
-
 def _told(correction: ForceCorrection) -> ForceCorrectionPart:
     return ForceCorrectionPart(
         steps=list(correction.steps),
@@ -149,11 +151,11 @@ def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
     logged = {step.displacement for step in test.steps if step.displacement is not None}
     chords = [step.chord for step in test.steps if step.chord is not None]
     std = max((step.chord_std or settings.chord_std * test.length for step in test.steps), default=0.0)
-    moved = max(chords, default=0.0) - min(chords, default=0.0) > settings.fault_sigma * std
+    moved = max(chords, default=0.0) - min(chords, default=0.0) > FAULT * std
     return logged == {0.0} or (len(logged) == 1 and moved)
 
 
-def _data_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | None:
+def _data_at_fault(bench: Workbench) -> Faults | None:
     """A break in the forces, or one item, that removes more than any cause or pair can; None below the threshold."""
     if bench.largest <= bench.limit:
         return None
@@ -165,17 +167,17 @@ def _data_at_fault(bench: Workbench, settings: DiagnosisSettings) -> Faults | No
         bench.suspicion.owner,
     )
     by_cause = max(bench.largest**2, float(pairs.max(initial=0.0)))
-    return force_break(bench, settings, by_cause=by_cause) or _item_at_fault(bench, settings, by_cause=by_cause)
+    return force_break(bench, by_cause=by_cause) or _item_at_fault(bench, by_cause=by_cause)
 
 
-def _item_at_fault(bench: Workbench, settings: DiagnosisSettings, *, by_cause: float) -> Faults | None:
+def _item_at_fault(bench: Workbench, *, by_cause: float) -> Faults | None:
     """One photo or force whose absence brings the rest to the noise, and removes more than any cause or pair can."""
     item = worst_item(bench.observation, bench.base)
-    if item is None or item.gain - item.rows < settings.fault_sigma**2:
+    if item is None or item.gain - item.rows < FAULT**2:
         return None
     freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
     fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * item.gain
-    least = item.gain - item.rows - settings.fault_sigma**2
+    least = item.gain - item.rows - FAULT**2
     if not fits or by_cause >= least:
         return None
     # scores are linear ones: about a base model that is far off, a cause explains more than they promise

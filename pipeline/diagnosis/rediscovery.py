@@ -14,7 +14,6 @@ import numpy as np
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import ITERATIONS, Fit, fit
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.laws import FewPoints
@@ -23,6 +22,7 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.observations.observation import Observation, observe
 from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.plans.design import Plan, planned_bench
+from pipeline.faults import faults_of_input
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
@@ -87,7 +87,7 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
         In the order found; ends when neither extension is asked for.
     """
     settings = settings or DiagnosisSettings()
-    faults = faults_of_input(test, settings)
+    faults = faults_of_input(test)
     facts = facts_of(faults.test)
     pictures = frozenset(range(len(test.steps)))
     forces = observe(faults.test, settings, without_photos=pictures, without_forces=faults.forces)

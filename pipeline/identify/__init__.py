@@ -8,7 +8,7 @@ goes into ``result.json``).
 from pipeline.identify.identification import Identification
 from pipeline.identify.measured import measured_test
 from pipeline.identify.parts import IdentificationParts, identification_parts
-from pipeline.identify.ways import identify, identify_test, identify_without
+from pipeline.identify.ways import identify, identify_test
 
 __all__ = [
     "Identification",
@@ -16,6 +16,5 @@ __all__ = [
     "identification_parts",
     "identify",
     "identify_test",
-    "identify_without",
     "measured_test",
 ]

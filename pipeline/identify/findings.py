@@ -49,10 +49,7 @@ def _open(kappa: float | None, std: float) -> Message:
 
 
 def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
-    """Sign of the forces, and the load cell's zero in the force-free step."""
-    loaded = [step.force for step in test.steps if step.branch != "mounted"]
-    if loaded and np.median(loaded) < 0.0:
-        yield doubtful("identify/force-sign", median_N=np.median(loaded))
+    """The load cell's zero in the force-free step."""
     for step in test.steps:
         if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
             z = abs(step.force) / step.force_std

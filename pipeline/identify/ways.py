@@ -6,18 +6,17 @@ for all steps together, and a test says whether the two show the same characteri
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
+from pipeline.faults import Faults
 from pipeline.identify.agreement import compare, log_curve, rest_curvature
 from pipeline.identify.contrast import chi_square, parts_difference
 from pipeline.identify.findings import identification_findings
 from pipeline.identify.identification import Identification
-from pipeline.identify.measured import measured_test
-from pipeline.records import Specimen, Traces
 from pipeline.settings.identify import IdentifySettings
 from rod.balance import BalanceOptions, balance
 from rod.inverse import Estimate, InverseOptions, estimate
@@ -27,27 +26,16 @@ LEAST_PHOTOS = 2
 """Photos of loaded steps that a branch needs to be fitted on its own."""
 
 
-def identify(specimen: Specimen, traces: Traces, settings: IdentifySettings) -> Identification:
-    """Characteristic of a specimen by both ways.
+def identify(faults: Faults, images: Mapping[int, str], settings: IdentifySettings) -> Identification:
+    """Characteristic by both ways from what may be used of a test; its record keeps the whole test.
 
-    Parameters
-    ----------
-    specimen : Specimen
-    traces : Traces
-    settings : IdentifySettings
-
-    Returns
-    -------
-    Identification
-        Whatever the data refuse is an outcome in it, with advice, and a finding.
+    Whatever the data refuse is an outcome in it, with advice, and a finding. ``images``: names of photos by step.
     """
-    found = identify_test(measured_test(specimen, traces, settings), settings)
-    images = {step.step: step.image for step in specimen.steps if step.image is not None}
-    return replace(found, images=images)
+    return replace(identify_test(faults.used(), settings), test=faults.test, images=dict(images))
 
 
 def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identification:
-    """`identify` for a test that is measured already."""
+    """`identify` of all of a test."""
     options = inverse_options(settings)
     inverse = estimate(test, options=options)
     graph = balance(test, options=BalanceOptions(blocks=settings.blocks, grid=settings.grid))
@@ -62,33 +50,6 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
     )
     found = replace(found, agreement=compare(test, inverse, graph, level=settings.agreement_level))
     return replace(found, findings=identification_findings(found, settings))
-
-
-def identify_without(
-    found: Identification, photos: Collection[int], forces: Collection[int], settings: IdentifySettings
-) -> Identification:
-    """Both ways again without forces and photos that contradict all others.
-
-    Parameters
-    ----------
-    found : Identification
-        With everything; its test stays what was measured, forces corrected or not.
-    photos, forces : collections of int
-        Steps whose photo, or force, is at fault. A shape without its force tells neither way the scale of f_EI, so a
-        step without force is left out as a whole.
-    settings : IdentifySettings
-
-    Returns
-    -------
-    Identification
-    """
-    steps = tuple(
-        replace(step, shape=None, chord=None, chord_std=None) if step.step in photos else step
-        for step in found.test.steps
-        if step.step not in forces
-    )
-    again = identify_test(replace(found.test, steps=steps), settings)
-    return replace(again, test=found.test, images=found.images)
 
 
 def inverse_options(settings: IdentifySettings) -> InverseOptions:

@@ -128,7 +128,7 @@ def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
     return next(first, next((f for f in faults if f.code == "size/force"), None))
 
 
-WRONG_SCALE = {"size/force", "force/unit", "identify/force-sign"}
+WRONG_SCALE = {"size/force", "force/unit"}
 """Findings after which f_EI has the scale or the sign of no cable, of whatever level."""
 
 OTHER_CABLE = 0.1

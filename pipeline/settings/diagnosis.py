@@ -46,36 +46,6 @@ class DiagnosisSettings(BaseModel):
     # base model
     grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
 
-    # data faults
-    fault_sigma: float = Field(6.0, description="sigma; a photo or force this far from what the others say is a fault")
-    chord_mismatch: float = Field(
-        0.15,
-        description="share of the travel; mean mismatch of chord and displacement from which order or unit is doubted",
-    )
-    displacement_mismatch: float = Field(
-        0.02,
-        gt=0,
-        description="share of the travel; mismatch of a single chord and its displacement from which that displacement "
-        "is doubted, in place of a photo or a cause: a fifth of a step of ten",
-    )
-    doubled_share: float = Field(
-        0.03,
-        description="share of the scatter of the sections; two photos that differ by less are one photo; light and "
-        "ground that stay make two photos of one shape alike to an eighth",
-    )
-    force_break: float = Field(
-        0.03,
-        gt=0,
-        description="factor less 1, or share of the largest force; a smaller change of all forces from one step on is "
-        "no switch of a range or lost zero, and what slips or creeps changes as much at once",
-    )
-    stiffness_range: tuple[float, float] = Field(
-        (1e-7, 100.0), description="N m^2; EI of cables spans 1e-5 to 1, two decades beyond that is a wrong unit"
-    )
-    length_mismatch: float = Field(
-        0.01, description="relative; traced against stated length from which length_mm is doubted"
-    )
-
     # presentation
     curve_points: int = Field(61, description="points of the extended characteristic; smooth at any figure's width")
 

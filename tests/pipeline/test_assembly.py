@@ -63,10 +63,9 @@ def test_the_headline_begins_with_the_fault_and_keeps_the_numbers(measured):
     )
 
 
-def test_what_the_diagnosis_names_is_said_once():
+def test_what_is_told_as_a_fault_is_said_once():
     noticed = [
         Finding("scale/displacement", "warning", "the travel gives another scale"),
-        Finding("identify/chord-displacement", "warning", "chord and displacement disagree"),
         Finding("scale/length", "warning", "the traced length is another"),
     ]
     unit = Finding("log/unit", "warning", "the log seems to hold cm instead of mm")
@@ -75,7 +74,7 @@ def test_what_the_diagnosis_names_is_said_once():
     pulled = [Finding(f"identify/{name}", "warning", "off by 9 standard deviations") for name in ("length", "scale")]
     length = Finding("length/traced", "warning", "the photos show a cable of another length")
     told = without_those_told_better([*noticed, *pulled], [length])
-    assert [f.code for f in told] == ["scale/displacement", "identify/chord-displacement"]
+    assert [f.code for f in told] == ["scale/displacement"]
 
 
 def test_what_several_photos_show_alike_is_said_once_with_all_their_names():

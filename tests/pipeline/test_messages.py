@@ -93,10 +93,10 @@ def test_messages_hold_messages_and_come_back_from_json():
 
 @pytest.mark.parametrize(
     "damage",
-    [{"key": "log/nothing"}, {"values": {}}, {"values": {"median_N": "much"}}, {"values": {"median_N": {"key": 1}}}],
+    [{"key": "log/nothing"}, {"values": {}}, {"values": {"spread_m": "much"}}, {"values": {"spread_m": {"key": 1}}}],
 )
 def test_a_finding_whose_data_are_none_of_this_version_is_told_as_it_was_written(damage):
-    part = FindingPart.of("warning", Message("identify/force-sign", median_N=-0.5))
-    assert part.code == "identify/force-sign" and "median −500" in part.message.replace("-", "−")
+    part = FindingPart.of("warning", Message("identify/chord-displacement.one", spread_m=5e-4))
+    assert part.code == "identify/chord-displacement" and "differ by 0.500 mm" in part.message
     stored = {**json.loads(part.model_dump_json()), **damage}
     assert FindingPart(**stored).said == free_text(part.message)

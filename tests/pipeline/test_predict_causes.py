@@ -15,9 +15,9 @@ from fixtures.hidden import LOOP, SIX, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.part import present
+from pipeline.faults import faults_of_input
 from pipeline.identified_model import identified_model
 from pipeline.predict import predict
 from pipeline.result import Result, SpecimenPart
@@ -45,7 +45,7 @@ def result_of(name):
     cable, protocol = CABLES[name]
     test = hidden_test(cable, protocol, largest=LARGEST, seed=21)
     causes = [cause for cause in CATALOGUE if cause.name == name]
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     part = present(bench, conclude(bench, SETTINGS), SETTINGS)
     specimen = SpecimenPart(id="hidden", length_m=cable.length, diameter_m=0.005, folder=".", moving_bearing="left")
     return Result(status="measured", specimen=specimen, diagnosis=part)

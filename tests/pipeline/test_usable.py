@@ -43,7 +43,6 @@ def test_the_answer_says_which_curve_it_is_and_why(measured):
         ("size/force", "error", False),
         ("size/force", "warning", False),
         ("force/unit", "warning", False),
-        ("identify/force-sign", "warning", False),
         ("force/sign", "warning", False),
         ("force/factor", "error", True),  # corrected, and the bands know by what
         ("force/dead", "warning", True),  # left out

@@ -26,15 +26,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.faults import Faults, ForceCorrection
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.faults import Faults, ForceCorrection
 from pipeline.messages import Message
 from pipeline.records import Finding, Level, doubtful
-from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
+
+FAULT = 6.0
+"""Standard deviations: what is this far from what all other data say is a fault, and no chance."""
+
+SWITCHED = 0.03
+"""Factor less 1, or share of the largest force: a smaller change of all forces from one step on is no switch of a range
+or lost zero; what slips or creeps changes as much at once."""
 
 EXPLAINED = 0.10
 """Share of the excess misfit that a fault of the data may leave."""
@@ -85,7 +91,7 @@ class Break:
         return self.kind == "factor" and (abs(self.amount) < max(DEAD, NO_FACTOR * self.std))
 
 
-def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: float) -> Faults | None:
+def force_break(bench: Workbench, *, by_cause: float) -> Faults | None:
     """The break in the forces that explains what the base model misfits, with the forces corrected; None without one.
 
     ``by_cause`` is the chi-square that a cause or a pair of causes removes.
@@ -94,8 +100,8 @@ def force_break(bench: Workbench, settings: DiagnosisSettings, *, by_cause: floa
     if told is None:
         return None
     whole, single = told.whole(), told.without_one()
-    found = [_break(told, trial, whole) for trial in (*told.signs(), *told.breaks(settings))]
-    fault = settings.fault_sigma**2
+    found = [_break(told, trial, whole) for trial in (*told.signs(), *told.breaks())]
+    fault = FAULT**2
     best = max(found, key=lambda one: one.gain, default=None)
     if best is None or best.gain < by_cause + fault:
         return None
@@ -223,7 +229,7 @@ class _Told:
         # a cable that is pushed together pushes back: those that pull are the wrong ones, be they many or few
         return [_Trial("sign", tuple(self.step[turned].tolist()), self._rest(sign)[0], -1.0)]
 
-    def breaks(self, settings: DiagnosisSettings) -> list[_Trial]:
+    def breaks(self) -> list[_Trial]:
         """A factor or an offset from each step on that leaves two forces after it, and enough before it."""
         found = []
         for k in range(1, len(self.step) - 1):
@@ -233,10 +239,10 @@ class _Told:
             steps = tuple(self.step[after].tolist())
             if (self.loaded & ~after).sum() > 1:
                 rest, factor, std = self._factor(after)
-                if abs(factor - 1.0) > settings.force_break:
+                if abs(factor - 1.0) > SWITCHED:
                     found.append(_Trial("factor", steps, rest, factor, std))
             rest, offset, std = self._offset(after)
-            if abs(offset) > settings.force_break * np.max(np.abs(self.force)):
+            if abs(offset) > SWITCHED * np.max(np.abs(self.force)):
                 found.append(_Trial("zero", steps, rest, offset, std))
         return found
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.observations.observation import Observation
+from pipeline.faults import Faults
 from pipeline.records import doubtful
 from rod.measurement import MeasuredTest
 
@@ -60,22 +60,24 @@ def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
     return Faults(test, (finding,), index if photo else frozenset(), frozenset() if photo else index)
 
 
-def joined_with_outlier(found: Faults, outlier: Faults, measured: MeasuredTest) -> Faults:
+def joined_with_outlier(found: Faults, outlier: Faults) -> Faults:
     """Both; where photo and displacement of the step at fault contradict each other too, its photo is of another step.
 
     With the displacement taken from such a photo, the force of the step stands alone against it. Force and displacement
-    of ``measured``, the test as it came, are right then, and one photo is all that is wrong.
+    as logged are right then, and one photo is all that is wrong.
     """
-    moved = {i for i, s in enumerate(measured.steps) if s.displacement != found.test.steps[i].displacement is None}
-    wrong = (outlier.photos | outlier.forces) & moved
+    wrong = (outlier.photos | outlier.forces) & found.doubted.keys()
     if outlier.corrections or not wrong:
         return found.joined(outlier)
     (index,) = wrong
-    kept = tuple(finding for finding in found.findings if finding.code != "log/displacement")
-    steps = tuple(measured.steps[i] if i == index else step for i, step in enumerate(found.test.steps))
+    step = replace(found.test.steps[index], displacement=found.doubted[index])
     return replace(
         found,
-        test=replace(found.test, steps=steps),
-        findings=(*kept, doubtful("photo/other-step", step=measured.steps[index].step)),
-        photos=found.photos | wrong,
+        test=replace(found.test, steps=(*found.test.steps[:index], step, *found.test.steps[index + 1 :])),
+        findings=(
+            *(finding for finding in found.findings if finding.code != "log/displacement"),
+            doubtful("photo/other-step", step=step.step),
+        ),
+        photos=found.photos | {index},
+        doubted={},
     )

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.faults import Faults
 from pipeline.diagnosis.fits.fit import FITS, ITERATIONS, Fit, fit, fit_from
 from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import Suspicion, suspect
@@ -24,6 +23,7 @@ from pipeline.diagnosis.observations.noise import calibrate_photo_noise
 from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
 from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.statistics.score import null_maxima, threshold
+from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.compliance_law import refreshed

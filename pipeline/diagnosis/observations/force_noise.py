@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from pipeline.faults.stuck_forces import last_digit
 from rod.measurement import MeasuredStep
 
 Array = NDArray[np.float64]
@@ -116,20 +117,8 @@ def _drawn_together(found: _Scatter, floor: float) -> tuple[Array, Array]:
     return variance, 1.0 / behind
 
 
-ROUNDING = 1e-9
-"""Of the largest force: numbers that close are the same number."""
-
 HARMONICS = np.arange(1, 30)
 """Of the sawtooth of a rounding error over the force; the variance of the others is 2 % of the whole."""
-
-
-def last_digit(forces: Array) -> float:
-    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
-    top = float(np.max(np.abs(forces), initial=0.0))
-    for places in range(-3, 13):
-        if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):
-            return 10.0**-places
-    return 0.0
 
 
 def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:

@@ -9,11 +9,11 @@ from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from pipeline.diagnosis.diagnose import diagnose
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.statistics.score import admissible
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -36,7 +36,7 @@ def unlogged(test):
 
 
 def bench_of(test):
-    return prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    return prepare(faults_of_input(test), SETTINGS)
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
@@ -102,7 +102,7 @@ def test_a_wrong_zero_that_presses_a_cable_over_to_its_other_side():
     cable = Cable(K0=-1.0, displacement_offset=2e-4)
     test = hidden_test(cable, SIX, largest=LARGEST, seed=33)
     assert test.steps[0].shape is not None and np.mean(test.steps[0].shape.y) > 0.0
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert (part.verdict, [cause.name for cause in part.causes]) == ("named", ["displacement_offset"])
     found = part.causes[0]  # offset and K0 act as one on the chord at rest, so the band is wide
     assert found.unit == "m" and abs(found.estimate - 2e-4) < 2.0 * found.std < 1e-4

@@ -16,10 +16,10 @@ from pipeline.diagnosis.explanations.refit import Addition, linear_start
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.extension import Term
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.findings import too_large
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -27,7 +27,7 @@ ELEMENTS = Slipping((2e-3, 1.3e-3), (1.0, 3.0))
 
 
 def prepared(cable, seed):
-    return prepare(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=seed), SETTINGS), SETTINGS)
+    return prepare(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=seed)), SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_form_stands_beside_itself_only_where_its_place_is_its_own(plain):
 def test_a_steep_tilt_is_one_to_the_noise(tilt):
     """6.5 degrees from 0.86 m foreshorten by 0.64 %: the perspective alone left several times the noise."""
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=3, reading=Reading(tilt=tilt, distance=0.86))
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    bench = prepare(faults_of_input(test), SETTINGS)
     index = [cause.name for cause in SUSPECTS].index("camera_tilt")
     found = refit_one(bench.observation, bench.base, bench.suspicion, index)
     amount, std = found.amount(SUSPECTS[index])

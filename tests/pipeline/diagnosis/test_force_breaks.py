@@ -7,10 +7,10 @@ import pytest
 
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test
-from pipeline.diagnosis import diagnose, with_corrected_forces
+from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.diagnose import _data_at_fault
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -32,7 +32,7 @@ def spoiled(test, change):
 
 
 def fault(test):
-    return _data_at_fault(prepare(faults_of_input(test, SETTINGS), SETTINGS), SETTINGS)
+    return _data_at_fault(prepare(faults_of_input(test), SETTINGS))
 
 
 @pytest.mark.parametrize("protocol", ["six", "loop"])
@@ -107,11 +107,12 @@ def test_no_cause_is_a_break(name, amount):
 
 def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces(honest):
     test = spoiled(honest["six"], lambda i, force: force * (0.5 if i >= 4 else 1.0))
-    part, findings = diagnose(test, None, SETTINGS)
+    part, findings, faults = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "adequate" and [finding.code for finding in findings] == ["force/factor"]
     assert (part.left_out_forces, part.left_out_photos) == ([], [])
-    right = with_corrected_forces(test, part.corrected_forces)
-    assert np.array([s.force for s in right.steps]) == pytest.approx([s.force for s in honest["six"].steps], rel=5e-3)
+    assert np.array([s.force for s in faults.test.steps]) == pytest.approx(
+        [s.force for s in honest["six"].steps], rel=5e-3
+    )
 
 
 @pytest.mark.parametrize("kind", ["factor", "zero"])
@@ -145,6 +146,9 @@ def test_two_kinds_that_are_not_told_apart_are_an_error_too(honest):
 
 
 def test_errors_of_a_correction_go_with_the_result(honest):
-    part, _ = diagnose(spoiled(honest["loop"], lambda i, force: force * (0.5 if i >= 4 else 1.0)), None, SETTINGS)
-    (error,) = with_corrected_forces(honest["loop"], part.corrected_forces).common_force_errors
+    halved = spoiled(honest["loop"], lambda i, force: force * (0.5 if i >= 4 else 1.0))
+    part, _, faults = diagnose(faults_of_input(halved), None, SETTINGS)
+    (told,) = part.corrected_forces
+    (error,) = faults.test.common_force_errors
+    assert told.errors_N == [list(error.values())]
     assert set(error) == {4, 5, 6} and 1e-4 < abs(error[4]) / honest["loop"].steps[4].force < 0.02

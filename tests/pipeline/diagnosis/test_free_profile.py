@@ -13,10 +13,10 @@ from pipeline.diagnosis.explanations.conclusion import in_deeper_valley
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
 from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import FITS, evaluated
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -34,7 +34,7 @@ def three_waves(amount):
 def benched(cable, protocol, name, seed):
     causes = [cause for cause in CATALOGUE if cause.name == name]
     test = hidden_test(cable, protocol, largest=0.0138, seed=seed)
-    return prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    return prepare(faults_of_input(test), SETTINGS, causes=causes)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_columns_of_profiles_are_those_of_difference_quotients(name, turned):
 
 def test_a_strong_profile_beside_another_cause_is_one_of_two_names():
     cable = Cable(K0_profile=step(1.5, 0.5), compliance=2e-4)
-    part, findings = diagnose(hidden_test(cable, SIX, largest=0.0138, seed=60403), None, SETTINGS)
+    part, findings, _ = diagnose(faults_of_input(hidden_test(cable, SIX, largest=0.0138, seed=60403)), None, SETTINGS)
     assert part.verdict == "two_causes", part.headline
     assert {cause.name for cause in part.causes} == {"pre_curvature_varying", "rig_compliance"}
     assert f_error(part.extended, cable)[0] < 0.02 and findings == ()
@@ -102,7 +102,7 @@ def test_the_end_of_a_search_is_told_only_where_a_second_cause_was_suspected():
     """Refits of single causes count for the search; where nothing speaks for a second one there was none to end."""
     hasty = SETTINGS.model_copy(update={"search_newton_steps": 1})
     test = hidden_test(Cable(), SIX, largest=0.0138, seed=60404, reading=Reading(scale_error=4e-3))
-    part, findings = diagnose(test, None, hasty)
+    part, findings, _ = diagnose(faults_of_input(test), None, hasty)
     assert part.verdict == "named" and findings == ()
 
 

@@ -10,9 +10,9 @@ from fixtures.memory import BoucWen, Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -22,7 +22,7 @@ def off(cable, name, protocol, largest, seed):
     """Relative rms error of f_EI, rms band, rms error in standard deviations; sizes of causes whose forms add up."""
     test = hidden_test(cable, protocol, largest=largest, seed=seed)
     causes = [cause for cause in CATALOGUE if cause.name == name]
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     accepted = refit_one(bench.observation, bench.base, bench.suspicion, 0)
     again = identified_again(bench.observation, accepted.fitted)
     found = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)

@@ -53,7 +53,7 @@ def test_the_band_grows_with_what_no_cause_makes(varies):
     cable = Cable(bearing_friction=1.2e-3 * varies, friction_varies=factors)
     test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=41)
     found = identify_test(test, IdentifySettings())
-    part, _ = diagnose(test, found)
+    part, _, _ = diagnose(test, found)
     answer = part.extended if part.widening is None else part.widening.of(curve(found.inverse))
     K, f, std = (np.array(row) for row in (answer.kappa_per_m, answer.tangent_Nm2, answer.tangent_std_Nm2))
     truth = cable.law(K - cable.K0)[1]

@@ -9,9 +9,9 @@ from fixtures.hidden import hidden_test
 from fixtures.scores import SETTINGS
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations.single_cause import refit_one
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.plans.next_experiment import BETTER, next_experiment, protocols
+from pipeline.faults import faults_of_input
 
 NAMES = [cause.name for cause in SUSPECTS]
 
@@ -19,7 +19,7 @@ NAMES = [cause.name for cause in SUSPECTS]
 def refits(protocol, amount, names, hidden):
     cable, reading = HIDE[hidden](amount, Form())
     test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=3, reading=reading)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    bench = prepare(faults_of_input(test), SETTINGS)
     found = [refit_one(bench.observation, bench.base, bench.suspicion, NAMES.index(n)) for n in names]
     return bench, found
 

@@ -19,6 +19,7 @@ from pipeline.diagnosis.posterior.evidence import SIZES, evidence
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.posterior.words import verdict
+from pipeline.faults import faults_of_input
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +195,7 @@ def scattering(test, seed):
 @pytest.mark.parametrize("protocol", ["six", "loop"])
 def test_displacements_that_scatter_are_no_misfit_that_nothing_explains(protocol):
     test = hidden_test(random_cable(80001), PROTOCOLS[protocol], largest=LARGEST, seed=1)
-    part, findings = diagnose(scattering(test, 1), None, SETTINGS)
+    part, findings, _ = diagnose(faults_of_input(scattering(test, 1)), None, SETTINGS)
     assert part.verdict == "adequate", part.headline
     (told,) = (finding for finding in findings if finding.code == "log/displacement-scatter")
     # six errors of which a line was taken: their scatter is known to a third, 95 % within 0.35 to 1.7 of it
@@ -204,7 +205,7 @@ def test_displacements_that_scatter_are_no_misfit_that_nothing_explains(protocol
 def test_a_cause_is_named_beside_displacements_that_scatter():
     cable, reading = HIDE["bearing_stiffness"](0.004, None)
     test = hidden_test(cable, PROTOCOLS["six"], largest=LARGEST, seed=5, reading=reading)
-    part, findings = diagnose(scattering(test, 5), None, SETTINGS)
+    part, findings, _ = diagnose(faults_of_input(scattering(test, 5)), None, SETTINGS)
     assert [cause.name for cause in part.causes] == ["bearing_stiffness"], part.headline
     assert "log/displacement-scatter" in {finding.code for finding in findings}
 
@@ -217,14 +218,16 @@ def test_a_law_with_a_kink_is_no_fault_of_the_simulation():
         (kinked, 0.012, Reading(px_per_m=1e4, force_noise=2e-3)),
         (steep, LARGEST, Reading()),
     ):
-        part, _ = diagnose(hidden_test(cable, LOOP, largest=largest, seed=4, reading=reading), None, SETTINGS)
+        part, _, _ = diagnose(
+            faults_of_input(hidden_test(cable, LOOP, largest=largest, seed=4, reading=reading)), None, SETTINGS
+        )
         assert part.verdict == "adequate", part.headline
 
 
 def test_hypotheses_are_told_and_sum_to_one():
     cable, reading = HIDE["force_offset"](0.05, Form())
     test = hidden_test(cable, LOOP, largest=LARGEST, seed=6, reading=reading)
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     total = sum(one.probability for one in part.hypotheses) + part.none_of_these
     assert total == pytest.approx(1.0, abs=1e-4)
     assert part.hypotheses[0].probability == max(one.probability for one in part.hypotheses)

@@ -10,8 +10,8 @@ from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test, nudged
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -20,7 +20,7 @@ SETTINGS = DiagnosisSettings()
 def answer(test, names):
     """Names of the class, the causes accepted, whether more is left than noise; and the probability of the first."""
     causes = [cause for cause in CATALOGUE if cause.name in names]
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS, causes=causes)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     found = conclude(bench, SETTINGS)
     names = " / ".join(" ".join(causes[k].name for k in place) for place in found.classes)
     return (names, found.unmodelled), found.posterior.total(count=0, something_else=False)

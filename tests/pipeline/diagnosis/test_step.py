@@ -5,10 +5,10 @@ import pytest
 
 from fixtures.effects import HIDE, LARGEST, Form
 from fixtures.hidden import THREE, hidden_test, nudged
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.fit import TOLERANCE
 from pipeline.diagnosis.fits.step import Bounds, Linearised, lasting, least_distance, reach
 from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -44,7 +44,7 @@ def at_the_border():
 
 def test_a_law_at_the_border_of_what_has_an_equilibrium_is_a_minimum_like_any_other():
     test = at_the_border()
-    bench, moved = (prepare(faults_of_input(t, SETTINGS), SETTINGS) for t in (test, nudged(test)))
+    bench, moved = (prepare(faults_of_input(t), SETTINGS) for t in (test, nudged(test)))
     fitted = bench.base
     # creeping along the border, a fit ended at a chi-square of 142 with one processor, and of 223 with another
     assert fitted.converged

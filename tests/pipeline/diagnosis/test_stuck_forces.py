@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.fits.faults import faults_of_input
-from pipeline.diagnosis.fits.stuck_forces import stuck_forces
-from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.faults import faults_of_input
+from pipeline.faults.stuck_forces import stuck_forces
 from rod.measurement import MeasuredStep, MeasuredTest
 
 LEVELS = (0.0, 2.4, 2.9, 3.1, 3.2, 3.25)
@@ -68,7 +67,7 @@ def test_live_holds_are_not_stuck(kind):
 
 def test_the_finding_names_the_steps_and_what_to_do():
     test = MeasuredTest(0.18, 1e-4, 1e-3, clipped(log(), 3.0))
-    found = faults_of_input(test, DiagnosisSettings())
+    found = faults_of_input(test)
     assert [finding.code for finding in found.findings] == ["force/stuck"]
     assert "3, 4, 5" in found.findings[0].message
     assert "larger range" in found.findings[0].message

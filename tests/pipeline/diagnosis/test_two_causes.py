@@ -13,10 +13,10 @@ from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.exchange import exchanged
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import refitted_pairs, with_all_forms
-from pipeline.diagnosis.fits.faults import faults_of_input
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.observations.work import newton_steps
 from pipeline.diagnosis.statistics.pairs import Pair
+from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
@@ -35,12 +35,12 @@ def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time():
     spent = []
     for _ in range(2):
         before = newton_steps()
-        _, findings = diagnose(test, None, hasty)
+        _, findings, _ = diagnose(faults_of_input(test), None, hasty)
         spent.append(newton_steps() - before)
         assert [f.code for f in findings].count("diagnosis/search-ended") == 1
     assert spent[0] == spent[1] > 100  # four equilibria of some three steps each, in tens of fits
     before = newton_steps()
-    _, findings = diagnose(test, None, SETTINGS)
+    _, findings, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert newton_steps() - before > spent[0]
     assert "diagnosis/search-ended" not in [f.code for f in findings]
 
@@ -50,7 +50,7 @@ def test_a_wrong_half_of_a_pair_is_exchanged():
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
     reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
     test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    bench = prepare(faults_of_input(test), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     scale, decay, lens = (names.index(n) for n in ("scale_error", "relaxation", "lens_distortion"))
     given = Pair(bench.suspicion.best(scale), bench.suspicion.best(decay), 0.0)
@@ -64,7 +64,7 @@ def test_each_half_of_a_pair_has_all_its_forms():
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
     cable = Cable(load=(-0.06, 0.06))
     test = hidden_test(cable, steps, largest=0.0138, seed=21, reading=Reading(lens=0.012))
-    bench = prepare(faults_of_input(test, SETTINGS), SETTINGS)
+    bench = prepare(faults_of_input(test), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
     given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)
@@ -80,7 +80,7 @@ def test_a_weak_cause_beside_one_fifty_times_as_loud_is_needed_where_only_both_l
     amount = 0.0077
     cable = Cable(memory=Slipping((amount / 3.0, 2.0 * amount / 9.0), (1.0, 3.0)))  # slips at 1 and at 3 1/m
     test = hidden_test(cable, LOOP, largest=0.0138, seed=4, reading=Reading(scale_error=0.008))
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "two_causes" and {cause.name for cause in part.causes} == {"hysteresis", "scale_error"}
     scale = next(cause for cause in part.causes if cause.name == "scale_error")
     assert abs(scale.estimate - 0.008) < 4.0 * scale.std

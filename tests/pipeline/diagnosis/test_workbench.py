@@ -12,7 +12,7 @@ from fixtures.trials import Trial, made
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.fits import workbench
 from pipeline.diagnosis.fits.extended import curve_change
-from pipeline.diagnosis.fits.faults import faults_of_input
+from pipeline.faults import faults_of_input
 from pipeline.result import Curve
 from pipeline.run import measure
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -49,7 +49,7 @@ def test_covers_above_the_cable_are_no_cause(protocol):
     Held to be the same on every photo they were a lens: the chord that grows shorter shows less of it.
     """
     test = parted_axes(hidden_test(Cable(), protocol, largest=LARGEST, seed=9), 3e-3, (0.08, 0.06))
-    part, _ = diagnose(replace(test, axis_parallax_std=4e-3, camera_foot_std=0.05), None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(replace(test, axis_parallax_std=4e-3, camera_foot_std=0.05)), None, SETTINGS)
     assert part.verdict == "adequate", part.headline
 
 
@@ -59,7 +59,7 @@ def test_every_cause_leaves_a_trace_beside_a_base_model_at_its_limits():
     Without a trace the friction was never refitted, and a displacement offset named alone (probability 1).
     """
     trial = Trial(kind="hidden", protocol="three", seed=30000, names=("bearing_friction",), times=4.0)
-    bench = workbench.prepare(faults_of_input(made(trial), SETTINGS), SETTINGS)
+    bench = workbench.prepare(faults_of_input(made(trial)), SETTINGS)
     assert isinstance(bench, workbench.Workbench), bench
     suspicion = bench.suspicion
     for name in ("bearing_friction", "bearing_stiffness"):
@@ -72,7 +72,7 @@ def test_a_load_that_turns_the_mounted_cable_over_is_found():
     cable = Cable(K0=-2.0, load=(0.0, 0.36))
     test = hidden_test(cable, SIX, largest=LARGEST, seed=7001)
     assert np.mean(test.steps[0].shape.y) > 0.0
-    part, _ = diagnose(test, None, SETTINGS)
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.causes and "in_plane_load" in part.causes[0].class_
     assert abs(part.causes[0].estimate - 0.36) < 2.0 * part.causes[0].std
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.faults import faults_of_input
 from pipeline.identify import identification_parts, identify, measured_test
 from pipeline.identify.measured import picture_centre
 from pipeline.messages import Message
@@ -136,7 +137,8 @@ def test_centre_of_the_picture_lies_where_it_was_drawn(measured, bow_up):
 
 
 def test_identify_names_the_photos_of_the_steps(specimen, traces, settings, law):
-    found = identify(specimen, traces, settings)
+    images = {step.step: step.image for step in specimen.steps}
+    found = identify(faults_of_input(measured_test(specimen, traces, settings)), images, settings)
     parts = identification_parts(found)
     assert [s.image for s in parts.steps] == [s.image for s in specimen.steps]
     error = found.inverse.law.tangent / law.tangent(found.inverse.law.kappa) - 1

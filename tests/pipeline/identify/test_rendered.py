@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.identify import identify
+from pipeline.identify import identify_test, measured_test
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
 from pipeline.simulate import Experiment, State, write_specimen
@@ -31,7 +31,9 @@ def test_characteristic_from_rendered_photos(tmp_path, name):
     written = write_specimen(tmp_path / given.id, experiment, states=tuple(state(s, law) for s in shapes))
     settings = Settings()
     specimen = read_specimen(written.folder, settings.intake)
-    found = identify(specimen, trace_series(specimen, settings.vision), settings.identify)
+    found = identify_test(
+        measured_test(specimen, trace_series(specimen, settings.vision), settings.identify), settings.identify
+    )
     for way in (found.inverse.law, found.balance.law):
         relative = way.tangent / law.tangent(way.kappa) - 1
         # promised of rendered photos: 1.5 % rms, K0 within 0.05 1/m

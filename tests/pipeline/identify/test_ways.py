@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.identify import identification_parts, identify_test, identify_without
+from pipeline.faults import Faults
+from pipeline.identify import identification_parts, identify, identify_test
 from pipeline.identify.agreement import difference_covariance, log_curve, rest_curvature
 from pipeline.identify.findings import chord_findings, force_findings, pre_curvature_sources
 from pipeline.result import Result, SpecimenPart, from_json, to_json
@@ -141,7 +142,7 @@ def test_wrong_zero_of_displacement_leaves_the_result_alone(measured, settings, 
 def test_what_is_at_fault_is_left_out_of_both_ways(measured, settings, law):
     wrong = with_steps(measured, lambda s: replace(s, force=1.25 * s.force) if s.step == 3 else s)
     spoiled = identify_test(wrong, settings)
-    again = identify_without(spoiled, photos=[], forces=[3], settings=settings)
+    again = identify(Faults(wrong, forces=frozenset({3})), {}, settings)
     for way in (again.inverse.law, again.balance.law):
         truth = law.tangent(way.kappa)
         # what is left is the noise of the data; with the force a quarter too high it is 5 % or more
@@ -151,9 +152,7 @@ def test_what_is_at_fault_is_left_out_of_both_ways(measured, settings, law):
     assert "identify/misfit-force" not in codes(again.findings)
 
 
-def test_tension_and_a_load_cell_off_zero_are_told(measured, settings):
-    pulled = with_steps(measured, lambda s: replace(s, force=-s.force))
-    assert "identify/force-sign" in codes(force_findings(pulled, settings))
+def test_a_load_cell_off_zero_is_told(measured, settings):
     off = with_steps(measured, lambda s: replace(s, force=s.force + 20 * s.force_std))
     assert codes(force_findings(off, settings)) == {"identify/force-zero"}
 
@@ -161,7 +160,6 @@ def test_tension_and_a_load_cell_off_zero_are_told(measured, settings):
 def test_tension_ends_in_outcomes_not_in_a_crash(measured, settings):
     result = identify_test(with_steps(measured, lambda s: replace(s, force=-s.force)), settings)
     assert {"identify/balance-no-moment", "identify/inverse-opposite-forces"} <= codes(result.findings)
-    assert "identify/force-sign" in codes(result.findings)
     identification_parts(result)
 
 

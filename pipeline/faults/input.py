@@ -1,8 +1,7 @@
-"""Faults of the data, told apart from causes: a mixed-up photo is not physics.
+"""Faults of the data that show without any fit: a mixed-up photo is not physics.
 
-Before anything is fitted, photographed chords are held against the displacement log (order of photos, unit), photos
-against each other (doubled), traced against stated length, forces against what a cable can do (unit, sign) and against
-each other (stuck). After the base fit, breaks in the forces (`force_breaks`) and single items (`outlier`) are sought.
+Photographed chords are held against the displacement log (order of photos, unit), photos against each other (doubled),
+traced against stated length, forces against what a cable can do (unit, sign) and against each other (stuck).
 
 Codes: ``photo/order``, ``photo/doubled``, ``force/sign``, ``force/stuck``, ``force/unit``, ``log/unit``,
 ``log/displacement``, ``length/traced``.
@@ -10,104 +9,59 @@ Codes: ``photo/order``, ``photo/doubled``, ``force/sign``, ``force/stuck``, ``fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from pipeline.diagnosis.fits.stuck_forces import stuck_forces
-from pipeline.records import Finding, doubtful
-from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.faults.record import Faults
+from pipeline.faults.stuck_forces import stuck_forces
+from pipeline.records import doubtful
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
-
-Array = NDArray[np.float64]
 
 UNITS = {1e3: "m", 1e-3: "um", 10.0: "cm", 25.4: "inches"}
 """What the displacement column may hold if the chord changes this many times as much as the log says."""
 
 ALONE = 4.0
-"""Times the spread of all other sums of chord and displacement: a sum that far away is alone among them."""
+"""Times the spread of all other sums of chord and displacement: a sum that far away is alone among them. Also standard
+deviations of a chord: displacements nearer to each other are those of one place."""
+
+MISMATCH = 0.15
+"""Of the travel: mismatch of chord and displacement from which order or unit is doubted. Play, a yielding frame and a
+wrong zero stay below a tenth."""
+
+OF_ONE = 0.02
+"""Of the travel: mismatch of a single chord and its displacement from which that displacement is doubted, in place of a
+photo or a cause: a fifth of a step of ten."""
+
+DOUBLED = 0.03
+"""Of the scatter of the sections: two photos that differ by less are one photo; light and ground that stay make two
+photos of one shape alike to an eighth."""
+
+STIFFNESS = (1e-7, 100.0)
+"""N m^2: EI of cables spans 1e-5 to 1, two decades beyond that is a wrong unit."""
+
+OTHER_LENGTH = 0.01
+"""Relative: traced against stated length from which length_mm is doubted; a rule is read to a tenth of that."""
 
 
-@dataclass(frozen=True)
-class ForceCorrection:
-    """What was wrong with the forces of some steps: shown = factor * force + offset (N); steps by their numbers.
-
-    ``errors``: what the correction may be off by, N for each of the steps, rows of one standard deviation each.
-    """
-
-    steps: tuple[int, ...]
-    factor: float
-    offset: float
-    errors: tuple[tuple[float, ...], ...] = ()
-
-    def applied(self, test: MeasuredTest) -> MeasuredTest:
-        """The test with these forces as they should have been, and with what they may be off by together."""
-        steps = tuple(self._corrected(s) if s.step in self.steps else s for s in test.steps)
-        errors = tuple(dict(zip(self.steps, row, strict=True)) for row in self.errors)
-        return replace(test, steps=steps, common_force_errors=(*test.common_force_errors, *errors))
-
-    def _corrected(self, step: MeasuredStep) -> MeasuredStep:
-        return replace(
-            step,
-            force=(step.force - self.offset) / self.factor,
-            force_std=step.force_std / abs(self.factor),
-            hold_forces=None if step.hold_forces is None else (step.hold_forces - self.offset) / self.factor,
-        )
-
-
-@dataclass(frozen=True)
-class Faults:
-    """What is wrong with the data.
-
-    Attributes
-    ----------
-    test : MeasuredTest
-        With displacements replaced by chords where their unit is wrong.
-    findings : tuple of Finding
-    photos, forces : frozenset of int
-        Indices of steps whose photo, or force, is not to be used.
-    corrections : tuple of ForceCorrection
-        Those that ``test`` has got.
-    """
-
-    test: MeasuredTest
-    findings: tuple[Finding, ...] = ()
-    photos: frozenset[int] = frozenset()
-    forces: frozenset[int] = frozenset()
-    corrections: tuple[ForceCorrection, ...] = ()
-
-    def loaded_forces(self) -> list[int]:
-        """Indices of the steps under load whose force may be used; without any, stiffness has no scale."""
-        steps = enumerate(self.test.steps)
-        return [i for i, step in steps if step.branch != "mounted" and step.force and i not in self.forces]
-
-    def joined(self, other: Faults) -> Faults:
-        """Both."""
-        return Faults(
-            other.test,
-            (*self.findings, *other.findings),
-            self.photos | other.photos,
-            self.forces | other.forces,
-            (*self.corrections, *other.corrections),
-        )
-
-
-def faults_of_input(test: MeasuredTest, settings: DiagnosisSettings) -> Faults:
+def faults_of_input(test: MeasuredTest) -> Faults:
     """Faults that show without any fit."""
     found = Faults(test)
-    for check in (
+    checks: tuple[Callable[[Faults], Faults], ...] = (
         _unit_of_displacement,
         _doubled_photos,
         _order_of_photos,
         _displacement,
         _traced_length,
         _forces,
-    ):
-        found = found.joined(check(found, settings))
-    return found.joined(_stuck(found))
+        _stuck,
+    )
+    for check in checks:
+        found = found.joined(check(found))
+    return found
 
 
 def _with_both(found: Faults) -> list[int]:
@@ -119,7 +73,7 @@ def _with_both(found: Faults) -> list[int]:
     ]
 
 
-def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _unit_of_displacement(found: Faults) -> Faults:
     """The chord changes by another factor than one per displacement: a unit."""
     test, used = found.test, _with_both(found)
     if len(used) < 2:
@@ -131,8 +85,8 @@ def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
     slope, at_zero = np.polyfit(displacement, chord, 1)
     left = float(np.sqrt(np.mean((chord - at_zero - slope * displacement) ** 2)))
     factor = min(UNITS, key=lambda unit: abs(np.log(abs(slope) / unit)))
-    near = abs(np.log(abs(slope) / factor)) < settings.chord_mismatch
-    if slope >= 0.0 or not near or left > settings.chord_mismatch * np.ptp(chord):
+    near = abs(np.log(abs(slope) / factor)) < MISMATCH
+    if slope >= 0.0 or not near or left > MISMATCH * np.ptp(chord):
         return Faults(test)
     steps = tuple(
         replace(step, displacement=None if step.displacement is None else -slope * step.displacement)
@@ -141,7 +95,7 @@ def _unit_of_displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
     return Faults(replace(test, steps=steps), (doubtful("log/unit.scaled", times=-slope, unit=UNITS[factor]),))
 
 
-def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _doubled_photos(found: Faults) -> Faults:
     """Two photos from files of the same contents, or whose noise is the same, are one photo."""
     steps = found.test.steps
     pictures = [(i, step.shape) for i, step in enumerate(steps) if step.shape is not None]
@@ -149,7 +103,7 @@ def _doubled_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
     for (i, one), (j, other) in combinations(pictures, 2):
         assert one is not None and other is not None
         same_file = steps[i].picture is not None and steps[i].picture == steps[j].picture
-        if not same_file and not _same_noise(one, other, settings.doubled_share):
+        if not same_file and not _same_noise(one, other, DOUBLED):
             continue
         gap = {k: abs(_mismatch(found.test, k)) for k in (i, j)}
         wrong = j if gap[j] >= gap[i] else i
@@ -188,30 +142,56 @@ def _mismatch(test: MeasuredTest, index: int) -> float:
     return sums[index] - float(np.median(list(sums.values()))) if index in sums else 0.0
 
 
-def _order_of_photos(found: Faults, settings: DiagnosisSettings) -> Faults:
-    """Chords fit the displacements in another order than the one given."""
+def _order_of_photos(found: Faults) -> Faults:
+    """Chords fit the displacements in another order than the one given: each photo goes to the step that it fits.
+
+    A cable that is pushed further has a shorter chord, whatever rig and cable do. Steps of one displacement (up and
+    down) cannot be told apart by it: a photo that may be of either is left out.
+    """
     test, used = found.test, _with_both(found)
     if len(used) < 2:
         return Faults(test)
     chord = np.array([test.steps[i].chord for i in used], dtype=float)
     displacement = np.array([test.steps[i].displacement for i in used], dtype=float)
-    travel = float(np.ptp(displacement))
-    if travel <= 0.0:
+    by_log, by_photo = np.argsort(displacement, kind="stable"), np.argsort(-chord, kind="stable")
+    sums = chord[by_photo] + displacement[by_log]
+    limit = MISMATCH * float(np.ptp(displacement))
+    wrong = np.abs(chord + displacement - np.median(sums)) > limit
+    if not limit > 0.0 or wrong.sum() < 2 or np.any(np.abs(sums - np.median(sums)) > limit):
         return Faults(test)
-    by_log = np.argsort(displacement, kind="stable")
-    by_photo = np.argsort(-chord, kind="stable")
-    sorted_sum = chord[by_photo] + displacement[by_log]
-    natural = float(np.median(sorted_sum))
-    given = chord + displacement - natural
-    limit = settings.chord_mismatch * travel
-    wrong = np.abs(given) > limit
-    if wrong.sum() < 2 or np.any(np.abs(sorted_sum - natural) > limit):
-        return Faults(test)
-    out = [used[k] for k in np.flatnonzero(wrong)]
-    return Faults(test, (doubtful("photo/order", steps=[test.steps[i].step for i in out]),), frozenset(out))
+    level = np.zeros(len(used), dtype=int)
+    alike = ALONE * max(test.steps[i].chord_std or 0.0 for i in used)
+    level[by_log] = np.cumsum(np.diff(displacement[by_log], prepend=displacement.min()) > alike)
+    belongs = np.empty_like(level)
+    belongs[by_photo] = level[by_log]
+    steps, moved, out = list(test.steps), {}, set()
+    for one in np.unique(level):
+        places = [used[k] for k in np.flatnonzero((level == one) & (belongs != one))]
+        photos = [used[k] for k in np.flatnonzero((belongs == one) & (level != one))]
+        if len(places) > 1:
+            out.update(places)
+        elif places:
+            steps[places[0]] = _with_photo_of(test.steps[places[0]], test.steps[photos[0]])
+            moved[test.steps[places[0]].step] = test.steps[photos[0]].step
+    put_right = Faults(replace(test, steps=tuple(steps)), photos=frozenset(out), moved=moved)
+    told = [doubtful("photo/order", steps=sorted(moved))] if moved else []
+    if out:
+        told.append(doubtful("photo/order.unclear", steps=[test.steps[i].step for i in sorted(out)]))
+    return replace(put_right, findings=tuple(told))
 
 
-def _displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _with_photo_of(step: MeasuredStep, other: MeasuredStep) -> MeasuredStep:
+    return replace(
+        step,
+        chord=other.chord,
+        chord_std=other.chord_std,
+        shape=other.shape,
+        picture_centre=other.picture_centre,
+        picture=other.picture,
+    )
+
+
+def _displacement(found: Faults) -> Faults:
     """One chord under load that does not fit its displacement, where all others do; its step then goes by the chord.
 
     The force-free step is none of them: play and a yielding frame set it apart from all others.
@@ -224,30 +204,31 @@ def _displacement(found: Faults, settings: DiagnosisSettings) -> Faults:
     off = sums - np.median(sums)
     worst = int(np.argmax(np.abs(off)))
     rest, travel = float(np.ptp(np.delete(off, worst))), float(np.ptp(chord))
-    if abs(off[worst]) < max(settings.displacement_mismatch * travel, ALONE * rest):
+    if abs(off[worst]) < max(OF_ONE * travel, ALONE * rest):
         return Faults(test)
     step = test.steps[used[worst]]
     apart = "apart" if off[worst] > 0.0 else "nearer"
     finding = doubtful("log/displacement", step=step.step, off_m=abs(off[worst]), apart=apart)
     steps = tuple(replace(one, displacement=None) if one is step else one for one in test.steps)
-    return Faults(replace(test, steps=steps), (finding,))
+    doubted = {used[worst]: float(step.displacement or 0.0)}
+    return Faults(replace(test, steps=steps), (finding,), doubted=doubted)
 
 
-def _traced_length(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _traced_length(found: Faults) -> Faults:
     """All photos show another length than the one stated."""
     test = found.test
     traced = [float(step.shape.s[-1]) for i, step in enumerate(test.steps) if step.shape and i not in found.photos]
     if not traced:
         return Faults(test)
     off = float(np.median(traced)) / test.length - 1.0
-    if abs(off) < settings.length_mismatch or np.ptp(traced) / test.length > abs(off):
+    if abs(off) < OTHER_LENGTH or np.ptp(traced) / test.length > abs(off):
         return Faults(test)
     # covers above the cable are seen too far apart, never too near: then neither need be wrong
     key = "length/traced.covers" if off > 0.0 and test.axis_parallax_std > 0.0 else "length/traced"
     return Faults(test, (doubtful(key, seen_m=np.median(traced), stated_m=test.length),))
 
 
-def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
+def _forces(found: Faults) -> Faults:
     """Forces of the wrong sign, or of a size no cable has."""
     test = found.test
     pushed = [step for step in test.steps if step.branch != "mounted"]
@@ -255,7 +236,7 @@ def _forces(found: Faults, settings: DiagnosisSettings) -> Faults:
     if forces.size and np.mean(forces < 0.0) > 0.5:
         return Faults(test, (doubtful("force/sign"),))
     stiffness = float(np.max(np.abs(forces), initial=0.0)) * test.length**2 / np.pi**2
-    low, high = settings.stiffness_range
+    low, high = STIFFNESS
     if 0.0 < stiffness < low or stiffness > high:
         return Faults(test, (doubtful("force/unit", stiffness=stiffness, low=low, high=high),))
     return Faults(test)
