@@ -10,6 +10,7 @@ from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import hidden_test
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.posterior.mixture import _half_width
+from pipeline.faults import faults_of_input
 from pipeline.identify.parts import curve
 from pipeline.identify.ways import identify_test
 from pipeline.result import Curve, Widening
@@ -53,7 +54,7 @@ def test_the_band_grows_with_what_no_cause_makes(varies):
     cable = Cable(bearing_friction=1.2e-3 * varies, friction_varies=factors)
     test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=41)
     found = identify_test(test, IdentifySettings())
-    part, _, _ = diagnose(test, found)
+    part, _, _ = diagnose(faults_of_input(test), found)
     answer = part.extended if part.widening is None else part.widening.of(curve(found.inverse))
     K, f, std = (np.array(row) for row in (answer.kappa_per_m, answer.tangent_Nm2, answer.tangent_std_Nm2))
     truth = cable.law(K - cable.K0)[1]
