@@ -147,11 +147,15 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
 def _other_valleys(added: Addition) -> list[Array]:
     """Starts on both sides of K0 beside a bare base model whose K0 no photo of the force-free cable shows.
 
-    K0 then has a second, false valley, as deep as the true one but for some sigma.
+    K0 then has a second, false valley, as deep as the true one but for some sigma. With such a photo there is a start
+    with the law and K0 that all photos show, where the base model went elsewhere: a load in the plane may turn the
+    mounted cable over, and without it no K0 of the true sign does.
     """
     base, facts = added.base.extension.base, added.base.extension.facts
-    if "mounted" in facts.branch:
-        return []
     shift = OTHER_VALLEY * facts.curvature_scale
+    if "mounted" in facts.branch:
+        seen = base.as_seen()
+        apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > shift
+        return [added.start(seen)] if apart and len(seen) == len(added.base.vector) else []
     guesses = [base.neutral(bend=bend) for bend in (shift, -shift)]
     return [added.start(guess) for guess in guesses if len(guess) == len(added.base.vector)]

@@ -164,7 +164,7 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
     freedom = observation.rows.count - len(base.names)
     neutral = ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift))
     starts = [base.neutral(stiffness=stiffness, bend=bend) for stiffness, bend in neutral]
-    for vector in (base.as_seen(), *starts):
+    for number, vector in enumerate((base.as_seen(), *starts)):
         found = fit(
             observation,
             Extension(base, facts),
@@ -175,7 +175,7 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
             best = found
         # only then K0 is seen directly; else it has a second valley, which may fit nearly as well
         at_rest = "mounted" in facts.branch
-        if at_rest and best is not None and (best.chi2 < FITS * freedom or best.converged):
+        if at_rest and best is not None and (best.chi2 < FITS * freedom or (number and best.converged)):
             break
     return found if best is None else best
 
