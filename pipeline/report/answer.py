@@ -11,7 +11,8 @@ import numpy as np
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import Result, leading, trusted
-from pipeline.result.headline import opening, refusal
+from pipeline.result.answer import refusal
+from pipeline.result.headline import opening
 from pipeline.settings import ReportSettings
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -89,7 +90,7 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
     if curve is None or diagnosis is None:
         return ()
     band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
-    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.blind_spots]
+    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.could_hide]
     worst = sorted((one for one in spots if one[0] > band), key=lambda one: -one[0])[:MOST_HIDDEN]
     return tuple(
         words(
