@@ -41,6 +41,8 @@ class FirstScreen:
     pre_curvatures : tuple of (way, value ± std)
     hidden : tuple of str
         What could hide in the data and would change f_EI by more than its band.
+    doubt : str
+        What the bands leave open.
     """
 
     sentence: str
@@ -51,6 +53,7 @@ class FirstScreen:
     tone: str
     pre_curvatures: tuple[tuple[str, str], ...]
     hidden: tuple[str, ...] = ()
+    doubt: str = ""
 
 
 def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
@@ -77,6 +80,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
             for way, (value, std) in _all_pre_curvatures(result).items()
         ),
         hidden=_hidden(result, words, settings),
+        doubt=words("band_unexplained") if diagnosis and diagnosis.verdict == "unexplained" else "",
     )
 
 
