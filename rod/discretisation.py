@@ -232,6 +232,7 @@ class Rod:
             reached,
             self.left.advanced(float(angles[0]), memory.left_angle),
             self.right.advanced(float(angles[-1]), memory.right_angle),
+            memory.step + 1,
         )
 
 

@@ -214,12 +214,14 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
     law, K0, move = section.law, section.rest(), moves.pre_curvature
     reads: tuple[Read, ...] = (Read(1.0, K),)
     set_move = moves.none[:, None]
-    if section.plastic_rate or moves.has("plastic_set"):
+    if section.sets or moves.has("plastic_set"):
         K0 = section.pre_curvature
         excess = np.maximum(memory.reached, K - K0) - section.set_threshold
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
         grown = grown - moves.scalar("set_threshold")[:, None]
         set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
+        if moves.grown:
+            set_move = set_move + moves.given(moves.grown, memory.step)
         reads = section.read(K, section.set_at(K, memory))
     moment: Array | float = 0.0
     for read in reads:
@@ -257,7 +259,8 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     u = (angle - (step.before.left_angle if left else step.before.right_angle)) / support.stick_angle
     moment = moves.scalar(f"end_moment_{side}") * (-1.0 if left else 1.0)
     moment = moment + moves.scalar(f"bearing_stiffness_{side}") * (angle - at_rest)
-    moment = moment + moves.scalar(f"bearing_friction_{side}") * min(1.0, max(-1.0, u))
+    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.rubbing, step.before.step)
+    moment = moment + friction * min(1.0, max(-1.0, u))
     if support.stiffness:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
         moment = moment - support.stiffness * rest
