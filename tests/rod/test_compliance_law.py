@@ -7,6 +7,7 @@ from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
 from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
+from rod.measured_law import propagated
 
 RNG = np.random.default_rng(3)
 RIPPLE = 0.2
@@ -33,6 +34,7 @@ def test_bend_is_the_integral_of_the_compliance(law):
     assert np.allclose(law.bend(m), exact, atol=2e-6 * np.ptp(exact))
     slope = [(law.bend(at + 1e-8) - law.bend(at - 1e-8)) / 2e-8 for at in m]
     assert np.allclose(slope, law.compliance(m), rtol=2e-4)
+    assert law.stiffness_scale == pytest.approx(1.0 / law.compliance(law.basis.moments).min())
 
 
 @pytest.mark.parametrize("law", list(laws()))
@@ -216,3 +218,36 @@ def test_forms_of_a_normal_prior_are_that_prior():
     exact = np.linalg.pinv(precision, rcond=1e-10)
     assert forms.shape[1] == COEFFICIENTS - 1
     assert np.allclose(apart @ forms @ forms.T @ apart, apart @ exact @ apart, atol=1e-6 * exact.max())
+
+
+def test_bands_of_all_readings_are_those_of_their_derivatives():
+    """Of m = a (K - K0) + b (K - K0)^3, linearised about three unknowns; the secant is the tangent at rest."""
+    kappa, rest = np.linspace(1.0, 9.0, 9), 2.0
+    C = 1e-4 * np.array([[4.0, 1.0, -0.5], [1.0, 9.0, 2.0], [-0.5, 2.0, 16.0]])
+
+    def read(a, b, K0):
+        D = kappa - K0
+        return a * D + b * D**3, a + 3.0 * b * D**2, a + b * D**2
+
+    def by(number):
+        steps = [read(*(np.array([5.0, 0.1, rest]) + sign * h)) for h in 1e-6 * np.eye(3) for sign in (1.0, -1.0)]
+        return np.column_stack([(steps[2 * k][number] - steps[2 * k + 1][number]) / 2e-6 for k in range(3)])
+
+    moment, tangent, secant = read(5.0, 0.1, rest)
+    law = propagated(
+        kappa,
+        rest,
+        moment=moment,
+        tangent=tangent,
+        by_moment=by(0),
+        by_log=by(1) / tangent[:, None],
+        by_pre_curvature=np.array([0.0, 0.0, 1.0]),
+        covariance=C,
+    )
+    assert np.allclose(law.secant, secant)
+    away = np.abs(kappa - rest) > 0.5
+    for number, std in ((0, law.moment_std), (1, law.tangent_std), (2, law.secant_std)):
+        exact = np.sqrt(np.einsum("ij,jk,ik->i", by(number), C, by(number)))
+        assert np.allclose(std[away], exact[away], rtol=1e-6)
+    assert law.secant_std[~away] == pytest.approx(law.tangent_std[~away])
+    assert law.pre_curvature_std == pytest.approx(0.04)
