@@ -162,11 +162,13 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
     best: Fit | None = None
     shift = 0.1 * facts.curvature_scale
     freedom = observation.rows.count - len(base.names)
-    for stiffness, bend in ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift)):
+    neutral = ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift))
+    starts = [base.neutral(stiffness=stiffness, bend=bend) for stiffness, bend in neutral]
+    for vector in (base.as_seen(), *starts):
         found = fit(
             observation,
             Extension(base, facts),
-            base.neutral(stiffness=stiffness, bend=bend),
+            vector,
             iterations=2 * ITERATIONS,
         )
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
