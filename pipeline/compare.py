@@ -26,6 +26,7 @@ from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.messages import Message
 from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import Result, Visited, leading
+from pipeline.result.visited import html_table
 from pipeline.settings.compare import CompareSettings
 
 Array = NDArray[np.float64]
@@ -100,6 +101,11 @@ class Comparison:
     def statement(self) -> str:
         """The outcome in plain words."""
         return str(self.said)
+
+    def _repr_html_(self) -> str:
+        """Show the comparison in a notebook."""
+        rows = [(self.verdict, self.statement), *((finding.level, str(finding.said)) for finding in self.findings)]
+        return html_table(f"{self.a} and {self.b}", rows)
 
 
 def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) -> Comparison:

@@ -31,8 +31,10 @@ from pipeline.identified_model import IdentifiedModel, Zero, identified_model
 from pipeline.messages import Message, ended, word
 from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
+from pipeline.result.visited import html_table
 from pipeline.rounding import plain
 from pipeline.settings.predict import PredictSettings
+from pipeline.units import quantity
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
@@ -94,6 +96,13 @@ class PredictedStep:
         """Why the step is not simply predicted; empty if it is."""
         return "" if self.said is None else str(self.said)
 
+    def told(self) -> str:
+        """Force with its standard deviation and largest curvature, or why there are none."""
+        if self.force_N is None:
+            return f"{self.status}: {self.reason}"
+        bent = f"{quantity(self.force_N, 'N', self.force_std_N)}, bent to {plain(self.kappa_max_per_m or 0.0)} 1/m"
+        return f"{bent} ({self.status}: {self.reason})" if self.reason else bent
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -125,6 +134,12 @@ class Prediction:
     reachable_m: float | None
     steps: tuple[PredictedStep, ...]
     findings: tuple[Finding, ...] = ()
+
+    def _repr_html_(self) -> str:
+        """Show the prediction in a notebook, a row a step."""
+        rows = [(f"{plain(1e3 * step.displacement_m, 4)} mm", step.told()) for step in self.steps]
+        rows += [(finding.level, str(finding.said)) for finding in self.findings if finding.level != "info"]
+        return html_table(f"{self.specimen}, {plain(1e3 * self.length_m, 4)} mm long: predicted forces", rows)
 
 
 def predict(

@@ -82,9 +82,9 @@ _MODULES = {
 
 def __getattr__(name: str) -> Any:
     """Load a name when it is first used: scipy takes half a second that one who needs a record alone can spare."""
-    at_home = {"fit_characteristic": "paper_fit"}.get(name, name)
-    module = next((module for module, names in _MODULES.items() if at_home in names), None)
-    if module is None or name not in __all__:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    at_home = {"fit_characteristic": "paper_fit"}.get(name, name)
+    module = next(module for module, names in _MODULES.items() if at_home in names)
     globals()[name] = value = getattr(import_module(module), at_home)
     return value

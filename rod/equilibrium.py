@@ -82,6 +82,9 @@ class Equilibrium:
     after: Memory
     iterations: int
 
+    def __repr__(self) -> str:
+        return f"<Equilibrium {self.outcome.name}: force {self.force:.6g} N, chord {self.chord:.6g} m>"
+
     @property
     def rod(self) -> Rod:
         """The discrete rod."""

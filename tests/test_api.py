@@ -92,7 +92,7 @@ def test_importing_the_package_loads_nothing_heavy():
 def test_everything_offered_is_there():
     for name in cablebend.__all__:
         assert getattr(cablebend, name) is not None
-    assert sorted(cablebend.__all__) == sorted([*itertools.chain(*cablebend.ROOMS.values()), "__version__"])
+    assert sorted(cablebend.__all__) == sorted([*itertools.chain(*cablebend.ROOMS.values()), "__version__", "rod"])
     with pytest.raises(AttributeError, match="has no attribute 'mesure'"):
         cablebend.__getattr__("mesure")
 

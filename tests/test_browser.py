@@ -6,6 +6,8 @@ is said in ``tests/conftest.py``.
 
 from __future__ import annotations
 
+import base64
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -276,6 +278,19 @@ def visible_names(driver):
     return driver.execute_script(
         "return [...document.querySelectorAll('#specimens tbody tr:not([hidden])')].map(r => r.cells[1].textContent)"
     )
+
+
+def test_the_printed_index_begins_below_its_title(show, site):
+    """A table that is kept together leaves the first page to the title alone."""
+    driver = show(f"{site}/index.html")
+
+    def pages():
+        printed = driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]
+        return len(re.findall(rb"/Type ?/Page\b", base64.b64decode(printed)))
+
+    whole = pages()
+    driver.execute_script("document.querySelector('section.card').style.breakInside = 'avoid'")
+    assert whole < pages()
 
 
 def test_index_sorts_by_number_and_by_name(show, site):

@@ -236,11 +236,8 @@ def _moved_by_forces(model: MomentModel, found: Regression) -> Array:
 def _loaded_pre_curvature(model: MomentModel, found: Regression) -> tuple[float, float]:
     """K0 and its std by the loaded photos alone: the same linearisation without the rows of force-free photos."""
     loaded = [k for k, d in enumerate(model.data) if d.force != 0.0]
-    if len(loaded) == len(model.data):
-        posterior = found.posterior
-    else:
-        value = np.concatenate([found.rows[k].value for k in loaded])
-        J = np.vstack([model.columns(model.data[k], found.rows[k]) for k in loaded])
-        posterior = replace(model, varying=False).posterior(found.unknowns, value, J)
+    value = np.concatenate([found.rows[k].value for k in loaded])
+    J = np.vstack([model.columns(model.data[k], found.rows[k]) for k in loaded])
+    posterior = replace(model, varying=False).posterior(found.unknowns, value, J)
     p = model.size
     return float(posterior.mean[p]), float(np.sqrt(posterior.covariance[p, p]))

@@ -104,7 +104,7 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
         return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=Outcome.LIMIT_POINT)
     imposed = [imposed_chord(model, u, d) for d in model.data]
     bent = [k for k, d in enumerate(model.data) if not d.at_rest]
-    shapes = {k: _arc(model, u) for k, d in enumerate(model.data) if d.at_rest}
+    shapes = {k: free_cable(model, u) for k, d in enumerate(model.data) if d.at_rest}
     equilibria: tuple[Equilibrium, ...] = ()
     if bent:
         test = model.bending_test(u)
@@ -148,7 +148,7 @@ def imposed_chord(model: FitModel, u: Array, data: StepData) -> tuple[float, Arr
         by[model.index(own)] = -model.nuisances[own]
         moved += model.nuisance(u, own)
     if model.zero is None:
-        arc = _arc(model, u)
+        arc = free_cable(model, u)
         return float(arc.x[-1]) - moved, by + arc.x_by[-1] @ _chain(model, u, np.zeros(model.size))
     by[model.index("zero")] = model.nuisances["zero"]
     return model.zero + model.nuisance(u, "zero") - moved, by
@@ -165,7 +165,7 @@ def _chain(model: FitModel, u: Array, chord_by: Array) -> Array:
     return chain
 
 
-def _arc(model: FitModel, u: Array) -> Simulated:
+def free_cable(model: FitModel, u: Array) -> Simulated:
     """The force-free cable: an arc of curvature K0 on its chord, with derivatives by all unknowns."""
     K0, length = model.pre_curvature(u), model.cable_length(u)
     s = np.linspace(0.0, length, model.elements + 1)

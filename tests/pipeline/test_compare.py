@@ -6,6 +6,7 @@ for 11, that of K0 for 2 and 17.
 
 import json
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -152,6 +153,11 @@ def test_doubts(before):
     curve = before.inverse.curve
     few = [k < curve.kappa_per_m[0] + 1.0 for k in curve.kappa_per_m]
     assert "compare/range" in codes(compare(before, shifted(before, supported=few)))
+
+
+def test_it_shows_itself_in_a_notebook(before, stiffer):
+    comparison = compare(before, stiffer)
+    assert f"<tr><th>differ</th><td>{escape(comparison.statement)}</td></tr>" in comparison._repr_html_()
 
 
 def test_frame(before, stiffer):

@@ -18,6 +18,7 @@ from pipeline.predict import identified_model, predict
 from pipeline.report.frames import prediction_frame
 from pipeline.result import DiagnosisPart, to_json
 from pipeline.settings import PredictSettings
+from pipeline.units import quantity
 from rod.elastica import uniform_equilibrium
 from rod.inverse import estimate
 from tests.pipeline.virtual_experiment import QUICK, identified, without
@@ -182,6 +183,15 @@ def test_frame_has_a_row_a_point_and_one_for_a_refused_step(result):
     assert list(frame.columns[:5]) == ["displacement_m", "status", "chord_m", "force_N", "force_std_N"]
     assert len(frame) == POINTS + 1
     assert frame.force_N.isna().sum() == frame.s_m.isna().sum() == 1
+
+
+def test_it_shows_itself_in_a_notebook(result):
+    prediction = predict(result, [0.004, 0.1])
+    html = prediction._repr_html_()
+    step = prediction.steps[0]
+    shown = quantity(step.force_N, "N", step.force_std_N)
+    assert f"<th>4 mm</th><td>{shown}, bent to " in html
+    assert f"<th>100 mm</th><td>refused: {prediction.steps[1].reason}</td>" in html
 
 
 def test_command(result, tmp_path):

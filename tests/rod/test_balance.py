@@ -209,3 +209,17 @@ def test_fewer_blocks_of_a_photo_change_nothing_beyond_the_band():
     one, two = law_of(test), law_of(test, options=BalanceOptions(blocks=80))
     assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < one.tangent_std)
     assert max(p.photo.s.size for p in moment_points(test, blocks=80)) == 80
+
+
+def test_points_are_where_they_were_measured_wherever_the_smooth_curve_begins():
+    """A smooth curve that lies beside the cable by a tenth of a millimetre is only what positions are counted from."""
+    camera = Camera(cover=0.0)
+    shape = next(step.shape for step in measured(camera=camera).steps if step.branch == "loading")
+    beside = 1e-4 * np.array([-np.sin(shape.theta[0]), np.cos(shape.theta[0])])
+    moved = replace(shape, x=shape.x + beside[0], y=shape.y + beside[1])
+    one, two = (
+        moment_points(replace(test, steps=(replace(test.steps[1], shape=given),)))[0]
+        for test in (measured(camera=camera),)
+        for given in (shape, moved)
+    )
+    assert np.abs(one.offset - two.offset)[:-1].max() < 1e-6

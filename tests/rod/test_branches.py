@@ -8,9 +8,9 @@ import pytest
 from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
-from rod.equilibrium import Outcome
+from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
-from rod.support import Support
+from rod.support import CLAMP, Support
 from tests.rod.minimum import is_minimum
 from tests.rod.potential_energy import Potential
 
@@ -80,6 +80,17 @@ def test_random_cables_never_end_on_another_shape_silently() -> None:
         exact = uniform_equilibrium(law, length=0.2, chord=chord, pre_curvature=K0)
         assert step.good
         assert np.abs(step.kappa - exact.kappa).max() < 3e-3 * np.abs(exact.kappa).max()
+
+
+def test_a_far_warm_start_ends_on_no_loop() -> None:
+    """Newton's method alone would wind the cable up into a loop that holds 120 N of tension."""
+    test = BendingTest(0.2, StickSlip(1e-2, 2.5e-3, 3.0), 5.0, left=CLAMP, elements=60)
+    start = simulate(test, chords=[0.1 * test.zero_chord], branch="down")[0]
+    hold = test.hold("chords", 0.95 * test.zero_chord)
+    cold, warm = (solve(test.rod, hold, start=given, branch="down") for given in (None, start))
+    assert start.good and cold.good and warm.good
+    assert warm.force == pytest.approx(cold.force, rel=1e-9)
+    assert cold.force == pytest.approx(2.59, abs=0.01)
 
 
 def arch(load: float) -> BendingTest:

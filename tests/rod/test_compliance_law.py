@@ -7,6 +7,7 @@ from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
 from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
+from rod.measured_law import propagated
 
 RNG = np.random.default_rng(3)
 RIPPLE = 0.2
@@ -33,6 +34,7 @@ def test_bend_is_the_integral_of_the_compliance(law):
     assert np.allclose(law.bend(m), exact, atol=2e-6 * np.ptp(exact))
     slope = [(law.bend(at + 1e-8) - law.bend(at - 1e-8)) / 2e-8 for at in m]
     assert np.allclose(slope, law.compliance(m), rtol=2e-4)
+    assert law.stiffness_scale == pytest.approx(1.0 / law.compliance(law.basis.moments).min())
 
 
 @pytest.mark.parametrize("law", list(laws()))
@@ -113,7 +115,7 @@ def test_priors_are_the_integrals_of_the_module():
     a = np.linalg.lstsq(splines(80)(t), logarithm, rcond=None)[0]
     at_rest = float(splines(80)(0.0, 1) @ a)
     told = quadratic(priors(many), a).reshape(along, slopes, 2, TAUS.size)[1, 0, 0] - (at_rest / REST_SLOPES[0]) ** 2
-    assert np.allclose(told, TAUS**-2.0 / REACH**2, rtol=0.02)
+    assert np.allclose(told, TAUS**-2.0 / REACH**2, rtol=0.005)
     for one in priors(basis):
         assert np.allclose((one.form + one.fixed) @ np.ones(basis.size), 0.0, atol=1e-9 * one.form.max())
 
@@ -146,6 +148,7 @@ def test_average_is_that_of_each_prior_by_its_normal_equations():
     weights /= weights.sum()
     mean = weights @ means
     off = np.array(means) - mean
+    assert found.log_evidence == pytest.approx(max(evidence) + np.log(np.mean(np.exp(evidence - max(evidence)))))
     assert np.allclose(found.weights.ravel(), weights, atol=1e-6)
     assert np.allclose(found.mean, mean, atol=1e-6)
     whole = np.tensordot(weights, covariances, 1) + (weights[:, None] * off).T @ off
@@ -215,3 +218,36 @@ def test_forms_of_a_normal_prior_are_that_prior():
     exact = np.linalg.pinv(precision, rcond=1e-10)
     assert forms.shape[1] == COEFFICIENTS - 1
     assert np.allclose(apart @ forms @ forms.T @ apart, apart @ exact @ apart, atol=1e-6 * exact.max())
+
+
+def test_bands_of_all_readings_are_those_of_their_derivatives():
+    """Of m = a (K - K0) + b (K - K0)^3, linearised about three unknowns; the secant is the tangent at rest."""
+    kappa, rest = np.linspace(1.0, 9.0, 9), 2.0
+    C = 1e-4 * np.array([[4.0, 1.0, -0.5], [1.0, 9.0, 2.0], [-0.5, 2.0, 16.0]])
+
+    def read(a, b, K0):
+        D = kappa - K0
+        return a * D + b * D**3, a + 3.0 * b * D**2, a + b * D**2
+
+    def by(number):
+        steps = [read(*(np.array([5.0, 0.1, rest]) + sign * h)) for h in 1e-6 * np.eye(3) for sign in (1.0, -1.0)]
+        return np.column_stack([(steps[2 * k][number] - steps[2 * k + 1][number]) / 2e-6 for k in range(3)])
+
+    moment, tangent, secant = read(5.0, 0.1, rest)
+    law = propagated(
+        kappa,
+        rest,
+        moment=moment,
+        tangent=tangent,
+        by_moment=by(0),
+        by_log=by(1) / tangent[:, None],
+        by_pre_curvature=np.array([0.0, 0.0, 1.0]),
+        covariance=C,
+    )
+    assert np.allclose(law.secant, secant)
+    away = np.abs(kappa - rest) > 0.5
+    for number, std in ((0, law.moment_std), (1, law.tangent_std), (2, law.secant_std)):
+        exact = np.sqrt(np.einsum("ij,jk,ik->i", by(number), C, by(number)))
+        assert np.allclose(std[away], exact[away], rtol=1e-6)
+    assert law.secant_std[~away] == pytest.approx(law.tangent_std[~away])
+    assert law.pre_curvature_std == pytest.approx(0.04)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rod.compliance_law import ComplianceLaw, moment_basis
-from rod.inverse.evaluation import evaluate
+from rod.inverse.evaluation import evaluate, free_cable
 from rod.inverse.fit import fit
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
 from rod.midline import block_covariance, midline
@@ -58,6 +58,29 @@ def test_jacobian_against_central_differences(blind, scatter):
         # what moves no residual by a hundredth of its standard deviation is a place of the law that no shape visits
         largest = max(np.abs(slope).max(), 1e-2)
         assert np.allclose(here.jacobian[:, place], slope, atol=5e-4 * largest), place
+
+
+def test_the_free_cable_moves_with_its_unknowns_as_told():
+    model = model_of(measured())
+    u = start_of(model)
+    arc = free_cable(model, u)
+    for place in (model.basis.size, model.index("length")):
+        h = np.eye(model.size)[place] * 1e-4
+        ahead, behind = (free_cable(model, u + sign * h) for sign in (1.0, -1.0))
+        # by K0 and by the length, which the unknowns hold in units of their own
+        column, unit = (-3, 1.0 / model.length) if place == model.basis.size else (-2, model.nuisances["length"])
+        for name in ("x", "y", "theta"):
+            slope = (getattr(ahead, name) - getattr(behind, name)) / 2e-4
+            told = unit * getattr(arc, f"{name}_by")[:, column]
+            assert np.allclose(told, slope, atol=1e-6 * np.abs(slope).max()), name
+
+
+def test_the_chord_of_a_photo_is_the_distance_of_its_ends():
+    test = measured()
+    step = replace(test.steps[1], chord=None)
+    aside = replace(step, shape=replace(step.shape, x=step.shape.x + 1e-3))
+    one, two = (step_data(replace(test, steps=(given,)))[0].chord for given in (step, aside))
+    assert one == pytest.approx(two, rel=1e-12)
 
 
 def test_residuals_are_white_at_the_truth():

@@ -96,3 +96,8 @@ def test_mistakes_are_told_with_what_to_do(call, says):
 def test_a_warm_start_is_taken():
     cold = bend(0.2, LAW, chord=0.18, pre_curvature=2.0)
     assert bend(0.2, LAW, chord=0.18, pre_curvature=2.0, start=cold).iterations <= 2
+
+
+def test_an_equilibrium_shows_how_it_ended_and_not_all_its_numbers() -> None:
+    made = rod.bend(0.2, 0.01, displacement=0.01, pre_curvature=1.0)
+    assert repr(made) == f"<Equilibrium CONVERGED: force {made.force:.6g} N, chord {made.chord:.6g} m>"

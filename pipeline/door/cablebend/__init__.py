@@ -1,8 +1,9 @@
 """Bending stiffness of cables from photos and forces: everything a notebook or a program of your own needs.
 
 ``measure(folder)`` gives a result, ``result.answer`` the curve that counts, with its band and K0; the functions below
-predict, compare, export and draw. `BendingTest`, `Characteristic`, `simulate`, `estimate` and `balance` are those of
-`rod`, the mechanics alone. A name is loaded when it is first used. SI units; the unit stands in every name.
+predict, compare, export and draw. `estimate` and `balance` are the two ways on data of your own; ``rod`` and all that
+it exports, `bend` above all, are the mechanics alone. A name is loaded when it is first used. SI units; the unit stands
+in every name.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import rod
 from pipeline import __version__
 
 if TYPE_CHECKING:
@@ -31,15 +33,29 @@ if TYPE_CHECKING:
     from pipeline.run import measure, write
     from pipeline.settings import Settings
     from pipeline.vision.single import trace_photo
+    from rod import (
+        BEARING,
+        CLAMP,
+        FREE,
+        BendingTest,
+        Characteristic,
+        Equilibrium,
+        Hold,
+        Outcome,
+        StickSlip,
+        Support,
+        Virtual,
+        as_law,
+        bend,
+        fit_characteristic,
+        simulate,
+        solve,
+    )
     from rod.balance import balance
-    from rod.bending_test import BendingTest, simulate
-    from rod.characteristic import Characteristic
     from rod.inverse import estimate
 
 __all__ = [
     "Answer",
-    "BendingTest",
-    "Characteristic",
     "InputError",
     "Plan",
     "Result",
@@ -62,11 +78,13 @@ __all__ = [
     "plot_residuals",
     "predict",
     "read_result",
-    "simulate",
+    "rod",
     "simulation_frame",
     "trace_photo",
     "write",
 ]
+__all__ += ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
+__all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
 
 ROOMS = {
     "pipeline.compare": ("compare",),
@@ -83,9 +101,8 @@ ROOMS = {
     "pipeline.run": ("measure", "write"),
     "pipeline.settings": ("Settings",),
     "pipeline.vision.single": ("trace_photo",),
+    "rod": tuple(rod.__all__),
     "rod.balance": ("balance",),
-    "rod.bending_test": ("BendingTest", "simulate"),
-    "rod.characteristic": ("Characteristic",),
     "rod.inverse": ("estimate",),
 }
 """Module -> public names that it holds."""
