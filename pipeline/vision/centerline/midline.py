@@ -36,7 +36,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter
+from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
@@ -47,6 +47,7 @@ from pipeline.vision.median import median, medians
 
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
+_TOGETHER = 4  # sections; fewer between gaps lie on something else
 _MEDIAN = 15  # sections of a running median: two to three diameters
 
 
@@ -142,6 +143,7 @@ def measure_sections(
     place, std, good = _consistent(place, std, good, settings.edge_outlier)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width, settings)
+    keep = binary_opening(keep, np.ones(_TOGETHER, dtype=bool))  # a pin on a block may be as wide
     if np.count_nonzero(keep) < settings.least_sections:
         return None
     s, place, std = s[keep], place[keep], std[keep]
