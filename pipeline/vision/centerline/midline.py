@@ -47,7 +47,7 @@ from pipeline.vision.median import median, medians
 
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
-_TOGETHER = 4  # sections; fewer between gaps lie on something else
+_TOGETHER = 4  # sections
 _MEDIAN = 15  # sections of a running median: two to three diameters
 
 
@@ -143,7 +143,7 @@ def measure_sections(
     place, std, good = _consistent(place, std, good, settings.edge_outlier)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width, settings)
-    keep = binary_opening(keep, np.ones(_TOGETHER, dtype=bool))  # a pin on a block may be as wide
+    keep = _from_stretch_to_stretch(keep)
     if np.count_nonzero(keep) < settings.least_sections:
         return None
     s, place, std = s[keep], place[keep], std[keep]
@@ -204,6 +204,13 @@ def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
     smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
+
+
+def _from_stretch_to_stretch(keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The mask ``(k,)`` without single sections beyond its outermost stretches: a pin on a block may be as wide."""
+    stretch = np.flatnonzero(binary_opening(keep, np.ones(_TOGETHER, dtype=bool)))
+    index = np.arange(len(keep))
+    return keep & (index >= stretch[0]) & (index <= stretch[-1]) if len(stretch) else keep
 
 
 def slow_part(s: Array, values: Array, order: int) -> Array:
