@@ -44,6 +44,8 @@ _FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
 _LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
+_SURE_WIDTH_SCATTER = 0.04  # relative, robust; a cable's edges keep their distance, a texture's vary by 0.1
+_ACCEPTED_WIDTH_RATIO = (0.65, 1.35)  # ratio of the edges' distance to the diameter; a sheath may be dark at its flanks
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage:
     if not reading.banded:
         cut = cut_across(standout, path, reading.width, stage, known=True)
         width = cut.seen_widths
-        if len(width) and _scatter(width) < stage.sure_width_scatter * cut.usual_width:
+        if len(width) and _scatter(width) < _SURE_WIDTH_SCATTER * cut.usual_width:
             return cut
     return cut_across(standout, path, reading.width, by_diameter(stage), known=True, shaded=reading.banded)
 
@@ -221,7 +223,7 @@ def _check_width(
     slender = float(np.hypot(*np.diff(cut.path, axis=0).T).sum()) / cut.usual_width
     if cable.diameter_px is None and slender < stage.least_slenderness:
         return refused(photo, "photo/width.short", slenderness=slender)
-    low, high = stage.accepted_width_ratio
+    low, high = _ACCEPTED_WIDTH_RATIO
     if cable.diameter_px is not None and not low <= width / cable.diameter_px <= high:
         return refused(photo, "photo/width.other", width_px=width, diameter_px=cable.diameter_px)
     return None

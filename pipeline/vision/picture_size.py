@@ -17,6 +17,11 @@ from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.shots import Shot
 
+_CROPPED_LENGTH = 0.03
+"""Relative; of the cable's length in px on a photo of another size: it is found within a third of that, and nobody
+scales a photo by less.
+"""
+
 
 def of_one_size(shots: list[Shot], settings: SeriesSettings) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Refuse photos of another size than most that were not merely cropped.
@@ -50,7 +55,7 @@ def of_one_size(shots: list[Shot], settings: SeriesSettings) -> tuple[list[Shot]
         name = shot.found.image
         both = {"size": f"{shot.size[0]} x {shot.size[1]} px", "most": f"{usual[1]} x {usual[0]} px"}
         ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
-        if abs(ratio - 1.0) <= settings.cropped_length:
+        if abs(ratio - 1.0) <= _CROPPED_LENGTH:
             findings.append(inferred("photo/size.cropped", image=name, **both))
             settled.append(shot)
             continue

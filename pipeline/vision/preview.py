@@ -21,6 +21,8 @@ from pipeline.vision.search.crosscut import path_normals
 
 # Okabe and Ito's orange and sky blue (blue, green, red): told apart by colour-blind readers and on dark and bright.
 _MIDDLE, _EDGE = (0, 159, 230), (233, 180, 86)
+_STRIP_WIDTHS = 1.0  # cable widths shown on each side of the middle of the strip
+_STRIP_HEIGHT_PX = 160  # px; a bend of a hundredth of the width is a pixel high
 
 
 def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
@@ -48,14 +50,14 @@ def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSet
     points = np.column_stack([np.interp(along, s, path[:, 0]), np.interp(along, s, path[:, 1])])
     _, normal = path_normals(points)
     normal *= -1.0 if line.mirrored else 1.0
-    half = settings.strip_widths * 2.0 * rough.half_width_px
-    across = np.linspace(-half, half, settings.strip_height_px, dtype=np.float32)[:, None]
+    half = _STRIP_WIDTHS * 2.0 * rough.half_width_px
+    across = np.linspace(-half, half, _STRIP_HEIGHT_PX, dtype=np.float32)[:, None]
     place, sideways = (points - rough.origin_px).astype(np.float32), normal.astype(np.float32)
     u, v = (place[:, axis] + across * sideways[:, axis] for axis in (0, 1))
     strip = np.asarray(cv2.remap(rough.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
     picture = np.asarray(cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR), np.uint8)
-    zoom = (settings.strip_height_px - 1) / (2.0 * half)
-    middle = 0.5 * (settings.strip_height_px - 1)
+    zoom = (_STRIP_HEIGHT_PX - 1) / (2.0 * half)
+    middle = 0.5 * (_STRIP_HEIGHT_PX - 1)
     picture[round(middle), ::2] = _MIDDLE
     for side in (-1.0, 1.0):
         picture[round(middle + side * rough.half_width_px * zoom), ::4] = _EDGE

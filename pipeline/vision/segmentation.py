@@ -35,6 +35,20 @@ Window = tuple[int, int, int, int]
 
 _WIDER = 1.08  # of the width; a course's strip that is wider by more has other edges
 _RIVAL = 0.35  # of the best strip's evidence; on wire piles another cable has more, pieces of one cable less
+_FIRST_COARSER = 3
+"""Cells; so many times fewer along a side are tried first where the diameter is unknown: they are enough for the cable
+of most photos, and take a third of the time.
+"""
+_MIN_LENGTH_SHARE = 0.2  # share of the photo's long side; a shorter strip is not the subject of the photo
+_VISIBLE_SHARE = 0.55  # share of the known length that must be seen; covers hide up to a quarter
+_MAX_LENGTH_RATIO = 1.25  # ratio to the known length; longer strips are rails and edges of the table
+_RIVAL_SHARE = 0.5  # share of the longest strip's length, and of the best contrast, of another rival
+_ACCEPTED_SLENDERNESS_RATIO = (0.6, 1.5)
+"""Ratio of length to width as seen and as stated, where no scale is known; covers hide up to a third of a short, thick
+cable, and a sheath may be dark at its flanks.
+"""
+_SEARCH_MARGIN_SHARE = 0.12  # share of the cable's extent; a step moves the bow by less, else all is searched
+_BLANK_RANGE = 0.03  # of the full range; a picture whose broad parts differ by less shows nothing
 
 
 def find_cable(
@@ -102,14 +116,14 @@ def _along_clicks(photo: Photo, settings: VisionSettings, cable: Cable) -> Rough
         reading = reading_along(standout, cable.path_px, width)
         outcome = judge_strip(photo, standout, reading, reading.strips[0], cable, settings)
         judged.append(_Judged([outcome], [standout.to_pixels(reading.strips[0].path)], [width]))
-    return _chosen(photo, judged, settings.segmentation.rival_share)
+    return _chosen(photo, judged, _RIVAL_SHARE)
 
 
 def _is_slender(found: RoughCable | Rejected, slenderness: float, settings: VisionSettings) -> bool:
     """True for a cable about as many times as long as wide as it is stated to be."""
     if isinstance(found, Rejected):
         return False
-    low, high = settings.segmentation.accepted_slenderness_ratio
+    low, high = _ACCEPTED_SLENDERNESS_RATIO
     return low <= _slenderness(found) / slenderness <= high
 
 
@@ -150,10 +164,10 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
                 photo, standout, readings[0], known=wanted.width is not None
             )
         judged += [_judged(photo, standout, reading, wanted, cable, settings) for reading in readings]
-        outcome = _chosen(photo, judged, settings.segmentation.rival_share)
+        outcome = _chosen(photo, judged, _RIVAL_SHARE)
         if isinstance(outcome, RoughCable) and _is_settled(outcome):
             return outcome
-    return _chosen(photo, judged, settings.segmentation.rival_share)
+    return _chosen(photo, judged, _RIVAL_SHARE)
 
 
 def _find_alone(
@@ -161,7 +175,7 @@ def _find_alone(
 ) -> RoughCable | None:
     """A cable of unknown width on fewer cells, if it is all there is to see; what is refused needs a closer look."""
     stage = settings.segmentation
-    coarser = stage.first_coarser
+    coarser = _FIRST_COARSER
     standout = stand_out(photo, coarser * reduction, stage, window=window)
     enough = int(coarser * narrowest(standout, stage) / stage.cells_across)
     if enough < 2:
@@ -172,7 +186,7 @@ def _find_alone(
     reading = read_alone(standout, wanted, stage)
     if reading is None:
         return None
-    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable, settings)], stage.rival_share)
+    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable, settings)], _RIVAL_SHARE)
     return found if isinstance(found, RoughCable) and _is_settled(found) else None
 
 
@@ -187,7 +201,7 @@ class _Judged(NamedTuple):
 def _judged(
     photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable, settings: VisionSettings
 ) -> _Judged:
-    least = max(wanted.least_length, settings.segmentation.rival_share * reading.longest)
+    least = max(wanted.least_length, _RIVAL_SHARE * reading.longest)
     strips = [strip for strip in reading.strips if strip.length >= least]
     judged = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in strips]
     paths = [standout.to_pixels(strip.path) for strip in strips]
@@ -281,17 +295,17 @@ def _lies_on(found: RoughCable, paths: list[Array]) -> bool:
 def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wanted:
     width = None if cable.diameter_px is None else cable.diameter_px / standout.reduction
     if cable.length_px is None:
-        least, most = stage.min_length_share * max(standout.residual.shape[:2]), np.inf
+        least, most = _MIN_LENGTH_SHARE * max(standout.residual.shape[:2]), np.inf
     else:
         length = cable.length_px / standout.reduction
-        least, most = stage.visible_share * length, stage.max_length_ratio * length
+        least, most = _VISIBLE_SHARE * length, _MAX_LENGTH_RATIO * length
     return Wanted(width, least, most, across_objects=cable.bearings.cover_radius(1.0) is None)
 
 
 def _blank(photo: Photo, stage: PhotoSettings) -> Rejected | None:
     """A picture of one level, such as that of a lens cap."""
     darkest, brightest = levels(photo)
-    if brightest - darkest > stage.blank_range:
+    if brightest - darkest > _BLANK_RANGE:
         return None
     return refused(photo, "photo/blank", brightness=0.5 * (darkest + brightest))
 
@@ -310,7 +324,7 @@ def _nothing(photo: Photo, standout: Standout, reading: Reading, *, known: bool)
 def _surroundings(near: RoughCable, photo: Photo, stage: SegmentationSettings) -> Window:
     """Where the cable can be one step later: its box on the neighbour photo and a share of its size around."""
     low, high = near.path_px.min(axis=0), near.path_px.max(axis=0)
-    margin = stage.search_margin_share * float((high - low).max()) + 4.0 * near.half_width_px
+    margin = _SEARCH_MARGIN_SHARE * float((high - low).max()) + 4.0 * near.half_width_px
     u0, v0 = np.maximum(np.floor(low - margin).astype(int), 0)
     u1, v1 = np.minimum(np.ceil(high + margin).astype(int) + 1, photo.size)
     return int(u0), int(v0), int(u1), int(v1)

@@ -45,6 +45,7 @@ Line = Centerline | Rejected
 Told = TypeVar("Told")
 
 _UNTOLD = doubtful("photo/program-error.series")
+_MIN_TRAVEL_M = 2e-4  # m; below it rounding of the log and play of the bearings hide which bearing moves
 
 
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
@@ -255,7 +256,7 @@ def _name_sides(
     if len(found) < 2:
         return False, ()
     steps = np.hypot(*np.ptp(axes, axis=0).T)  # (2,) px: how far the left and the right axis went
-    least = settings.series.min_travel_m * float(calibration.scale.px_per_m)
+    least = _MIN_TRAVEL_M * float(calibration.scale.px_per_m)
     if steps.max() < max(least, 4.0 * max(cable.left.std_px for cable in found)):
         return False, ()
     moving = "left" if steps[0] > steps[1] else "right"

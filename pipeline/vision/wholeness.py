@@ -18,6 +18,11 @@ from pipeline.vision.search.strips import Strip
 Axes = tuple[Bearing, Bearing]
 Place = tuple[float, float]
 
+_HIDDEN_WIDTHS = 15.0  # widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm
+_UNLIKE_WIDTHS = 6.0  # widths; a longer rest of a strip that looks unlike it is no cover: those are 2 to 6 wide
+_CLAMP_TAIL_SHARE = 0.1  # of the strip's length; a cable's tail beyond a clamp is shorter, its rest longer
+_WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is the whole cable
+
 
 def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes, stage: SegmentationSettings) -> Place | None:
     """A visible end beyond which there is more of the same close by, or at which the cable only fades."""
@@ -45,12 +50,12 @@ def rest_faced_at(
     rest.
     """
     length = float(np.hypot(*np.diff(cut.path, axis=0).T).sum())
-    if length_px is not None and length * standout.reduction > stage.whole_share * length_px:
+    if length_px is not None and length * standout.reduction > _WHOLE_SHARE * length_px:
         return None
     gaps: list[tuple[float, Place]] = []
     for axis, at_start in zip(axes, (True, False), strict=True):
         # beyond a clamp the tail of the cable comes out again
-        tail = stage.clamp_tail_share * length if axis.kind == "clamp" else 0.0
+        tail = _CLAMP_TAIL_SHARE * length if axis.kind == "clamp" else 0.0
         rest = [other for other in others if other.length > tail]
         gap = rest_ahead(standout, cut, rest, stage, at_start=at_start) if axis.kind in ("end", "clamp") else None
         gaps += [] if gap is None else [(gap, axis.center_px)]
@@ -61,7 +66,7 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes, stage: Segmenta
     """The end of a strip that lies before an axis that the user gave: far from it, or while the cable goes on."""
     width = cut.usual_width
     path = standout.to_pixels(cut.path)
-    near, far = stage.beyond_least_widths * width * standout.reduction, stage.hidden_widths * width * standout.reduction
+    near, far = stage.beyond_least_widths * width * standout.reduction, _HIDDEN_WIDTHS * width * standout.reduction
     for axis, at_start in zip(axes, (True, False), strict=True):
         distance = np.hypot(*(path - axis.center_px).T)
         end = 0 if at_start else len(path) - 1
@@ -82,6 +87,6 @@ def unlike_from(path: Array, kept: slice, axes: Axes, width: float, stage: Segme
     """
     rests = ((axes[0], kept.start, kept.start), (axes[1], len(path) - kept.stop, kept.stop - 1))
     for axis, rest, last in rests:
-        if axis.kind in ("end", "clamp") and rest > stage.unlike_widths * width:
+        if axis.kind in ("end", "clamp") and rest > _UNLIKE_WIDTHS * width:
             return float(path[last, 0]), float(path[last, 1])
     return None

@@ -17,15 +17,10 @@ class PhotoSettings(StageSettings):
         800.0, gt=0, description="MB; a larger file is refused unread: 120 Mpx of 16-bit colour are 720 MB"
     )
     min_side_px: int = Field(32, ge=1, description="px; a smaller picture shows no cable of five widths and its ground")
-    blank_range: float = Field(
-        0.03, gt=0, description="of the full range; a picture whose broad parts differ by less shows nothing"
-    )
 
 
 class PreviewSettings(StageSettings):
     """Pictures for people."""
 
     long_side_px: int = Field(1200, ge=200, description="px; as wide as a report's column on a dense screen")
-    strip_widths: float = Field(1.0, gt=0.5, description="cable widths shown on each side of the middle of the strip")
-    strip_height_px: int = Field(160, ge=40, description="px; a bend of a hundredth of the width is a pixel high")
     jpeg_quality: int = Field(80, ge=10, le=100, description="percent; about 80 kB a photo without visible blocks")

@@ -22,6 +22,13 @@ from pipeline.vision.search.ends import CableEnd
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
 
+_RADIUS_STD_BY_CABLE = 0.05  # relative; where only the cable's width on the photo tells the scale
+_SAME_END_RADII = 0.1
+"""Radii of a cover, and rad; strips of one photo that end so near and alike show one cover or none: a tenth of what a
+mask's end is allowed to be off.
+"""
+_END_STD_WIDTHS = 0.1  # widths; a cut or clamped end is found to about a tenth of the cable's width
+
 
 @dataclass
 class SoughtCovers:
@@ -32,8 +39,8 @@ class SoughtCovers:
     def at(
         self, photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
     ) -> Circle | None:
-        """As `find_cover`, or what it said of an end that is the same within ``settings.same_end_radii``."""
-        near, about = settings.same_end_radii, settings.same_radius
+        """As `find_cover`, or what it said of an end that is the same within ``_SAME_END_RADII``."""
+        near, about = _SAME_END_RADII, settings.same_radius
         for other, sought, width, circle in self.done:
             if (
                 np.hypot(*(end.place - other.place)) < near * radius.px
@@ -87,7 +94,7 @@ def find_bearings(
     radius = hints.cover_radius(width_px)
     if radius is None:
         return _visible_end(ends[0], width_px, settings), _visible_end(ends[1], width_px, settings)
-    std = settings.radius_std if hints.cover_px is not None else settings.radius_std_by_cable
+    std = settings.radius_std if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
     expected = Radius(radius, std)
     axes: list[Bearing | None] = [None, None]
     for k, end in enumerate(ends):
@@ -112,7 +119,7 @@ def _assign_given(
 
 def _visible_end(end: CableEnd, width_px: float, settings: BearingSettings) -> Bearing:
     kind: AxisKind = "clamp" if end.at_object else "end"
-    std = settings.end_std_widths * width_px
+    std = _END_STD_WIDTHS * width_px
     return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)
 
 

@@ -31,6 +31,22 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.ends import CableEnd
 
+_COVER_RADII_WIDTHS = (0.62, 3.2)
+"""Widths of the cable; range of radii searched where no size is given: covers of 1.4 to 6 diameters, and the mask may
+be a tenth wider or narrower than the cable; a smaller one shows too little of its rim.
+"""
+_MARK_WIDTHS = 0.8
+"""Widths of the cable; largest radius of a dot or screw that marks an axis where no size is given: half a cover of the
+usual size.
+"""
+_MARK_ASIDE = 0.3  # of the distance ahead of the cable's end; how far aside of its direction the axis lies
+_END_ON_RIM = 0.4  # radii; how far from the rim the cable's mask may end: led straight on by a width at most
+_LOST_BEFORE_RIM = 1.9
+"""Radii from where a cable is lost to the centre of a cover; letters up to its rim hide 0.9 of it, a dot of half the
+cover's size lies two of its own radii ahead.
+"""
+_LOST_CABLE_REACH = 3.1  # radii; the same where another end shows that it is a cover: as far as it is searched
+
 
 def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSettings) -> float | None:
     """Radius of the covers under which the cable's ends vanish.
@@ -114,13 +130,13 @@ def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[fl
 def _to_mark(lost: _LostEnd) -> float | None:
     """Distance (px) from the cable's end to what is turned about an axis ahead of it, as far ahead as covers reach."""
     photo, end, width, settings = lost.photo, lost.end, lost.width_px, lost.settings
-    reach = settings.mark_widths * width
+    reach = _MARK_WIDTHS * width
     step = reach / settings.mark_cells
-    ahead = np.arange(settings.cover_radii_widths[0] * width, settings.cover_radii_widths[1] * width, step)
-    most = settings.mark_aside * ahead[-1]
+    ahead = np.arange(_COVER_RADII_WIDTHS[0] * width, _COVER_RADII_WIDTHS[1] * width, step)
+    most = _MARK_ASIDE * ahead[-1]
     aside = np.arange(-most, most + step, step)
     along, across = (grid.ravel() for grid in np.meshgrid(ahead, aside))
-    near = np.abs(across) <= settings.mark_aside * along
+    near = np.abs(across) <= _MARK_ASIDE * along
     normal = np.array([-end.outward[1], end.outward[0]])
     places = end.place + along[near, None] * end.outward + across[near, None] * normal
     inside = (places >= reach).all(axis=1) & (places < np.array(photo.size) - reach).all(axis=1)
@@ -164,7 +180,7 @@ class _LostEnd:
 
     def on_rim(self, circle: Circle) -> bool:
         """True if the cable is lost on this circle."""
-        return abs(self.ahead(circle) - 1.0) <= self.settings.end_on_rim
+        return abs(self.ahead(circle) - 1.0) <= _END_ON_RIM
 
     def near(self, radius: float) -> Circle | None:
         """Circle of about some radius that is seen nearly all round."""
@@ -177,7 +193,7 @@ class _LostEnd:
     def sizes(self) -> Array:
         """Radii tried."""
         settings = self.settings
-        low, high = settings.cover_radii_widths
+        low, high = _COVER_RADII_WIDTHS
         # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
         steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
         return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
@@ -241,7 +257,7 @@ def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
         alike = [_nearest(end, radius) for end in ends]
         ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
         radii = _alike((None if circle is None else circle.radius for circle in alike), settings)
-        if radii is not None and max(ahead) <= settings.lost_cable_reach and min(ahead) <= settings.lost_before_rim:
+        if radii is not None and max(ahead) <= _LOST_CABLE_REACH and min(ahead) <= _LOST_BEFORE_RIM:
             return median(radii)
     return None
 

@@ -25,6 +25,21 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.ends import CableEnd
 
+_RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
+_MARK_RADII = 0.6  # radii of a cover; largest dot, screw or bevel that marks the axis of one not seen
+_EXPECTED_REACH_RADII = 2.5
+"""Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
+led astray by the cover's shadow two.
+"""
+_SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
+_MIN_SOFT_RIM = 0.5
+"""Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
+lost left 0.6, a moved camera, whose rim is doubled, 0.45.
+"""
+_ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
+_EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
+_CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
+
 
 def find_cover(
     photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
@@ -72,14 +87,14 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, setti
         return None
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
-    prior = np.exp(-0.5 * (aside / (settings.aside_std_radii * radius.px)) ** 2 - 0.5 * fall**2)
+    prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
     # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
     # A dome lit from one side is brighter than the ground there and darker on the other: quarters of its rim add up.
     # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
     # a sharp rim, what is soft and round is the shadow.
     partial: Circle | None = None
     fits = _Fits(photo, radius, settings)
-    sharp, soft = (1.0, settings.min_rim), (settings.soft_rim_px, settings.min_soft_rim)
+    sharp, soft = (1.0, settings.min_rim), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
     for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
         if softness > 1.0 and partial is not None:
             break
@@ -92,7 +107,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, setti
             if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
                 partial = found
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
-    ahead = np.exp(-0.5 * (aside / (2.0 * settings.aside_std_radii * radius.px)) ** 2) * (along > 0.0)
+    ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
     votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool), settings) * ahead
     farther = _best_circle(fits, window, votes, 1.0)
     return farther if farther is not None and farther.rim >= settings.sure_rim else partial
@@ -119,7 +134,7 @@ def find_again(
         None unless a cover of the same radius is seen where one is expected, all round or with a mark on its axis.
     """
     for cover in seen:
-        near = np.hypot(*np.subtract(cover.center_px, end.place)) <= settings.expected_reach_radii * radius.px
+        near = np.hypot(*np.subtract(cover.center_px, end.place)) <= _EXPECTED_REACH_RADII * radius.px
         if cover.radius_px is None or not near or not cover.sure:
             continue
         rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
@@ -143,7 +158,7 @@ def _by_marks(
     centre are seen, that is the cover. A mark alone, near where the cable's end tells, is the axis of a cover of the
     ground's own look.
     """
-    reach, spread = settings.mark_radii * radius.px, settings.aside_std_radii * radius.px
+    reach, spread = _MARK_RADII * radius.px, _ASIDE_STD_RADII * radius.px
     # An end led astray by a shadow lies twice as far from where it should be.
     across = np.arange(-3.0 * spread, 3.0 * spread, reach / settings.mark_cells)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
@@ -185,7 +200,7 @@ def _best_circle(fits: _Fits, window: _Window, votes: NDArray[np.float32], softn
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     votes, settings = votes.copy(), fits.settings
     best: Circle | None = None
-    for _ in range(settings.candidates):
+    for _ in range(_CANDIDATES):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
         circle = fits.at(window.to_pixels(np.array([u, v], float)), softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
@@ -243,12 +258,12 @@ def _votes(
     gu = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 1, 0))
     gv = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 0, 1))
     strength = np.sqrt((gu**2 + gv**2).sum(axis=2))
-    gain = 1.0 / np.maximum(strength, settings.edge_over_texture * median(strength) + 1e-6)
+    gain = 1.0 / np.maximum(strength, _EDGE_OVER_TEXTURE * median(strength) + 1e-6)
     gain[blind] = 0.0
     half = int(np.ceil(1.25 * radius))
     y, x = np.mgrid[-half : half + 1, -half : half + 1].astype(np.float32)
     distance = np.hypot(x, y) + np.float32(1e-6)
-    ring = np.exp(-0.5 * ((distance - radius) / max(0.7, settings.ring_width * radius)) ** 2)
+    ring = np.exp(-0.5 * ((distance - radius) / max(0.7, _RING_WIDTH * radius)) ** 2)
     ring /= distance * ring.sum()
     which = np.floor((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * sectors).clip(0, sectors - 1)
     votes = np.zeros(strength.shape, np.float32)

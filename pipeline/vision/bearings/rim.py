@@ -25,6 +25,12 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 
 _MAD_TO_STD = 1.4826
+_LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slopes are fitted with it
+_BEVEL_SPREAD_SHARE = 0.22
+"""Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
+_RIM_TOLERANCE = 0.015  # radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider
+_POOLED_RAYS = 1.5  # rays; standard deviation of the pooling along the rim
+_DIRECTIONS = 160  # rays of the circle fit at most; more share their pixels and tell little new
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,7 @@ def fit_circle(
     beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
     """
     radius = expected.px
-    count = int(np.clip(2.0 * np.pi * radius, 90, settings.directions))
+    count = int(np.clip(2.0 * np.pi * radius, 90, _DIRECTIONS))
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, settings.search_radii * radius)
@@ -83,7 +89,7 @@ def fit_circle(
         parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
     reach = max(3.0, settings.near_radii * radius)
     for beside in (False, True):
-        slopes = _radial_slopes(photo, parameters, ray, reach, softness, settings.pooled_rays, one_sign=on_cover)
+        slopes = _radial_slopes(photo, parameters, ray, reach, softness, _POOLED_RAYS, one_sign=on_cover)
         edge, trust = _radial_edges(slopes, reach, softness, settings)
         if beside and not on_cover:
             edge = _without_light(slopes, edge, settings)
@@ -92,7 +98,7 @@ def fit_circle(
             return None
         before, (parameters, covariance) = parameters, fitted
     miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
-    rim = float(np.mean(np.abs(miss) < max(0.75, settings.rim_tolerance * radius)))
+    rim = float(np.mean(np.abs(miss) < max(0.75, _RIM_TOLERANCE * radius)))
     off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
     concentric = other > max(4.0 * expected.std * radius, 1.0)
     if off > 0.5 * radius or (concentric and (rim < settings.sure_rim or other > 1.2 * span)):
@@ -109,9 +115,7 @@ def fit_circle(
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
     doubt = 0.0 if rim >= settings.sure_rim else excess
     # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
-    bevel = settings.bevel_spread_share * float(
-        np.sqrt(max(_spread(slopes, edge, settings)[2] ** 2 - softness**2, 0.0))
-    )
+    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge, settings)[2] ** 2 - softness**2, 0.0)))
     parts = [np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt, bevel]
     radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
@@ -205,7 +209,7 @@ def _best_shift(
     settings: BearingSettings,
 ) -> Array:
     """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
-    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness, settings.pooled_rays)
+    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness, _POOLED_RAYS)
     step = span / 12.0
     peak = np.sort(np.where(slopes.seen[:, None], slopes.strength, 0.0).max(axis=1))
     usual = float(peak[len(peak) // 2]) + 1e-12
@@ -267,7 +271,7 @@ def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> A
 def _spread(slopes: _Slopes, edge: Array, settings: BearingSettings) -> tuple[Array, Array, float]:
     """Offsets (m,) about the edges, slopes ``(n, m)`` there, and the spread (px) of their median over all edges."""
     found = np.isfinite(edge)
-    t = np.arange(-settings.light_reach_px, settings.light_reach_px + 0.25, 0.5)
+    t = np.arange(-_LIGHT_REACH_PX, _LIGHT_REACH_PX + 0.25, 0.5)
     places = (np.where(found, edge, 0.0)[:, None] + t - slopes.offsets[0]) / 0.5
     low = np.clip(np.floor(places).astype(int), 0, len(slopes.offsets) - 2)
     share, rows = np.clip(places - low, 0.0, 1.0), np.arange(len(edge))[:, None]

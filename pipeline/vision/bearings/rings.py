@@ -21,6 +21,16 @@ from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, reduce_area
 
+_MARK_TRIES = 4  # roundest places where a mark is fitted: edges of cover and shadow pass for round ones
+_ASTRAY_RADII = 0.16  # radii; how far a rim that is not sure may lie off the centre: half a bevel
+_SURE_CENTER_RADII = 0.004  # radii; a centre with a wider std is not sure: shadow or bevel took part of the rim
+_CERTAIN_CENTER_PX = 0.05
+"""Px; a rim seen all round that tells its centre so well needs no rings: 0.01 mm at 5 px/mm, less than the play of a
+bearing.
+"""
+_RING_RANGE = (0.1, 0.96)  # radii; where dots, grooves and bevels lie: below is a punch mark, above the rim
+_RINGS = 2  # rings of a cover that are fitted at most: the strongest tell the most
+
 
 def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSettings) -> Circle:
     """The circle of a cover, its centre by rim and rings together.
@@ -40,9 +50,9 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
         elsewhere, yields to the rings; else all are averaged by their variances, which are widened to what they differ.
     """
     whole, center = rim.rim >= settings.sure_rim, np.array(rim.center)
-    if whole and rim.std < settings.certain_center_px:
+    if whole and rim.std < _CERTAIN_CENTER_PX:
         return rim
-    if not (whole and rim.std < settings.sure_center_radii * expected.px):
+    if not (whole and rim.std < _SURE_CENTER_RADII * expected.px):
         center = _roundest(photo, center, expected.px, settings)
     rings = _rings(photo, center, expected.px, settings)
     if not rings:
@@ -96,7 +106,7 @@ def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSetti
         [(_slopes(small, group, reach / reduction, 0.7) ** 2).sum(axis=(1, 2)) for group in groups]
     )
     found: list[Circle] = []
-    for _ in range(settings.mark_tries):
+    for _ in range(_MARK_TRIES):
         place = places[int(np.argmax(roundness))]
         found += _rings(photo, _roundest(photo, place, reach, settings), reach, settings)
         roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
@@ -105,7 +115,7 @@ def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSetti
 
 def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Array:
     """Place within reach of ``center`` about which the cover is most round, to a hundredth of its radius."""
-    reach = settings.astray_radii * radius
+    reach = _ASTRAY_RADII * radius
     for finer in range(3):
         step = reach / 4.0 / 4.0**finer
         grid = np.arange(-4 if finer == 0 else -3, 5 if finer == 0 else 4) * step
@@ -136,17 +146,17 @@ def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings
     """Circles seen nearly all round about ``center``, the rim itself not among them."""
     slope = np.hypot.reduce(_slopes(photo, center[None], radius, 1.0)[0], axis=1)
     distance = 0.06 * radius + 0.5 + np.arange(len(slope))
-    slope[(distance < settings.ring_range[0] * radius) | (distance > settings.ring_range[1] * radius)] = 0.0
+    slope[(distance < _RING_RANGE[0] * radius) | (distance > _RING_RANGE[1] * radius)] = 0.0
     least = settings.rim_over_texture * median(slope[slope > 0.0]) if slope.any() else np.inf
     found: list[Circle] = []
-    for _ in range(settings.rings):
+    for _ in range(_RINGS):
         at = int(np.argmax(slope))
         if slope[at] <= least:
             break
         expected = Radius(float(distance[at]), 1.0 / float(distance[at]))  # to a pixel, by the mean of all rays
         ring = fit_circle(photo, center, expected, settings, on_cover=True)
         slope[np.abs(distance - distance[at]) < max(4.0, 2.0 * settings.near_radii * radius)] = 0.0
-        within = ring is not None and settings.ring_range[0] <= ring.radius / radius <= settings.ring_range[1]
+        within = ring is not None and _RING_RANGE[0] <= ring.radius / radius <= _RING_RANGE[1]
         if ring is None or not within or ring.rim < settings.sure_rim:
             continue
         if np.hypot(*(np.array(ring.center) - center)) < settings.same_axis_radii * radius:

@@ -17,6 +17,9 @@ from pipeline.vision.rough import Bearing, RoughCable
 
 Pair = tuple[tuple[float, float], tuple[float, float]]
 
+_LEAST_STEADY = 3  # photos; of two that differ nothing tells which one shows the fixed bearing in its place
+_STEADY_SHARE = 0.6  # of the photos; so many show the fixed bearing in one place, or the camera moved
+
 
 def moved_axes(axes: Pair, moving: Side, travel_px: float) -> Pair:
     """Left and right axis after the moving bearing went along the chord toward the fixed one."""
@@ -64,12 +67,12 @@ class Fixed:
 
 def fixed_cover(found: Sequence[RoughCable], limit_px: float, settings: SeriesSettings) -> Fixed | None:
     """The cover that stands still on most photos; None where none does (to ``limit_px``), or the axes are no covers."""
-    if len(found) < settings.least_steady or any(axis.kind != "cover" for c in found for axis in (c.left, c.right)):
+    if len(found) < _LEAST_STEADY or any(axis.kind != "cover" for c in found for axis in (c.left, c.right)):
         return None
     off = np.stack([_off_middle(found, side) for side in _SIDES])
     steady = off <= limit_px
     side = int(np.argmax(steady.sum(axis=1)))
-    if steady[side].sum() < max(settings.least_steady - 1, settings.steady_share * len(found)):
+    if steady[side].sum() < max(_LEAST_STEADY - 1, _STEADY_SHARE * len(found)):
         return None
     group = [_axis(cable, _SIDES[side]) for cable, still in zip(found, steady[side], strict=True) if still]
     middle = np.median([axis.center_px for axis in group], axis=0)

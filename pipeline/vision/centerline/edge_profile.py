@@ -35,6 +35,17 @@ _TABLE = ndtr(np.arange(-_TABLE_REACH * _TABLE_STEPS, _TABLE_REACH * _TABLE_STEP
 _TABLE_RISE = np.append(np.diff(_TABLE), np.float32(0.0))
 _BIN = 0.25  # px; pixels are pooled at this width of offset: widens the blur by 0.4 % at 0.8 px
 _MIN_BLUR = 0.30  # px; the pixel's own box is 0.29
+_PIXEL_OUTLIER = 4.0
+"""Standard deviations from the profile of the neighbourhood: letters, dirt; Gaussian noise passes it once in 16,000; at
+1.5 times it a pixel of a section has no weight.
+"""
+_PLAIN_STEP = 0.1  # of the edge's step; differences up to it are texture or slow light, not letters
+_LEAST_PIXEL_SHARE = 0.5  # weight left on a section's pixels; with less there is something else than an edge
+_LEAST_STEP_SIGMAS = 3.0
+"""Standard deviations of an edge's step; a lesser one is none: on paper that hid 12 diameters, edges of noise along the
+search's straight bridge moved the midline by 30 px.
+"""
+_PROFILE_WINDOWS = 16  # along the cable; in each, blur and shading of the edges are found: light turns slowly
 
 
 @dataclass(frozen=True)
@@ -145,7 +156,7 @@ def fit_profiles(
     Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take
     them for the sheath.
     """
-    count = min(settings.profile_windows, max(1, len(s) // 4))
+    count = min(_PROFILE_WINDOWS, max(1, len(s) // 4))
     each = len(s) // count
     # Windows of one size make one array of all; at most one section of each window is passed over for it.
     chosen = ((np.arange(count * each) + 0.5) * (len(s) / (count * each))).astype(np.int64)
@@ -163,12 +174,10 @@ def fit_profiles(
         usual = _running_median(np.column_stack([start[:, 1], linear]))
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
         # every fourth pixel tells the usual scatter to a percent
-        limit = np.maximum(
-            settings.pixel_outlier * median(_scatter(residual[:, ::4])), settings.plain_step * usual[:, 2:3]
-        )
+        limit = np.maximum(_PIXEL_OUTLIER * median(_scatter(residual[:, ::4])), _PLAIN_STEP * usual[:, 2:3])
         keep = residual < limit
         # A window that contradicts its neighbourhood as a whole is judged by itself: nothing of it would be left.
-        keep |= (keep.mean(axis=1) < settings.least_pixel_share)[:, None]
+        keep |= (keep.mean(axis=1) < _LEAST_PIXEL_SHARE)[:, None]
         pooled = _pool(offset, value, cell, keep, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
     plain, plain_linear = _variable_projection(pooled, full, ramps=False)
@@ -301,7 +310,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
         profiles.at(s, name).reshape(-1, 1).astype(np.float32) for name in ("blur", "inside", "outside")
     )
     noise = np.repeat(medians(profiles.noise, axis=1), shape[1])
-    softness = (1.0 / (1.5 * settings.pixel_outlier * noise + 1e-12)).astype(np.float32)[:, None]
+    softness = (1.0 / (1.5 * _PIXEL_OUTLIER * noise + 1e-12)).astype(np.float32)[:, None]
     basis, one = np.empty((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
     basis[:, 0] = 1.0
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
@@ -328,8 +337,8 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
             break
     covariance = (noise**2)[:, None, None] * np.linalg.inv(gram)
     # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward.
-    faint = step < settings.least_step_sigmas * np.sqrt(covariance[:, 1, 1])
-    found = np.where((weight.sum(axis=1) < settings.least_pixel_share * count) | faint, np.nan, place).reshape(shape)
+    faint = step < _LEAST_STEP_SIGMAS * np.sqrt(covariance[:, 1, 1])
+    found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place).reshape(shape)
     light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
     steady, std = steadied(found, light, errors, s, settings=settings)
     return Edges(steady, std, step.reshape(shape))

@@ -10,6 +10,11 @@ from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import slow_part
 from rod.measurement import slow_covariance
 
+_WIDTH_EXCESS = 1.5
+"""Ratio of the errors by the width's variation to those that scatter and light tell, above which the former count: over
+ten effective parameters chance passes it once in a hundred.
+"""
+
 
 def std_along(basis: Array, covariance: Array) -> Array:
     """Standard deviation (n,) of ``basis`` (n, p) times parameters with a covariance (p, p)."""
@@ -37,7 +42,7 @@ def width_excess(fit: CurveFit, off_width: Array, covariance: Array, options: Cu
     half, s = 0.5 * (off_width - slow_part(fit.s, off_width, options.slow_width_order))[used], fit.s[used]
     bend = fit.curve.curvature_basis(s)
     ratio = float(np.sqrt(np.mean((bend @ (fit.smooth.gain @ half) / std_along(bend, covariance)) ** 2)))
-    return ratio if ratio > options.width_excess else 1.0
+    return ratio if ratio > _WIDTH_EXCESS else 1.0
 
 
 def length_std(fit: CurveFit, s: Array, normal: Array, covariance: Array) -> float:

@@ -12,10 +12,10 @@ in change from photo to photo: they are each photo's *own*.
 Half the width of every photo is split into Legendre polynomials of s, orthonormal over its sections. What its scatter
 puts on each is known; the waves add ``std^2 exp(-ds^2 / (2 length^2))``, own and common, whose sizes and length are the
 likeliest over all photos together: one photo has some 25 such components, which alone tell a variance to a third. Where
-the likelihood gains no more than chance does there are none (`CurveSettings.least_wave_gain`).
+the likelihood gains no more than chance does there are none (`_LEAST_WAVE_GAIN`).
 
 Some waves every photo has: grid of the pixels, demosaicing, tone curve. They are no larger than a hundredth of a pixel
-(`least_wave_px`), and on sharp photos no scatter hides them: midlines traced to 0.01 px, with 0.015 px of scatter in a
+(`_LEAST_WAVE_PX`), and on sharp photos no scatter hides them: midlines traced to 0.01 px, with 0.015 px of scatter in a
 section, were told to misfit a true simulation in two of 23 specimens. Half as much is common.
 
 On a wooden table (grain of 3 % of white, 5 to 7 px/mm) both midline and half width have two to three times the variance
@@ -50,6 +50,14 @@ _SIZES = 40
 
 _PLACES = 240
 """Of an even grid on which the waves' share in each polynomial is computed."""
+_LEAST_WAVE_PX = 0.01
+"""Px; waves in a midline that no width need show: grid of pixels, demosaicing, tone curve; of this size they are on
+photos of even light and little noise.
+"""
+_LEAST_WAVE_GAIN = 7.8
+"""-2 log likelihood that waves in the widths must gain: three parameters gain as much by chance once in twenty series
+at most.
+"""
 
 
 @dataclass(frozen=True)
@@ -90,7 +98,7 @@ def edge_waves(photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_
     """
     if not photos:
         return Waves()
-    seen, least = seen_waves(photos, settings), settings.least_wave_px * metres_per_px
+    seen, least = seen_waves(photos, settings), _LEAST_WAVE_PX * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
     own, common = np.hypot(seen.own, least), np.hypot(seen.common, 0.5 * least)
     return Waves(float(own), float(common), seen.length or _USUAL * reach)
@@ -116,7 +124,7 @@ def seen_waves(photos: Sequence[HalfWidths], settings: CurveSettings) -> Waves:
     variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, _SIZES)]
     value = np.array([_surprise(found, counts, share, variances) for share in _shares()[:, coarsest:]])
     length, own, common = np.unravel_index(int(np.argmin(value)), value.shape)
-    if value[0, 0, 0] - value[length, own, common] < settings.least_wave_gain:
+    if value[0, 0, 0] - value[length, own, common] < _LEAST_WAVE_GAIN:
         return Waves()
     reach = median(np.array([np.ptp(photo.s) for photo in told]))
     std = np.sqrt(variances)

@@ -25,6 +25,12 @@ from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
 
+_LAY_PITCH_WIDTHS = 0.25  # widths; places along the cable at which the photos' midlines are held together
+_LAY_SMOOTH_WIDTHS = 1.5
+"""Widths; standard deviation of the running mean that is left alone: of a wave four widths long, the lay of a twisted
+pair, a twentieth is left, of a soft spot that long nine tenths.
+"""
+
 
 def without_lay(
     lines: tuple[Centerline | Rejected, ...], diameter_m: float, settings: CurveSettings
@@ -53,7 +59,7 @@ def relieved(shapes: list[MeasuredShape], diameter_m: float, settings: CurveSett
     """Shapes of one cable without the fast wiggle that they have in common; see `without_lay`."""
     if len(shapes) < 2:
         return shapes
-    pitch = settings.lay_pitch_widths * diameter_m
+    pitch = _LAY_PITCH_WIDTHS * diameter_m
     grid = np.arange(0.0, max(float(shape.s[-1]) for shape in shapes) + pitch, pitch)
     wiggle = _common(np.array([_fast(shape, grid, settings) for shape in shapes]))
     spare = len(shapes) / (len(shapes) - 1.0)
@@ -66,7 +72,7 @@ def _fast(shape: MeasuredShape, grid: Array, settings: CurveSettings) -> Array:
     cell = np.rint(shape.section_s / (grid[1] - grid[0])).astype(int).clip(0, grid.size - 1)
     count = np.bincount(cell, minlength=grid.size)
     mean = np.bincount(cell, across, grid.size) / np.maximum(count, 1)
-    width = settings.lay_smooth_widths / settings.lay_pitch_widths
+    width = _LAY_SMOOTH_WIDTHS / _LAY_PITCH_WIDTHS
     # Weighted, so that the unseen ends and gaps pull nothing.
     weight = gaussian_filter1d((count > 0).astype(float), width, mode="constant")
     slow = gaussian_filter1d(np.where(count > 0, mean, 0.0), width, mode="constant") / np.maximum(weight, 1e-12)

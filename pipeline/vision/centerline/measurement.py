@@ -47,6 +47,10 @@ from rod.measurement import MeasuredShape
 
 _HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
+_LEAST_BALANCE = 0.8
+"""Of both edges in a section (1: they count alike) for its width to tell how long errors last: one edge then has four
+times the other's variance.
+"""
 
 
 def measure_centerline(
@@ -144,7 +148,7 @@ class Followed:
 
     def half_widths(self, options: CurveSettings) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
-        used = (self.fit.weight > 0.0) & (self.sections.balance > options.least_balance)
+        used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
@@ -225,7 +229,7 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     Millimetre paper nearly parallel to a cable moved its midline by 0.25 px in waves of 80 px, which passed for its
     bend. Sections that live on one edge tell nothing.
     """
-    two = balance > options.least_balance
+    two = balance > _LEAST_BALANCE
     if np.count_nonzero(two) < options.least_sections:
         return None
     s, width = s[two], width[two]

@@ -18,7 +18,7 @@ and no averaging removes it. Its size is judged by what is seen on the photo its
   shading or penumbra, and its place is open by half of that;
 - measured width against diameter: what is missing is missing at one edge if the two have different contrast, at both
   alike (and harmless) if they have the same. Tone curve, sharpening and shade move an edge by a part of its blur; what
-  is off by more is the scale's or the diameter's, which are known to some percent (`width_play`). What is missing
+  is off by more is the scale's or the diameter's, which are known to some percent (`_WIDTH_PLAY`). What is missing
   beyond those lies beside the weaker edge, and half of it is the midline's: on a cable of 66 px under a lamp from one
   side, where the border of light and shade was taken for the edge, 2.7 px.
 
@@ -47,8 +47,34 @@ from pipeline.vision.median import median, medians
 
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
-_TOGETHER = 4  # sections; fewer between gaps lie on something else
+_TOGETHER = 4  # sections
 _MEDIAN = 15  # sections of a running median: two to three diameters
+_INSIDE_RADII = 0.25
+"""Of the radius; part of the sheath used for an edge: leaves out highlight and text, and the farther from the edge, the
+more shading bends away from the ramp (0.35 moved the midline by a third more).
+"""
+_OUTSIDE_RADII = 0.18
+"""Of the radius; part of the ground used for an edge: more brings more of the ground's texture (0.45 raised the error
+of kappa on brushed metal by half), less only more pixel noise.
+"""
+_EDGE_WINDOW_BLURS = 2.5  # blurs; least part of sheath and ground on each side: beyond it the edge's tail is over
+_WIDTH_DEPARTURE = 0.08
+"""Relative; a stretch whose width is farther from the usual one is left out: a cable's is constant within 5 %."""
+_EDGE_OUTLIER = 6.0  # robust standard deviations from the neighbouring edges; the other edge takes over
+_LONGEST_SIDE_PX = 12.0  # px; more sheath or ground than this adds texture, not knowledge of the edge
+_SMALL_RADIUS_PX = 15.0  # px; thinner cables leave little room for shading: plain error function, see ramps_worth
+_RAMPS_WORTH = 1.5
+"""Ratio of the widths' errors by the plain error function to those with ramps, above which a thin cable's edges get
+ramps all the same: they double the scatter, which a ratio near 1 does not repay.
+"""
+_WIDTH_PLAY = 0.04
+"""Of the width; so much it may be off the expected one throughout: scales and diameters are known to some percent, and
+what both edges are off alike leaves the midline in place.
+"""
+_ROUNDNESS = 0.005
+"""Of the width; a sheath is round and even so far: edges whose places are surer than that are averaged, the width of
+the cable tells nothing of them.
+"""
 
 
 @dataclass(frozen=True)
@@ -126,13 +152,13 @@ def measure_sections(
     settings: CurveSettings,
 ) -> Sections | None:
     """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
-    inside = min(settings.inside_radii * half_width, settings.longest_side_px)
-    outside = min(settings.outside_radii * half_width, settings.longest_side_px)
-    least = settings.edge_window_blurs * blur + 0.5  # half a pixel for what the path may be off
+    inside = min(_INSIDE_RADII * half_width, _LONGEST_SIDE_PX)
+    outside = min(_OUTSIDE_RADII * half_width, _LONGEST_SIDE_PX)
+    least = _EDGE_WINDOW_BLURS * blur + 0.5  # half a pixel for what the path may be off
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    thin = half_width < settings.small_radius_px
+    thin = half_width < _SMALL_RADIUS_PX
     shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings, thin=thin)
     profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter, settings) else shaded
     edges = fit_edges(pixels, s, profiles, settings=settings)
@@ -140,10 +166,10 @@ def measure_sections(
     good = np.isfinite(place)
     if good.sum(axis=0).min() < settings.least_sections:
         return None
-    place, std, good = _consistent(place, std, good, settings.edge_outlier)
+    place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width, settings)
-    keep = binary_opening(keep, np.ones(_TOGETHER, dtype=bool))  # a pin on a block may be as wide
+    keep = _from_stretch_to_stretch(keep)
     if np.count_nonzero(keep) < settings.least_sections:
         return None
     s, place, std = s[keep], place[keep], std[keep]
@@ -152,7 +178,7 @@ def measure_sections(
     width = place.sum(axis=1) + 2.0 * half_width
     step = edges.step[:, keep]
     smooth_width = _running_median(width)
-    doubt = _by_light(profiles, s, settings.roundness * 2.0 * half_width)
+    doubt = _by_light(profiles, s, _ROUNDNESS * 2.0 * half_width)
     trust = doubt[::-1] / doubt.sum(axis=0)
     likely = float(np.average(smooth_width, weights=1.0 / doubt.sum(axis=0)))
     inward = 0.5 * likely - half_width - place.T
@@ -187,9 +213,9 @@ def _serves(
         middle = median(width)
         off = 0.0 if diameter is None else abs(middle - diameter)
         spread = 1.4826 * median(np.abs(width - middle))
-        return float(np.hypot(spread, max(off - settings.width_play * 2.0 * half_width, 0.0)))
+        return float(np.hypot(spread, max(off - _WIDTH_PLAY * 2.0 * half_width, 0.0)))
 
-    return unlike(plain) <= settings.ramps_worth * unlike(shaded)
+    return unlike(plain) <= _RAMPS_WORTH * unlike(shaded)
 
 
 def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
@@ -200,10 +226,17 @@ def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
     middle = median(width)
     off = np.abs(width - middle)
     # An outline may wave; and edges of webcams and JPEG are found to a third of a pixel, whatever the width.
-    limit = max(settings.width_departure * middle, 4.0 * 1.4826 * median(off), _WIDTH_FLOOR)
+    limit = max(_WIDTH_DEPARTURE * middle, 4.0 * 1.4826 * median(off), _WIDTH_FLOOR)
     smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
+
+
+def _from_stretch_to_stretch(keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The mask ``(k,)`` without single sections beyond its outermost stretches: a pin on a block may be as wide."""
+    stretch = np.flatnonzero(binary_opening(keep, np.ones(_TOGETHER, dtype=bool)))
+    index = np.arange(len(keep))
+    return keep & (index >= stretch[0]) & (index <= stretch[-1]) if len(stretch) else keep
 
 
 def slow_part(s: Array, values: Array, order: int) -> Array:
@@ -269,7 +302,7 @@ def _systematic(
     unequal = _asymmetry(profiles.step)
     missing = 0.0 if diameter is None else abs(width - diameter)
     # What a caliper cannot have been off by is beside the weaker edge: a dark flank that is as dark as the ground.
-    lost = max(missing - settings.width_play * width, 0.0)
+    lost = max(missing - _WIDTH_PLAY * width, 0.0)
     by_diameter = (0.25 * min(missing, median(profiles.blur)) + 0.5 * lost) * min(unequal, 1.0)
     return float(np.sqrt(by_model**2 + by_blur**2 + by_likely**2 + by_diameter**2))
 

@@ -18,6 +18,32 @@ from pipeline.vision.median import median
 from pipeline.vision.rough import Bearing, RoughCable
 
 _BLOCK = 1.5  # half widths before what hides a cable up to a given axis: its border may lie aslant by 45 degrees or so
+_WIDTH_TOLERANCE = 0.15  # relative; prior of the width in the search when the diameter is known, else twice that
+_COVER_CHECK_RADII = 0.6
+"""Of the radius; a section counts where it is free of covers that far out on both sides: inside the edges' windows."""
+_LEAST_SEEN_RADII = 10.0  # of the radius; a shorter seen piece is no measurement
+_SECTION_SPACING_DIAMETERS = 0.6
+"""Diameters; sections closer than that tell the same of kappa, see knot_spacing_diameters."""
+_MIN_SECTIONS = 240  # of a short cable; fewer would average over bends, their errors are nearly independent
+_MAX_SECTIONS = 1000  # of a long cable; bounds the time of the fit
+_KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply than over its own width
+_MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
+_FIRST_INTERVALS = 36  # knot intervals tried first; a bow between two bearings uses ten to fifteen
+_CROWDED_SHARE = 0.6
+"""Of the parameters in effective use, above which knots are doubled: the penalty, not the knots, shall decide."""
+_PATH_KNOT_DIAMETERS = 5.0
+"""Diameters; knots of the path that the edges are sought along, and first try of a long cable."""
+_MOST_PATH_INTERVALS = 120  # knot intervals of that path; bounds the time
+_PENALTY_ORDER = 3
+"""Derivative of kappa that is penalised: 3 leaves a parabola free, the bow's first shape; 2 was 30 % worse inside the
+span.
+"""
+_LONGEST_CORRELATION_DIAMETERS = 2.0
+"""Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
+_BIAS_SHARE = 0.5
+"""Part of the penalty's bias that counts as uncertainty: an equilibrium is smoother than the penalty allows; with 1 the
+95 % band of kappa covered 98.6 % of smooth bows, with 0 92 %, with 0.5 97 %.
+"""
 
 
 def fit_along(
@@ -49,29 +75,29 @@ def fit_along(
     witness : Witness, optional
         Other data whose errors last as long along s as those of the points.
     """
-    most = max(settings.min_intervals, round(length / (settings.knot_spacing_diameters * diameter)))
-    intervals = min(most, max(settings.first_intervals, round(length / (settings.path_knot_diameters * diameter))))
+    most = max(_MIN_INTERVALS, round(length / (_KNOT_SPACING_DIAMETERS * diameter)))
+    intervals = min(most, max(_FIRST_INTERVALS, round(length / (_PATH_KNOT_DIAMETERS * diameter))))
 
     guide_s = s
 
     def fit(correlation_length: float | None, iterations: int) -> CurveFit:
-        frame = make_frame(0.0, length, intervals=intervals, order=settings.penalty_order, breaks=breaks)
+        frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER, breaks=breaks)
         return fit_curve(
             points,
             std,
             start=initial_curve(guide, guide_s, frame),
             s=s,
-            order=settings.penalty_order,
-            longest=settings.longest_correlation_diameters * diameter,
+            order=_PENALTY_ORDER,
+            longest=_LONGEST_CORRELATION_DIAMETERS * diameter,
             correlation_length=correlation_length,
             iterations=iterations,
-            bias_share=settings.bias_share,
+            bias_share=_BIAS_SHARE,
             witness=witness,
         )
 
     while intervals < most:  # long cables only
         quick = fit(median(np.diff(s)), 2)
-        if quick.smooth.freedom < settings.crowded_share * quick.curve.frame.size:
+        if quick.smooth.freedom < _CROWDED_SHARE * quick.curve.frame.size:
             break
         intervals = min(2 * intervals, most)
         # more knots follow points with a gap among them worse than they follow the curve by fewer
@@ -81,8 +107,8 @@ def fit_along(
 
 
 def _path_intervals(length: float, diameter: float, settings: CurveSettings) -> int:
-    wanted = length / (settings.path_knot_diameters * diameter)
-    return int(np.clip(wanted, settings.min_intervals, settings.most_path_intervals))
+    wanted = length / (_PATH_KNOT_DIAMETERS * diameter)
+    return int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
 
 
 def follow(rough: RoughCable, *, half_width: float, known: bool, settings: CurveSettings) -> Sections | Rejected:
@@ -98,18 +124,18 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
-    if along[last] - along[first] < settings.least_seen_radii * half_width:
+    if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
     points, s = _guides(rough, along, half_width)
     intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
-    frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
-    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order, iterations=1)
+    frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width, settings)
     if span is None:
         return _lost(rough, 0.0)
-    tolerance = settings.width_tolerance * (1.0 if known else 2.0)
+    tolerance = _WIDTH_TOLERANCE * (1.0 if known else 2.0)
     found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance, settings=settings)
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = median(width[found.usable]) if found.usable.any() else np.nan
@@ -119,12 +145,12 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
     points = where + found.edges.mean(axis=1)[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
-    path = follow_points(points[usable], start=path, s=found.s[usable], order=settings.penalty_order)
-    count = round((span[1] - span[0]) / (settings.section_spacing_diameters * diameter))
-    count = min(max(count, settings.min_sections), settings.max_sections, int(span[1] - span[0]))
+    path = follow_points(points[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
+    count = round((span[1] - span[0]) / (_SECTION_SPACING_DIAMETERS * diameter))
+    count = min(max(count, _MIN_SECTIONS), _MAX_SECTIONS, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[
-        free_of_covers(path, s, settings.cover_check_radii * half_width, covers)
+        free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)
         & in_picture(ground, path, s, 1.2 * half_width + 3.0 * rough.blur_px + 4.0)
     ]
     if len(s) < settings.least_sections:
@@ -188,8 +214,8 @@ def _span(
 ) -> tuple[float, float] | None:
     """Range of s in which the cable is seen and neither edge is hidden."""
     s = np.arange(seen[0], seen[1], 1.0)
-    free = s[free_of_covers(path, s, settings.cover_check_radii * half_width, covers)] if len(s) else s
-    enough = len(free) > settings.least_seen_radii * half_width
+    free = s[free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)] if len(s) else s
+    enough = len(free) > _LEAST_SEEN_RADII * half_width
     return (float(free[0]), float(free[-1])) if enough else None
 
 

@@ -21,6 +21,8 @@ from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
 
+_OTHER_SIDE_WIDTHS = 0.5  # widths; a bow that anyone sees: a smaller one to the other side is a straight cable
+
 
 def on_one_side(
     lines: tuple[Centerline | Rejected, ...], diameter_m: float, settings: SeriesSettings
@@ -50,7 +52,7 @@ def on_one_side(
     findings = tuple(
         of_photo(line.image, "info", Message("photo/other-side", bow_m=_bow(line)))
         for line in turned
-        if _bow(line) > settings.other_side_widths * diameter_m
+        if _bow(line) > _OTHER_SIDE_WIDTHS * diameter_m
     )
     return tuple(
         _turned(line) if isinstance(line, Centerline) and line.image in names else line for line in lines

@@ -29,6 +29,14 @@ _LASTING = 4.0  # blocks that a misfit lasts at most, before the polynomial foll
 # quarter of a section's error, and kappa is 1 % better.
 _CHANCE = 1.2
 _ROUNDING = 1e-12  # grey squared; drawn pictures without noise have no errors at all
+_SLOW_LIGHT_ORDER = 5
+"""Of the polynomial of s that level and step of an edge follow on an even sheath and ground: light turns with the
+cable, once from end to end.
+"""
+_LEAST_SLOW_SHARE = 0.9
+"""Of the sections, by edge; where fewer show it, what they show is no even light: white on white, edges held to it made
+a curve that looked right, 20 px beside the cable.
+"""
 
 
 def steadied(
@@ -49,9 +57,9 @@ def steadied(
     """
     free = np.sqrt(covariance[..., 2, 2])
     known = np.isfinite(place)
-    if known.sum(axis=1).min() < settings.least_slow_sections or known.mean(axis=1).min() < settings.least_slow_share:
+    if known.sum(axis=1).min() < settings.least_slow_sections or known.mean(axis=1).min() < _LEAST_SLOW_SHARE:
         return place, free
-    slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, settings.slow_light_order)
+    slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, _SLOW_LIGHT_ORDER)
     off, extra, plain = np.zeros(light.shape), np.zeros((2, 2)), known.copy()
     for k in (0, 1):
         for side in (0, 1):

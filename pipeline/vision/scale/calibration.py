@@ -22,6 +22,9 @@ from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
 _LENGTH = Message("scale.length")
+_COVER_DIAMETER_STD = 0.004  # relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit
+_COVER_HEIGHT_M = 1e-3  # m; top of a cover or marker above the cable's upper side: a lid and its screw
+_CHECK_FLOOR = 0.005  # relative; smaller deviations change the stiffness by less than one percent
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: Cal
     """
     if all(axis.kind in ("end", "given") for cable in found for axis in (cable.left, cable.right)):
         return 0.0
-    height = 0.5 * specimen.diameter_m + settings.cover_height_m
+    height = 0.5 * specimen.diameter_m + _COVER_HEIGHT_M
     return height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
@@ -145,7 +148,7 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
     rims = float(np.median([std / radius for radius, std in _radii(found)]))
     scatter = float(np.std(radii) / np.mean(radii))
     parallax_std = axis_parallax_std(specimen, found, settings)
-    std = math.hypot(settings.cover_diameter_std, parallax_std, scatter, rims)
+    std = math.hypot(_COVER_DIAMETER_STD, parallax_std, scatter, rims)
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, Message("scale.covers"))
 
 
@@ -196,7 +199,7 @@ def _std(other: Scale, used: Scale) -> float:
 
 def _off(other: Scale, used: Scale, settings: CalibrationSettings) -> bool:
     """True if a scale in units of the one used differs from it by more than both allow."""
-    return abs(other.px_per_m - 1.0) > max(settings.check_sigmas * _std(other, used), settings.check_floor)
+    return abs(other.px_per_m - 1.0) > max(settings.check_sigmas * _std(other, used), _CHECK_FLOOR)
 
 
 def _away(other: Scale, used: Scale) -> Message:

@@ -25,6 +25,13 @@ from pipeline.records import Array
 from pipeline.settings.vision.scale import CalibrationSettings
 
 _ROUNDS = 15
+_CORNER_REACH = 0.4  # squares; how far from a corner its edges are fitted: before the next corner's
+_CORNER_MARGIN = 0.9  # share of the white margin beside a ChArUco marker; the rest is the marker's blur
+_CORNER_REACH_PX = 20.0  # px; longer edges hardly help, and a lens bends them: 1 % of barrel by 0.005 px over 20 px
+_CORNER_PIXELS = 36  # pixels; nine unknowns of a corner, each from four
+_CORNER_BLUR_PX = 1.5  # px; blur at the start, wide enough to reach the edge from a pixel
+_CORNER_CONTRAST = 2.0  # half the step from black to white over the rms that the fit leaves; noise of 10 % has 4
+_CORNER_MOVE = 0.15  # squares; a corner found farther from its start is another thing
 
 
 @dataclass(frozen=True)
@@ -45,8 +52,8 @@ class Window:
     @classmethod
     def of(cls, marker_share: float, settings: CalibrationSettings) -> Window:
         """Window beside markers that are ``marker_share`` of a square wide (0 without any)."""
-        reach = settings.corner_reach
-        return cls(reach, min(reach, settings.corner_margin * 0.5 * (1.0 - marker_share)))
+        reach = _CORNER_REACH
+        return cls(reach, min(reach, _CORNER_MARGIN * 0.5 * (1.0 - marker_share)))
 
 
 def refine_corners(grey: Array, uv: Array, cells: Array, window: Window, settings: CalibrationSettings) -> Array:
@@ -72,13 +79,13 @@ def refine_corners(grey: Array, uv: Array, cells: Array, window: Window, setting
 
 def _refined(grey: Array, start: Array, cell: Array, window: Window, settings: CalibrationSettings) -> Array:
     lost = np.full(2, np.nan)
-    place, value = _pixels(grey, start, cell, window, settings.corner_reach_px)
+    place, value = _pixels(grey, start, cell, window, _CORNER_REACH_PX)
     square = float(np.hypot(*cell).min())
-    if len(value) < settings.corner_pixels:
+    if len(value) < _CORNER_PIXELS:
         return lost
     at = start.copy()
     turn = np.arctan2(cell[1], cell[0])
-    log_sigma = float(np.log(settings.corner_blur_px))
+    log_sigma = float(np.log(_CORNER_BLUR_PX))
     for _ in range(_ROUNDS):
         slopes, linear = _linearised(place - at, turn, float(np.exp(log_sigma)))
         amount, *_ = np.linalg.lstsq(linear, value, rcond=None)
@@ -90,8 +97,8 @@ def _refined(grey: Array, start: Array, cell: Array, window: Window, settings: C
         log_sigma += float(np.clip(step[4], -0.5, 0.5))
         if np.abs(move).max() < settings.corner_step_px:
             break
-    clear = abs(amount[1]) > settings.corner_contrast * float(np.std(left))
-    stayed = np.hypot(*(at - start)) < settings.corner_move * square and np.exp(log_sigma) < window.reach * square
+    clear = abs(amount[1]) > _CORNER_CONTRAST * float(np.std(left))
+    stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < window.reach * square
     return at if clear and stayed and np.abs(move).max() < 10.0 * settings.corner_step_px else lost
 
 

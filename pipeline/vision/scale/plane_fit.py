@@ -22,6 +22,11 @@ from pipeline.records import Array
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
+_LENS_PHOTOS = 10  # photos; from so many on they may show the board in any position
+_CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
+_LENS_SIGMAS = 3.0  # sigmas; a weaker k2 or tangential term adds more error than it removes
+_ONE_PLANE_RATIO = 1.5  # ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it
+
 
 @dataclass(frozen=True)
 class BoardView:
@@ -64,11 +69,11 @@ class PlaneFit:
 def fit_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
     """Plane map of the board's surface from one photo or more."""
     flat = _fit_plane_views(views, settings)
-    if len(views) < settings.lens_photos:
+    if len(views) < _LENS_PHOTOS:
         return flat
     free = _fit_free_views(views, settings)
     # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
-    return free if flat.rms_px > settings.one_plane_ratio * free.rms_px else flat
+    return free if flat.rms_px > _ONE_PLANE_RATIO * free.rms_px else flat
 
 
 def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
@@ -192,7 +197,7 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float, settin
             parts.append((shown * radius + middle - view.uv).ravel())
         return np.concatenate(parts)
 
-    std, q = settings.corner_std_px, start / scale
+    std, q = _CORNER_STD_PX, start / scale
     for _ in range(2):  # the second time with the corners' own scatter
         used = std
 
@@ -220,7 +225,7 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     ]
     # k2 and the tangential terms run wild outside the board unless the corners really show them.
     drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
-    rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > settings.lens_sigmas**2 * 3 else fits[0]
+    rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > _LENS_SIGMAS**2 * 3 else fits[0]
     lens = Lens(np.asarray(camera, np.float64), np.asarray(distortion, np.float64).ravel()[:5])
     ideal = replace(views[0], uv=lens.undistort(views[0].uv))
     rotation, _ = cv2.Rodrigues(turns[0])

@@ -23,6 +23,8 @@ from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
 _MAD_TO_STD = 1.4826  # standard deviation of a normal distribution by its median absolute deviation
+_REDUCED_SIDE_CELLS = 1000
+"""Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Standout:
 
 def choose_reduction(size: tuple[int, int], diameter_px: float | None, settings: SegmentationSettings) -> int:
     """Photo pixels per cell: a few cells across the cable if its diameter is known, a set picture size if not."""
-    by_size = max(1, round(max(size) / settings.reduced_side_cells))
+    by_size = max(1, round(max(size) / _REDUCED_SIDE_CELLS))
     if diameter_px is None:
         return by_size
     return max(1, int(diameter_px / settings.cells_across))

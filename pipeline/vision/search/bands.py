@@ -24,6 +24,7 @@ from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import Mask, Strip, find_strips
 
 _MAD_TO_STD = 1.4826
+_MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 
 
 def strips_in_bands(
@@ -69,7 +70,7 @@ def _cable_within(
     wide = by_diameter(settings).model_copy(update={"pair_search_widths": search})
     flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), wide, known=True)
     both = np.isfinite(flanks.left + flanks.right)
-    if both.mean() < settings.min_band_edges:
+    if both.mean() < _MIN_BAND_EDGES:
         return None
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width * len(rows) / len(path), mode="nearest")

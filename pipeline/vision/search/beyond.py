@@ -24,6 +24,26 @@ from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across
 from pipeline.vision.search.ends import led_on, straight_body
 from pipeline.vision.search.strips import Strip, end_direction, thick_part
 
+_BEYOND_WIDTHS = 10.0  # widths; so far beyond a visible end more of the cable is looked for
+_BEYOND_LEADS_WIDTHS = ((1.5, 4.0), (1.5, 10.0), (6.0, 10.0))
+"""Widths; pieces by which a path is led on, how far before its end they end and how long they are: a short one follows
+a bend; the end of a mask runs some widths along the border of a shadow.
+"""
+_BEYOND_MOST_SHARE = 3.0  # of the strip's length; followed no farther: a strip found is at least a quarter of the cable
+_BEYOND_OBJECT_CONTRAST = 0.8
+"""Of the strip's step; thick things that stand out so much are clamps at the end of what was followed, those that stand
+out less may be shadows.
+"""
+_BEYOND_DARKEST = 0.02  # of full range; a ground darker than that is counted as so bright: it tells no share
+_FADING_SHARE = 0.5  # of the step before an end that is left beyond it: covers leave less, glare more
+_SHEET_WIDTHS = 60.0  # widths; a sheet of paper across a cable hides no more of it: 300 mm of 5 mm
+_SHEET_TURN_DEG = 60.0  # degrees against the chord; a cable turns by twice that at most under a sheet
+_BEYOND_WIDTH_OFF = 0.15  # relative; a cable's width is constant within 5 %, where a line crosses it edges are lost
+_BEYOND_CONTRAST = (0.6, 1.6)
+"""Of the strip's step by its ground's brightness; a shadow leaves it as it is, but stray light and the camera's curve
+do not; covers and clamps differ by more.
+"""
+
 
 def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
     """True if beyond the first or the last point of a strip, led on as it ends, there is more of the same.
@@ -51,15 +71,15 @@ def fades(standout: Standout, cut: CrossCut, width: float, settings: Segmentatio
     path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
     near = slice(round(0.75 * width), round(settings.beyond_least_widths * width))
     before = median(step[::-1][near])
-    _, ahead = _led_into_picture(standout, path, width, settings.beyond_leads_widths[0], settings)
+    _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0], settings)
     if len(ahead) < near.stop or before <= 0.0:
         return False
     ahead = ahead[: near.stop + round(width)]
-    if not _may_fade(standout, cut, ahead, near, width, settings.fading_share * before, settings):
+    if not _may_fade(standout, cut, ahead, near, width, _FADING_SHARE * before, settings):
         return False
     more = cut_across(standout, ahead, width, settings, known=True, weights=cut.weights)
-    same = np.abs(more.width[near] / width - 1.0) < settings.beyond_width_off
-    faint = median(more.step[near]) > settings.fading_share * before
+    same = np.abs(more.width[near] / width - 1.0) < _BEYOND_WIDTH_OFF
+    faint = median(more.step[near]) > _FADING_SHARE * before
     return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
 
 
@@ -103,10 +123,10 @@ def _arc_joins(end: Array, leaving: Array, rest: Array, width: float, settings: 
     An arc leaves its chord by the angle by which it comes back to it; a cable that bends unevenly by about that.
     """
     gap, arriving = rest[0] - end, -end_direction(rest[::-1], width)
-    if np.hypot(*gap) > settings.sheet_widths * width:
+    if np.hypot(*gap) > _SHEET_WIDTHS * width:
         return False
     out, back = (np.degrees(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)) for a, b in ((leaving, gap), (gap, arriving)))
-    return bool(max(abs(out), abs(back)) < settings.sheet_turn_deg and abs(out - back) < settings.joint_angle_deg)
+    return bool(max(abs(out), abs(back)) < _SHEET_TURN_DEG and abs(out - back) < settings.joint_angle_deg)
 
 
 def follow(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array | None:
@@ -115,7 +135,7 @@ def follow(standout: Standout, cut: CrossCut, width: float, settings: Segmentati
     None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
     """
     path = cut.path
-    most = (1.0 + settings.beyond_most_share) * len(path)
+    most = (1.0 + _BEYOND_MOST_SHARE) * len(path)
     for _ in range(2):
         path = path[::-1]
         longer, scraps = _ahead(standout, cut, path, width, settings)
@@ -144,7 +164,7 @@ def followed_in(
     for point in np.rint(added[:: max(1, round(0.5 * width))]).astype(int).tolist():
         cv2.circle(around, point, round(2.5 * width), 1, cv2.FILLED)
     relief = (standout.residual @ cut.weights.astype(np.float32)) * (-1.0 if cut.dark else 1.0)
-    strong = (relief > settings.beyond_object_contrast * cut.contrast).astype(np.uint8)
+    strong = (relief > _BEYOND_OBJECT_CONTRAST * cut.contrast).astype(np.uint8)
     thick = reading.thick & thick_part(strong, settings.thick_widths * width)
     return replace(
         reading,
@@ -164,7 +184,7 @@ def _ahead(
     """
     usual = median(_weber(standout, cut, width, settings))
     best, scraps = None, 0
-    for lead in settings.beyond_leads_widths:
+    for lead in _BEYOND_LEADS_WIDTHS:
         led, ahead = _led_into_picture(standout, path, width, lead, settings)
         if not _may_go_on(standout, cut, ahead, width, usual, settings):
             continue
@@ -212,8 +232,8 @@ def _may_go_on(
     straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
     light, _, _ = straighten(standout.picture, ahead, normal, width, settings)
     relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
-    darkest = np.maximum(light.mean(axis=2).min(axis=1), settings.beyond_darkest)
-    strong = (-relief if cut.dark else relief) > (settings.beyond_contrast[0] * usual) * darkest[:, None]
+    darkest = np.maximum(light.mean(axis=2).min(axis=1), _BEYOND_DARKEST)
+    strong = (-relief if cut.dark else relief) > (_BEYOND_CONTRAST[0] * usual) * darkest[:, None]
     enough = 0.25 * width / (offsets[1] - offsets[0])
     length = float(np.hypot(*np.diff(ahead, axis=0).T).sum())
     return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * length / (len(rows) - 1) > least)
@@ -246,7 +266,7 @@ def _led_into_picture(
     """The path, and what it is led on by beyond its last point as far as the picture goes."""
     body, outward = straight_body(path, width, lead[0] * width)
     reach = float(np.hypot(*(path[-1] - body[-1])))
-    led = led_on(body, outward, reach + settings.beyond_widths * width, width, base=lead[1])
+    led = led_on(body, outward, reach + _BEYOND_WIDTHS * width, width, base=lead[1])
     led, ahead = np.split(led, [len(body) + int(reach)])
     rows, columns = standout.residual.shape[:2]
     inside = np.all((ahead >= 0) & (ahead <= (columns - 1, rows - 1)), axis=1)
@@ -261,9 +281,9 @@ def shaded(standout: Standout, cut: CrossCut, width: float, settings: Segmentati
 def _alike(
     standout: Standout, cut: CrossCut, width: float, usual: float, settings: SegmentationSettings
 ) -> NDArray[np.bool_]:
-    low, high = settings.beyond_contrast
+    low, high = _BEYOND_CONTRAST
     share = _weber(standout, cut, width, settings) / usual
-    return (np.abs(cut.width / width - 1.0) < settings.beyond_width_off) & (share > low) & (share < high)
+    return (np.abs(cut.width / width - 1.0) < _BEYOND_WIDTH_OFF) & (share > low) & (share < high)
 
 
 def _weber(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array:
@@ -273,4 +293,4 @@ def _weber(standout: Standout, cut: CrossCut, width: float, settings: Segmentati
     ground = cv2.remap(
         standout.picture, beside[..., 0], beside[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), settings.beyond_darkest))
+    return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _BEYOND_DARKEST))

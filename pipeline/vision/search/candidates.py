@@ -23,6 +23,21 @@ from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.bands import strips_in_bands
 from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
 
+_TRACE_SHARE = 0.03  # of the area of the strips that cover most; narrower ones that cover less are specks and writing
+_ALONE_CLEAR_WIDTHS = 3.0  # widths; a strip that comes back to itself as near as that is looked at more closely
+_JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
+_RING_GAP_WIDTHS = 2.5  # widths; a ring or writing on the sheath interrupts the skeleton so far, covers farther
+_MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
+_JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
+_TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
+_LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
+_HIGHER_LEVELS = 2  # levels tried above Otsu's, each splits what stands above the last: shadow, then cable
+_LEAST_LEVEL = 5.0  # sigmas of the ground; a strip above it is no play of noise and texture
+_LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
+_MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
+_MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
+_BAND_WIDTHS = (2.2, 3.2)  # widths; cable and hard shadow together, by a lamp 45 and 25 degrees above the table
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -64,11 +79,11 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
         if long:
             given += 1
             yield long
-        if given >= settings.max_judged_pictures:
+        if given >= _MAX_JUDGED_PICTURES:
             break
         best = max([best, *readings], key=lambda reading: reading.longest)
     if wanted.width is not None:
-        for reading in islice(_banded(standout, wanted, wanted.width, settings), settings.max_judged_pictures):
+        for reading in islice(_banded(standout, wanted, wanted.width, settings), _MAX_JUDGED_PICTURES):
             given += 1
             yield (reading,)
     if not given:
@@ -80,7 +95,7 @@ def narrowest(standout: Standout, settings: SegmentationSettings) -> float:
     picture, level = next(_pictures(standout, settings))
     widths = ridge_widths((picture > level).astype(np.uint8), settings)
     most = max((width * length for width, length in widths), default=0.0)
-    return min((width for width, length in widths if width * length > settings.trace_share * most), default=0.0)
+    return min((width for width, length in widths if width * length > _TRACE_SHARE * most), default=0.0)
 
 
 def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading | None:
@@ -93,16 +108,16 @@ def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSetting
     strips = [strip for reading in readings for strip in reading.strips[:2]]
     if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
         return None
-    clear = settings.alone_clear_widths * strips[0].width
+    clear = _ALONE_CLEAR_WIDTHS * strips[0].width
     return None if strips[0].branch or approaches_itself(strips[0].path, clear) else readings[0]
 
 
 def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> bool:
     """True if something of the cable's width leaves, crosses or meets the strip, so that its course is ambiguous."""
     width = reading.width
-    if strip.branch >= settings.min_branch_widths * width:
+    if strip.branch >= _MIN_BRANCH_WIDTHS * width:
         return True
-    reach = settings.junction_widths * width
+    reach = _JUNCTION_WIDTHS * width
     long = [other for other in reading.strips if other.length > settings.min_piece_widths * width]
     if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
         return True
@@ -131,7 +146,7 @@ def _touches(end: int, strip: Strip, other: Strip, settings: SegmentationSetting
 
     Each counts by its own width: a ruler beside the cable is wider than that.
     """
-    near = (settings.touching_widths - 0.5) * strip.width + 0.5 * other.width
+    near = (_TOUCHING_WIDTHS - 0.5) * strip.width + 0.5 * other.width
     margin = int(2.0 * near)
     inner = other.path[margin : len(other.path) - margin]
     return bool(len(inner)) and bool(np.hypot(*(inner - strip.path[end]).T).min() < near)
@@ -149,17 +164,17 @@ def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tu
     distance = standout.distance()
     otsu, *higher = _levels(distance, settings)
     yield distance, otsu
-    for level in (*higher, *(factor * otsu for factor in settings.level_factors)):
-        if level > settings.lowest_level:
+    for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
+        if level > _LOWEST_LEVEL:
             yield distance, level
     brightness = standout.brightness()
     for sign in (-1.0, 1.0):
         picture = np.maximum(np.float32(sign) * brightness, 0.0)
         level, *higher = _levels(picture, settings)
-        if level > settings.least_level:
+        if level > _LEAST_LEVEL:
             for tried in (level, *higher, 0.5 * level):
                 yield picture, tried
-    for level in (settings.least_level, settings.lowest_level):
+    for level in (_LEAST_LEVEL, _LOWEST_LEVEL):
         yield distance, level
 
 
@@ -171,7 +186,7 @@ def _levels(picture: Image, settings: SegmentationSettings) -> list[float]:
     top = float(picture.max()) + 1e-9
     coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
     levels: list[float] = []
-    for _ in range(1 + settings.higher_levels):
+    for _ in range(1 + _HIGHER_LEVELS):
         code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
         levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
         coded = coded[coded > code]
@@ -182,7 +197,7 @@ def _levels(picture: Image, settings: SegmentationSettings) -> list[float]:
 
 def _readings(picture: Image, level: float, wanted: Wanted, settings: SegmentationSettings) -> Iterator[Reading]:
     above = picture > level
-    if above.mean() > settings.max_covered_share:
+    if above.mean() > _MAX_COVERED_SHARE:
         return
     widths = [(wanted.width, np.inf)] if wanted.width is not None else _guess_widths(above, settings)
     largest = 0.0
@@ -201,9 +216,9 @@ def _banded(standout: Standout, wanted: Wanted, width: float, settings: Segmenta
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
     for picture, level in _pictures(standout, settings):
         mask = strip_mask(picture > level, width, settings)
-        if mask.mean() > settings.max_covered_share:
+        if mask.mean() > _MAX_COVERED_SHARE:
             continue
-        for most in settings.band_widths:
+        for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
             strips = strips_in_bands(picture, mask, thick, width, most, settings)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
@@ -218,7 +233,7 @@ def _read(
     thick = thick_part(mask, settings.thick_widths * width)
     strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
     short = not strips or strips[0].length < wanted.least_length
-    gap = settings.joint_gap_widths if short or wanted.across_objects else settings.ring_gap_widths
+    gap = _JOINT_GAP_WIDTHS if short or wanted.across_objects else _RING_GAP_WIDTHS
     joined = join_strips(strips, width, settings, gap=gap * width, obstacle=None if wanted.across_objects else thick)
     strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:

@@ -22,6 +22,7 @@ from pipeline.vision.search.crosscut import path_normals
 _MAD_TO_STD = 1.4826
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
 _TILE = 128  # px; pieces of the window that are projected or left out
+_CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def take_closeup(
     photo: Photo, path_px: Array, width_px: float, weights: Array, settings: SegmentationSettings
 ) -> Closeup:
     """Project the corridor along ``path_px`` (k, 2) to grey and measure its noise and blur."""
-    margin = settings.corridor_widths * width_px + 8.0
+    margin = _CORRIDOR_WIDTHS * width_px + 8.0
     low = np.maximum(np.floor(path_px.min(axis=0) - margin).astype(int), 0)
     high = np.minimum(np.ceil(path_px.max(axis=0) + margin).astype(int) + 1, photo.size)
     grey = np.zeros((high[1] - low[1], high[0] - low[0]), np.float32)

@@ -22,6 +22,7 @@ from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
 _MAD_TO_STD = 1.4826
+_TEXTURE_WIDTHS = 12.0  # widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ def cut_across(
     pitch = len(path) / len(rows)
     flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
     step = _core_level(relief, offsets, flanks)
-    texture = _texture(grey, ground, offsets / width, settings.texture_widths * width / pitch, shaded=shaded)
+    texture = _texture(grey, ground, offsets / width, _TEXTURE_WIDTHS * width / pitch, shaded=shaded)
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")

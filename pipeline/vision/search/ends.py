@@ -25,6 +25,10 @@ from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.closeup import Closeup
 from pipeline.vision.search.strips import end_direction
 
+_TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
+_STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
+_CUT_STD_WIDTHS = 0.04  # widths; a cut with pliers is square and the path centred to about a twentieth
+
 
 @dataclass(frozen=True)
 class CableEnd:
@@ -44,7 +48,7 @@ def find_end(
     straight begins a cover's radius earlier.
     """
     width = reading.width
-    trimmed = settings.trimmed_widths * width
+    trimmed = _TRIMMED_WIDTHS * width
     trimmed = trimmed if cover_radius_px is None else max(trimmed, 1.2 * cover_radius_px / standout.reduction)
     body, outward = straight_body(path, width, trimmed)
     place, at_object = body[-1], False
@@ -87,7 +91,7 @@ def lead_to_axes(
         path = path[: int(np.argmin(distance)) + 1]
         outside = np.flatnonzero(distance[: len(path)] > radius)
         body, outward = straight_body(
-            path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, settings.trimmed_widths * width
+            path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, _TRIMMED_WIDTHS * width
         )
         steps = np.arange(1.0, max(_to_circle(body[-1], outward, center, radius), 1.0) + 1e-9)
         path = np.vstack([body, body[-1] + steps[:, None] * outward])
@@ -120,7 +124,7 @@ def settle_end(
     """
     if axis.kind not in ("end", "clamp"):
         return axis, path
-    body, outward = straight_body(path, width, 1.5 * settings.trimmed_widths * width)
+    body, outward = straight_body(path, width, 1.5 * _TRIMMED_WIDTHS * width)
     reach = max(float((path[-1] - body[-1]) @ outward), 1.0)
     path = led_on(body, outward, reach, width)
     settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
@@ -132,13 +136,13 @@ def settle_end(
     points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
     u, v = (points[..., k].astype(np.float32) for k in (0, 1))
     profiles = cv2.remap(closeup.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    places = [_half_level(profile, along, width, settings.stroke_widths * width) for profile in profiles]
+    places = [_half_level(profile, along, width, _STROKE_WIDTHS * width) for profile in profiles]
     known = np.array([place for place in places if place is not None])
     if len(known) < 5:
         return settled, path
     middle = median(known)
     # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
-    std = float(np.hypot(1.4826 * median(np.abs(known - middle)) / 2.0, settings.cut_std_widths * width))
+    std = float(np.hypot(1.4826 * median(np.abs(known - middle)) / 2.0, _CUT_STD_WIDTHS * width))
     path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 

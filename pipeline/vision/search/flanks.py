@@ -20,6 +20,15 @@ from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
 
+_PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
+_PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
+_PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
+_PAIR_WIDTHS = 26  # widths tried, 5 % apart; the edges are then sought in 15 %
+_PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off before the edges count for less
+_PAIR_WIDTH_SHARE = 0.9  # ratio to the best pair's score from which a wider pair is preferred
+_EDGE_REACH_WIDTHS = 0.1  # widths; an edge is sought so near to the pair's place; glare is farther
+_LEAST_EDGE_SHARE = 0.15  # ratio to the usual steepest slope; a flatter place is no edge: half is shade
+
 
 @dataclass(frozen=True)
 class Flanks:
@@ -65,7 +74,7 @@ def find_flanks(
     # Most sections tell how strong an edge is; letters count no more, and a highlight's edge, which may be three times
     # as strong as a flank, less than twice (the root).
     usual = median(np.abs(slope).max(axis=1)) + 1e-12
-    pooling = settings.pair_pooling_widths * width / pitch
+    pooling = _PAIR_POOLING_WIDTHS * width / pitch
     rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
     near = np.flatnonzero(np.abs(offsets) <= settings.pair_search_widths * width)
     # Pooled sections repeat each other: every half width of them is enough for width and course.
@@ -73,12 +82,12 @@ def find_flanks(
     rise, fall = rise[every], fall[every]
     best = spacing * _pair_width(rise, fall, near, width / spacing, known, settings)
     score = _pair_score(rise, fall, near, np.array([best / spacing]))[:, 0]
-    course = offsets[near][_best_course(score, settings.pair_wander_cost)]
+    course = offsets[near][_best_course(score, _PAIR_WANDER_COST)]
     middle = np.interp(np.arange(len(relief)), every, course)
-    least = settings.least_edge_share * usual
+    least = _LEAST_EDGE_SHARE * usual
     slope = _pooled(slope, pooling)
-    left = _steepest(slope, offsets, middle - 0.5 * best, settings.edge_reach_widths * best, least)
-    right = _steepest(-slope, offsets, middle + 0.5 * best, settings.edge_reach_widths * best, least)
+    left = _steepest(slope, offsets, middle - 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
+    right = _steepest(-slope, offsets, middle + 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
     return Flanks(left, right, middle, best)
 
 
@@ -139,13 +148,13 @@ def _pair_width(
 
     An unknown width is the largest of nearly the best ones: a highlight splits a cable, nothing doubles it.
     """
-    tried = width * np.geomspace(*settings.pair_width_range, settings.pair_widths)
+    tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = _pair_score(rise, fall, near, tried).max(axis=2).mean(axis=0)
     if known:
-        trust = np.exp(-0.5 * (np.log(tried / width) / settings.pair_width_std) ** 2)
+        trust = np.exp(-0.5 * (np.log(tried / width) / _PAIR_WIDTH_STD) ** 2)
         return float(tried[np.argmax(totals * (settings.pair_width_doubt + (1.0 - settings.pair_width_doubt) * trust))])
-    return float(tried[np.flatnonzero(totals >= settings.pair_width_share * totals.max())[-1]])
+    return float(tried[np.flatnonzero(totals >= _PAIR_WIDTH_SHARE * totals.max())[-1]])
 
 
 def _steepest(slope: Array, offsets: Array, about: Array, reach: float, least: float) -> Array:

@@ -26,6 +26,16 @@ Mask = NDArray[np.uint8]
 
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
 _ROUGH_DISTANCE = 0.95  # rough distances over masks of 5 cells are 2 % off at most
+_CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
+_OPENING_WIDTHS = 0.3  # widths; specks removed: texture is finer than the cable
+_COVER_HOLE_WIDTHS = (0.5, 3.2)
+"""Widths; radii of holes that the rims of covers leave: covers are 2 to 6 diameters wide."""
+_RING_ROUNDNESS = 0.85  # share of its smallest circle that a hole fills; a disc in cells 0.93 and more, a square 0.64
+_RING_WALL_WIDTHS = 0.6  # widths; how thick the rim of a cover may be: loops of cable are one width thick
+_RING_FREE_SHARE = 0.6
+"""Of the directions in which the ring is thinner: the cable takes a tenth, a shadow a third of them."""
+_MAX_PIECES = 12  # largest pieces of a mask that are traced; the cable is among them
+_MAX_WIDTH_GUESSES = 3  # widths tried where the diameter is unknown; 1 was right so far
 
 
 @dataclass(frozen=True)
@@ -57,7 +67,7 @@ class Strip:
 
 def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSettings) -> Mask:
     """Mask of what stands out, closed over highlights and filled where writing and covers' rims leave holes."""
-    mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(settings.closing_widths * width))
+    mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSING_WIDTHS * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
@@ -66,7 +76,7 @@ def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSet
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
-    return _morphology(mask, cv2.MORPH_OPEN, _disc(settings.opening_widths * width))
+    return _morphology(mask, cv2.MORPH_OPEN, _disc(_OPENING_WIDTHS * width))
 
 
 def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float, settings: SegmentationSettings) -> bool:
@@ -75,20 +85,20 @@ def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float, settings: Se
     A cable that runs into it would make a loop of it, as if it crossed itself; a loop of cable is as thick as that.
     """
     center, radius = cv2.minEnclosingCircle(contour)
-    low, high = settings.cover_hole_widths
+    low, high = _COVER_HOLE_WIDTHS
     if not low * width <= radius <= high * width:
         return False
-    if cv2.contourArea(contour) < settings.ring_roundness * np.pi * radius**2:
+    if cv2.contourArea(contour) < _RING_ROUNDNESS * np.pi * radius**2:
         return False
     angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
-    beyond = np.asarray(center)[:, None] + (radius + settings.ring_wall_widths * width) * np.stack(
+    beyond = np.asarray(center)[:, None] + (radius + _RING_WALL_WIDTHS * width) * np.stack(
         [np.cos(angle), np.sin(angle)]
     )
     u, v = np.rint(beyond).astype(int)
     inside = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
     free = np.ones(len(angle), dtype=bool)
     free[inside] = mask[v[inside], u[inside]] == 0
-    return bool(np.mean(free) >= settings.ring_free_share)
+    return bool(np.mean(free) >= _RING_FREE_SHARE)
 
 
 def thick_part(mask: Mask, least: float) -> Mask:
@@ -125,7 +135,7 @@ def find_strips(
     thin = mask & (1 - grown)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
-    largest = 1 + np.argsort(areas)[::-1][: settings.max_pieces]
+    largest = 1 + np.argsort(areas)[::-1][:_MAX_PIECES]
     strips = []
     for label in largest[areas[largest - 1] >= settings.min_piece_widths * width**2]:
         u, v, w, h = stats[label, :4]
@@ -153,7 +163,7 @@ def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[tuple[float
     # A ridge is up to as thick as the strip's cells allow; neighbouring bins belong to the same strip.
     pooled = np.convolve(counts, [0.5, 1.0, 0.5], mode="same")
     order = [i for i in np.argsort(pooled)[::-1] if pooled[i] >= max(pooled[max(i - 1, 0) : i + 2])]
-    best = [i for i in order[: settings.max_width_guesses] if pooled[i] > 0]
+    best = [i for i in order[:_MAX_WIDTH_GUESSES] if pooled[i] > 0]
     return [(float(np.sqrt(edges[i] * edges[i + 1])), float(pooled[i])) for i in best]
 
 
