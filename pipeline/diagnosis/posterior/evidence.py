@@ -26,9 +26,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr
 
 from pipeline.diagnosis.fits.extension import Term
@@ -66,12 +64,23 @@ class WithColumn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """The fit's own unknowns for every error model (G, ...): inverse of H, H^-1 b, log p flat in the amounts."""
+    """What the fit's own unknowns are for every error model.
+
+    ``flat`` (G,): log p flat in the amounts. ``H`` (G, p, p) in units ``scale`` (G, p) of its unknowns. ``amounts``:
+    those of the vector that no prior row states. ``move`` (G, a) of these and ``covariance`` (G, a, a).
+    """
 
     products: Products
-    inverse: Array
-    move: Array
     flat: Array
+    H: Array
+    scale: Array
+    amounts: list[int]
+    move: Array
+    covariance: Array
+
+    def moves(self, by: Array) -> Array:
+        """H^-1 of columns (G, p, k) of products."""
+        return np.asarray(np.linalg.solve(self.H, by / self.scale[..., None]) / self.scale[..., None])
 
 
 def evidence(
@@ -107,8 +116,9 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     weight = np.where(solved.products.rest, solved.flat + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
-    moved = grid.displacements[:data] @ (solved.products.moved[best] * solved.move[best, size:])
-    left = fitted.residual[:data] - fitted.jacobian[:data] @ solved.move[best, :size] - moved
+    move = solved.moves(solved.products.own[:, 1:, :1])[best, :, 0]
+    moved = grid.displacements[:data] @ (solved.products.moved[best] * move[size:])
+    left = fitted.residual[:data] - fitted.jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)
 
 
@@ -134,7 +144,9 @@ def moments(grid: ErrorGrid, fitted: Fit) -> Moments:
     """Mean and covariance of a fit's unknowns under every error model."""
     solved, size = _solved(grid, fitted, np.zeros((len(fitted.residual), 0))), fitted.extension.size
     weight = solved.flat + _amounts(fitted, solved) + solved.products.log_prior
-    return Moments(weight, solved.move[:, :size], solved.inverse[:, :size, :size], solved.products.rest)
+    b, unit = solved.products.own[:, 1:, :1], np.eye(solved.H.shape[1])[:, :size]
+    found = solved.moves(np.concatenate([b, np.broadcast_to(unit, (len(b), *unit.shape))], axis=2))[:, :size]
+    return Moments(weight, found[..., 0], found[..., 1:], solved.products.rest)
 
 
 def _total(logs: Array) -> Array:
@@ -162,35 +174,36 @@ def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
     H, b = products.own[:, 1:, 1:], products.own[:, 1:, 0]
     shown = np.einsum("gii->gi", H)
     scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    inverse, log_det = _inverses(H / scale[:, :, None] / scale[:, None, :] + ROUNDING * np.eye(H.shape[1]))
-    inverse /= scale[:, :, None] * scale[:, None, :]
-    move = np.einsum("gij,gj->gi", inverse, b)
-    log_det += 2.0 * np.sum(np.log(scale), axis=1)
-    chi2 = products.own[:, 0, 0] - np.sum(b * move, axis=1)
-    amounts = sum(not np.isfinite(term.variant.known) for term in fitted.extension.terms)
+    unit = 1.0 / scale
+    H = H * unit[:, :, None] * unit[:, None, :]
+    np.einsum("gii->gi", H)[:] += ROUNDING
+    amounts = _unknown(fitted)
+    rows = np.zeros((*b.shape, 1 + len(amounts)))
+    rows[..., 0] = b * unit
+    rows[:, amounts, np.arange(1, 1 + len(amounts))] = unit[:, amounts]
+    root = np.asarray(np.linalg.cholesky(H), dtype=np.float64)
+    half = _forward(root, rows)
+    below = np.swapaxes(half, 1, 2) @ half
+    log_det = 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
-    normal = 0.5 * amounts * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
-    flat = normal - 0.5 * (chi2 + products.log_det + log_det)
-    return _Solved(products, inverse, move, flat)
+    normal = 0.5 * len(amounts) * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
+    flat = normal - 0.5 * (products.own[:, 0, 0] - below[:, 0, 0] + products.log_det + log_det)
+    return _Solved(products, flat, H, scale, amounts, below[:, 1:, 0], below[:, 1:, 1:])
 
 
-def _inverses(matrices: Array) -> tuple[Array, Array]:
-    """Inverses (g, n, n) and log-determinants (g,) of positive definite matrices: a quarter of the work of any others.
+def _forward(root: Array, rows: Array) -> Array:
+    """Lower triangular factors (g, n, n) solved for rows (g, n, k), row by row for all at once."""
+    solved = np.empty_like(rows)
+    for j in range(rows.shape[1]):
+        known = np.einsum("gi,gik->gk", root[:, j, :j], solved[:, :j])
+        solved[:, j] = (rows[:, j] - known) / root[:, j, j, None]
+    return solved
 
-    Raises
-    ------
-    LinAlgError
-        If one is not positive definite.
-    """
-    half, pivots = np.empty_like(matrices), np.empty(matrices.shape[:2])
-    for k, matrix in enumerate(matrices):
-        root, failed = dpotrf(matrix)
-        if failed:
-            raise LinAlgError("a matrix is not positive definite")
-        pivots[k] = root.diagonal()
-        half[k] = dpotri(root)[0]  # the upper triangle; the lower one is that of the root, zero
-    half[:, np.arange(half.shape[1]), np.arange(half.shape[1])] *= 0.5
-    return half + np.swapaxes(half, 1, 2), 2.0 * np.sum(np.log(pivots), axis=1)
+
+def _unknown(fitted: Fit) -> list[int]:
+    """Positions in the vector of amounts that no prior row states."""
+    terms = zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True)
+    return [at for at, term in terms if not np.isfinite(term.variant.known)]
 
 
 def _places(fitted: Fit) -> tuple[list[int], list[float], list[float]]:
@@ -214,18 +227,13 @@ def _log_known(fitted: Fit) -> list[float]:
 
 def _amounts(fitted: Fit, solved: _Solved) -> Array:
     """Log of the factor (G,) by which the prior of the fit's own amounts changes p."""
-    extension = fitted.extension
-    own = [
-        (at, term)
-        for at, term in zip(extension.amounts_at, extension.terms, strict=True)
-        if not np.isfinite(term.variant.known)
-    ]
-    total = np.zeros(len(solved.flat))
-    for cause in {term.cause.name: term.cause for _, term in own}.values():
-        at = [k for k, term in own if term.cause is cause]
-        value = fitted.vector[at] + solved.move[:, at]
-        covariance = solved.inverse[:, at, :][:, :, at]
-        total += _size_unknown(value, covariance, cause.plausible(extension.facts), cause.sign)
+    extension, total = fitted.extension, np.zeros(len(solved.flat))
+    owner = [extension.terms[extension.amounts_at.index(at)].cause for at in solved.amounts]
+    value = fitted.vector[solved.amounts] + solved.move
+    for cause in {cause.name: cause for cause in owner}.values():
+        at = [k for k, other in enumerate(owner) if other is cause]
+        covariance = solved.covariance[:, at, :][:, :, at]
+        total += _size_unknown(value[:, at], covariance, cause.plausible(extension.facts), cause.sign)
     return total
 
 
@@ -250,10 +258,10 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
 
 def _column_gain(fitted: Fit, terms: Sequence[Term], solved: _Solved) -> Array:
     """Log of the factor (G, k) by which each further column changes p."""
-    u = solved.products.cross[:, 1:]
-    square, across = solved.products.square, np.sum(u * (solved.inverse @ u), axis=1)
-    precision = np.maximum(square - across, INVISIBLE * square + 1e-300)
-    score = solved.products.cross[:, 0] - np.einsum("gik,gi->gk", u, solved.move)
+    u, b = solved.products.cross[:, 1:], solved.products.own[:, 1:, 0]
+    square, moves = solved.products.square, solved.moves(u)
+    precision = np.maximum(square - np.sum(u * moves, axis=1), INVISIBLE * square + 1e-300)
+    score = solved.products.cross[:, 0] - np.einsum("gik,gi->gk", moves, b)
     amount, facts = score / precision, fitted.extension.facts
     gains = [
         log_gain(amount[:, k], 1.0 / precision[:, k], term.cause.plausible(facts), term.cause.sign)
