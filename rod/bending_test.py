@@ -22,7 +22,7 @@ Source: Secs. 3.1 and 3.2 of the paper; `table_1` is its virtual experiment.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -63,6 +63,8 @@ class BendingTest:
         Springs, Coulomb moments, rigid pieces, clamps; see `rod.support`.
     load : (2,) N/m
         Distributed dead load along x and y of the chord frame.
+    friction_by_step : (steps,) N m or None
+        Added to the Coulomb moment of both bearings step by step; the last one stays.
     compliance : m/N
         Of the rig.
     friction : InternalFriction or None
@@ -72,6 +74,8 @@ class BendingTest:
         Whether the law stays at its curvature while K0 grows; else it moves along (see `rod.section`).
     set_threshold : 1/m
         Bend from rest beyond which K0 grows.
+    grown : (steps, elements + 1) 1/m or None
+        Growth of K0 at the joints that is given step by step; the last one stays.
     zero : "natural", "loaded", "length" or m
         Distance of the axes at displacement zero.
     displacement_offset : m
@@ -89,11 +93,13 @@ class BendingTest:
     left: Support = BEARING
     right: Support = BEARING
     load: tuple[float, float] = (0.0, 0.0)
+    friction_by_step: Array | None = None
     compliance: float = 0.0
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
     law_stays: bool = False
     set_threshold: float = 0.0
+    grown: Array | None = None
     zero: Literal["natural", "loaded", "length"] | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
@@ -111,7 +117,7 @@ class BendingTest:
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
         profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
-        grows = self.plastic_rate, self.law_stays, self.set_threshold
+        grows = self.plastic_rate, self.law_stays, self.set_threshold, self.grown
         section = Section(self.characteristic, K0, profile, self.friction, *grows)
         return Rod(
             self.length,
@@ -123,6 +129,14 @@ class BendingTest:
             self.axial_stiffness,
             self.shear_stiffness,
         )
+
+    def rod_at(self, step: int) -> Rod:
+        """The rod of a step, where the bearings differ from step to step."""
+        if self.friction_by_step is None:
+            return self.rod
+        more = float(self.friction_by_step[min(step, len(self.friction_by_step) - 1)])
+        left, right = (replace(s, friction_moment=max(s.friction_moment + more, 0.0)) for s in (self.left, self.right))
+        return replace(self.rod, left=left, right=right)
 
     @cached_property
     def free(self) -> Equilibrium:
@@ -235,9 +249,8 @@ def simulate(
     memory, last, steps = test.rod.virgin, None, []
     for index, value in enumerate(values):
         start = last if starts is None else starts[index]
-        here = solve(
-            test.rod, test.hold(control, float(value)), memory=memory, start=start, branch=branch, patient=patient
-        )
+        rod, hold = test.rod_at(memory.step), test.hold(control, float(value))
+        here = solve(rod, hold, memory=memory, start=start, branch=branch, patient=patient)
         memory, last = here.after, here if here.good else None
         steps.append(here)
     return tuple(steps)

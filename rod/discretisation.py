@@ -205,6 +205,25 @@ class Rod:
         """Curvature at the joints, (n + 1,) 1/m."""
         return np.asarray((angles[:-1] - angles[1:]) / self.weights)
 
+    @cached_property
+    def shown(self) -> slice:
+        """The vertices that are shown, of n + 3: the joints, and the bearing axes where rigid pieces stand between."""
+        return slice(0 if self.edges[0] else 1, None if self.edges[-1] else -1)
+
+    def at_vertices(self, extent: Array, angles: Array, K: Array, m: Array) -> Array:
+        """Position x and y, theta, kappa and moment at the vertices shown, (5, ..., vertices); or changes of them.
+
+        From the extent of the edges (2, ..., n + 2), their angles, and curvature and moment at the joints (..., n + 1).
+        """
+        *_, theta, kappa, moment = values = np.zeros((5, *angles.shape[:-1], angles.shape[-1] + 1))
+        np.add.accumulate(extent, axis=-1, out=values[:2, ..., 1:])
+        inner = angles[..., 1:-1]
+        theta[..., 2:-2] = inner[..., :-1] + self.right_share * (inner[..., 1:] - inner[..., :-1])
+        theta[..., :2], theta[..., -2:] = angles[..., :1], angles[..., -1:]
+        kappa[..., 1:-1], moment[..., 1:-1] = K, m
+        moment[..., 0], moment[..., -1] = m[..., 0], m[..., -1]
+        return values[..., self.shown]
+
     def advanced(self, angles: Array, memory: Memory) -> Memory:
         """Memory after a step that ended with these angles."""
         relaxed, reached = self.section.advanced(self.curvature(angles), memory)
@@ -213,6 +232,7 @@ class Rod:
             reached,
             self.left.advanced(float(angles[0]), memory.left_angle),
             self.right.advanced(float(angles[-1]), memory.right_angle),
+            memory.step + 1,
         )
 
 

@@ -204,32 +204,26 @@ def _force_free(system: System) -> Trial:
 
 
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
-    """Shape at the vertices from the edge angles; the bearing axes join in where rigid pieces are."""
-    rod, angles, R = system.rod, trial.angles, trial.R
-    h, n = rod.edges, rod.edges.size
-    path, (theta, kappa, moment) = np.zeros((2, n + 1)), np.zeros((3, n + 1))
-    np.cumsum(h * system.directions(trial.balance.edge), axis=1, out=path[:, 1:])
-    theta[2:-2] = angles[1:-2] + rod.right_share * (angles[2:-1] - angles[1:-2])
-    theta[:2], theta[-2:] = angles[0], angles[-1]
-    kappa[1:-1], moment[1:-1] = trial.balance.K, trial.balance.m
-    moment[0], moment[-1] = moment[1], moment[-2]
-    keep = slice(0 if h[0] else 1, n + 1 if h[-1] else n)
+    """The equilibrium with its shape at the vertices."""
+    rod, angles, R, balance = system.rod, trial.angles, trial.R, trial.balance
+    extent = rod.edges * system.directions(balance.edge)
+    x, y, theta, kappa, moment = rod.at_vertices(extent, angles, balance.K, balance.m)
     load = rod.vertex_load
     return Equilibrium(
-        s=rod.arc_lengths[keep],
-        x=path[0, keep],
-        y=path[1, keep],
-        theta=theta[keep],
-        kappa=kappa[keep],
-        moment=moment[keep],
+        s=rod.arc_lengths[rod.shown],
+        x=x,
+        y=y,
+        theta=theta,
+        kappa=kappa,
+        moment=moment,
         force=-float(R[0]),
-        chord=float(path[0, -1]),
+        chord=float(x[-1]),
         outcome=trial.outcome,
         right_reaction=R,
         left_reaction=-R if load is None else -R - load.sum(axis=0),
         angles=angles,
         system=system,
-        balance=trial.balance,
+        balance=balance,
         after=rod.advanced(angles, system.memory),
         iterations=steps,
     )

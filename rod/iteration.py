@@ -104,7 +104,7 @@ def iterate(
         For a rod with memory or a law that is no `Characteristic`, or damping outside (0, 1].
     """
     section, law = rod.section, rod.section.law
-    if not isinstance(law, Characteristic) or section.friction is not None or section.plastic_rate:
+    if not isinstance(law, Characteristic) or section.friction is not None or section.sets:
         raise ValueError("the iterative method takes a Characteristic without friction and plastic set")
     if damping is not None and not 0.0 < damping <= 1.0:
         raise ValueError(f"damping must lie in (0, 1], got {damping}")

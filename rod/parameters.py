@@ -85,6 +85,8 @@ class Directions:
         Everything that is one number, under the names of the table; ``stick_angle_left`` and ``.._right`` beside.
     laws : list of (column, MomentCurve, MomentCurve, step)
         From which law to which the characteristic goes when that parameter grows by the step.
+    grown, rubbing : dict of column -> (steps, n), (steps,)
+        Of the set, and of the friction of both bearings, that are given step by step.
     """
 
     names: tuple[str, ...]
@@ -96,10 +98,21 @@ class Directions:
     stick: Array
     scalars: dict[str, Array] = field(default_factory=dict)
     laws: list[tuple[int, MomentCurve, MomentCurve, float]] = field(default_factory=list)
+    grown: dict[int, Array] = field(default_factory=dict)
+    rubbing: dict[int, Array] = field(default_factory=dict)
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
         return self.scalars.get(name, self.none)
+
+    def given(self, changes: dict[int, Array], step: int) -> Array:
+        """Change at a step (q, ...) of what is given step by step, `grown` or `rubbing`; (q,) zeros if nothing is."""
+        if not changes:
+            return self.none
+        every = np.zeros((len(self.names), *next(iter(changes.values())).shape[1:]))
+        for column, by_step in changes.items():
+            every[column] = by_step[min(step, len(by_step) - 1)]
+        return every
 
     @cached_property
     def none(self) -> Array:
@@ -219,8 +232,9 @@ def comparable(test: BendingTest, other: BendingTest) -> bool:
     """Whether a test can go `Toward` another: the same elements, supports and zero, friction of as many elements."""
     elements = [0 if t.friction is None else t.friction.stick.size for t in (test, other)]
     same = [(t.left.kind, t.right.kind, t.zero, t.law_stays, t.rod.elements.size) for t in (test, other)]
+    given = [(t.grown is None, t.friction_by_step is None) for t in (test, other)]
     stiffness = [(t.axial_stiffness, t.shear_stiffness, t.left.angle, t.right.angle) for t in (test, other)]
-    return elements[0] == elements[1] and same[0] == same[1] and stiffness[0] == stiffness[1]
+    return elements[0] == elements[1] and same[0] == same[1] and given[0] == given[1] and stiffness[0] == stiffness[1]
 
 
 def _go_toward(toward: Toward, made: Directions, column: int) -> None:
@@ -237,6 +251,10 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if test.friction is not None and other.friction is not None:
         made.slip[column] = (other.friction.slip - test.friction.slip)[:, 0] / step
         made.stick[column] = (other.friction.stick - test.friction.stick)[:, 0] / step
+    by_step = ((made.grown, test.grown, other.grown), (made.rubbing, test.friction_by_step, other.friction_by_step))
+    for changes, old, new in by_step:
+        if old is not None and new is not None:
+            changes[column] = (new - old) / step
     before, after = _numbers(test), _numbers(other)
     for name, value in before.items():
         if after[name] != value:

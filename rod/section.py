@@ -11,6 +11,7 @@ From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and t
   m_law(K - p, K0), as that of a cable that has been bent to another shape; or it stays at its curvature
   (``law_stays``), m_law(K, K0) - m_law(K0 + p, K0), as that of a cable whose stiffness belongs to the shape it has. For
   a law of constant stiffness both are the same.
+* A set may also be given step by step, ``grown``: where all of a sheath goes with its largest bend, say. It adds to p.
 
 Within one displacement step the response is a function of K alone with the memory of the step's start: an increment is
 a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
@@ -93,12 +94,15 @@ class Memory:
         Largest excess curvature K - K0 so far, not below zero.
     left_angle, right_angle : rad
         Angle at which the friction of each bearing is free of moment.
+    step : int
+        Number of the step that begins, where something is given step by step.
     """
 
     relaxed: Array
     reached: Array
     left_angle: float
     right_angle: float
+    step: int = 0
 
 
 class Read(NamedTuple):
@@ -129,6 +133,8 @@ class Section:
         Whether the law stays at its curvature while K0 grows.
     set_threshold : 1/m
         Bend from rest beyond which a set begins.
+    grown : (steps, n) 1/m or None
+        Set that is given step by step; the last one stays.
     """
 
     law: MomentCurve
@@ -138,6 +144,16 @@ class Section:
     plastic_rate: float = 0.0
     law_stays: bool = False
     set_threshold: float = 0.0
+    grown: Array | None = None
+
+    @property
+    def sets(self) -> bool:
+        """Whether the cable may take a set."""
+        return bool(self.plastic_rate) or self.grown is not None
+
+    def given(self, memory: Memory) -> Array | float:
+        """Set that is given at a step, (n,) 1/m."""
+        return 0.0 if self.grown is None else self.grown[min(memory.step, len(self.grown) - 1)]
 
     def rest(self) -> Array:
         """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
@@ -153,7 +169,7 @@ class Section:
     def set_at(self, K: Array, memory: Memory) -> Array:
         """Plastic set p that goes with curvature K, (n,) 1/m."""
         largest = np.maximum(memory.reached, K - self.pre_curvature)
-        return np.asarray(self.plastic_rate * (largest - self.set_threshold))
+        return np.asarray(self.plastic_rate * (largest - self.set_threshold) + self.given(memory))
 
     def rest_curvature(self, K: Array, memory: Memory) -> Array:
         """Pre-curvature with the set that goes with curvature K, (n,) 1/m."""
@@ -167,7 +183,7 @@ class Section:
 
     def response(self, memory: Memory) -> Response:
         """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
-        elastic = self._set_response(memory) if self.plastic_rate else _elastic(self)
+        elastic = self._set_response(memory) if self.sets else _elastic(self)
         if self.friction is None:
             return elastic
         stick, slip, relaxed = self.friction.stick, self.friction.slip, memory.relaxed
@@ -223,7 +239,8 @@ class Section:
         """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
         # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
         turn = np.minimum(K, self.pre_curvature + memory.reached) if self.plastic_rate else K
-        energy = self._law_energy(turn, self.plastic_rate * (memory.reached - self.set_threshold))
+        before = self.plastic_rate * (memory.reached - self.set_threshold) + self.given(memory)
+        energy = self._law_energy(turn, np.broadcast_to(before, K.shape))
         if self.plastic_rate:
             nodes, weights = np.polynomial.legendre.leggauss(12)
             k = turn + 0.5 * (K - turn) * (nodes[:, None] + 1.0)

@@ -170,7 +170,10 @@ def _step(
     dK = (dangles[:, :-1] - dangles[:, 1:]) / rod.weights + given.curvature
     extent -= border[:, None, :] * dangles
     extent += system.softened(edge, dR[:, :, None])
-    made = _derivatives(step, moves, dangles, dK, balance.tangent * dK + given.moment, _cumulated(extent), dR)
+    moment = balance.tangent * dK + given.moment
+    x, y, theta, kappa, moment = rod.at_vertices(extent, dangles, dK, moment).transpose(0, 2, 1)
+    s, chord = moves.vertices[:, rod.shown].T, extent[0].sum(axis=-1)
+    made = Derivatives(moves.names, s, x, y, theta, kappa, moment, -dR[0], chord)
     return made, _advanced(step, balance, moves, past, dangles, dK)
 
 
@@ -211,12 +214,14 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
     law, K0, move = section.law, section.rest(), moves.pre_curvature
     reads: tuple[Read, ...] = (Read(1.0, K),)
     set_move = moves.none[:, None]
-    if section.plastic_rate or moves.has("plastic_set"):
+    if section.sets or moves.has("plastic_set"):
         K0 = section.pre_curvature
         excess = np.maximum(memory.reached, K - K0) - section.set_threshold
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
         grown = grown - moves.scalar("set_threshold")[:, None]
         set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
+        if moves.grown:
+            set_move = set_move + moves.given(moves.grown, memory.step)
         reads = section.read(K, section.set_at(K, memory))
     moment: Array | float = 0.0
     for read in reads:
@@ -254,7 +259,8 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     u = (angle - (step.before.left_angle if left else step.before.right_angle)) / support.stick_angle
     moment = moves.scalar(f"end_moment_{side}") * (-1.0 if left else 1.0)
     moment = moment + moves.scalar(f"bearing_stiffness_{side}") * (angle - at_rest)
-    moment = moment + moves.scalar(f"bearing_friction_{side}") * min(1.0, max(-1.0, u))
+    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.rubbing, step.before.step)
+    moment = moment + friction * min(1.0, max(-1.0, u))
     if support.stiffness:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
         moment = moment - support.stiffness * rest
@@ -305,32 +311,6 @@ def _clamps(
             gradient[:, end] = -system.moment_scale * angle
             gradient[:, near] -= balance.tangent[end] / rod.weights[end] * angle
             gap += border[:, end][:, None] * angle
-
-
-def _derivatives(
-    step: Equilibrium, moves: Directions, dangles: Array, dK: Array, dm: Array, path: Array, dR: Array
-) -> Derivatives:
-    """The record at the vertices that the equilibrium shows."""
-    h = step.rod.edges
-    size = h.size + 1
-    theta, kappa, moment = np.zeros((3, dangles.shape[0], size))
-    theta[:, 2:-2] = dangles[:, 1:-2] + step.rod.right_share * (dangles[:, 2:-1] - dangles[:, 1:-2])
-    theta[:, :2], theta[:, -2:] = dangles[:, :1], dangles[:, -1:]
-    kappa[:, 1:-1] = dK
-    moment[:, 1:-1] = dm
-    moment[:, 0], moment[:, -1] = dm[:, 0], dm[:, -1]
-    keep = slice(0 if h[0] else 1, size if h[-1] else size - 1)
-    return Derivatives(
-        names=moves.names,
-        s=moves.vertices[:, keep].T,
-        x=path[0][:, keep].T,
-        y=path[1][:, keep].T,
-        theta=theta[:, keep].T,
-        kappa=kappa[:, keep].T,
-        moment=moment[:, keep].T,
-        force=-dR[0],
-        chord=path[0][:, -1],
-    )
 
 
 def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Past, dangles: Array, dK: Array) -> _Past:

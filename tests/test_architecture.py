@@ -53,7 +53,7 @@ INSIDE = {
     ],
     "pipeline.diagnosis.observations": [
         ("prediction", "noise", "force_noise", "work"),
-        ("common_waves",),
+        ("common_errors",),
         ("simulation", "observation"),
         ("linearised",),
     ],

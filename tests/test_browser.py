@@ -129,11 +129,22 @@ def shown(driver, selector):
     return [element for element in driver.find_elements(By.CSS_SELECTOR, selector) if element.is_displayed()]
 
 
-@pytest.mark.parametrize("page", ["cable-0/report.html", "de/report.html", "index.html"])
+@pytest.mark.parametrize("page", ["cable-0/report.html", "de/report.html", "index.html", "huge/index.html"])
 @pytest.mark.parametrize("width", [PHONE, 768, DESK])
 def test_no_sideways_scrolling(show, site, page, width):
     driver = show(f"{site}/{page}", width)
     assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_name_verdict_and_reason_of_a_row_are_read_without_scrolling_sideways(show, site, width):
+    driver = show(f"{site}/huge/index.html", width)
+    row = one(driver, "tr.unusable")
+    for selector in ("td:nth-child(2)", "td:nth-child(6)", ".why"):
+        box = row.find_element(By.CSS_SELECTOR, selector).rect
+        assert box["x"] >= 0 and box["width"] > 50 and box["x"] + box["width"] <= width, selector
+    columns = [cell.rect["y"] for cell in row.find_elements(By.CSS_SELECTOR, ".num")]
+    assert len(set(columns)) == 1
 
 
 def test_answer_fills_the_first_screen(show, site):

@@ -1,14 +1,18 @@
 """What commands say: German where it was asked for, no line wider than the terminal, who is at which stage."""
 
+import re
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
 from pipeline.batch import run_batch
 from pipeline.cli import main, speech
 from pipeline.cli.design import echo_outlook
+from pipeline.cli.group import COMMANDS
 from pipeline.diagnosis.plans.design import Plan, design
+from pipeline.messages import catalogue
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -30,6 +34,54 @@ def call(*arguments):
 def test_check_speaks_german(code, told):
     done = call("check", BROKEN / code / "specimen", "--language", "de")
     assert told in done.output and "Fehler" in done.output and "error" not in done.output
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_is_german_wherever_the_language_is_asked_for(name):
+    said = {call(*order).output for order in ([name, "--help", "--language", "de"], ["--language=de", name, "-h"])}
+    (german,) = said
+    english = call(name, "--help").output
+    assert german.startswith("Aufruf:") and english.startswith("Usage:")
+    lines = {line.strip() for line in german.splitlines() if len(re.findall("[a-zäöüß]{2,}[ .]", line)) > 2}
+    assert lines and not lines & {line.strip() for line in english.splitlines()}
+
+
+def test_the_catalogue_says_what_every_option_does_and_no_other():
+    group = click.Context(main)
+    commands = [main, *(main.get_command(group, name) for name in COMMANDS)]
+    own, shared = set(), set()
+    for command in commands:
+        own.add(f"help.{command.name}")
+        for option in command.get_params(group):
+            if isinstance(option, click.Option):
+                name = option.opts[-1].lstrip("-")
+                own.add(f"help.{command.name}.{name}")
+                shared.add(f"help.{name}")
+    told = {key for key in catalogue("en") if key.startswith("help.")}
+    assert told <= own | shared and {f"help.{name}" for name in ("main", *COMMANDS)} <= told
+    listed = call("--help", "--language", "de").output
+    assert all(catalogue("de")[f"help.{name}"][0] in listed for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "german", "english"),
+    [
+        (("runn",), "Den Befehl 'runn' gibt es nicht.", "No such command"),
+        (("run", "--foo"), "Die Angabe '--foo' gibt es nicht.", "No such option"),
+        (("predict", "x"), "Es fehlt die Angabe '--displacement-mm'.", "Missing option"),
+        (("run", "x", "--workers", "0"), "0 liegt nicht im Bereich x>=1", "0 is not in the range x>=1"),
+        (("init",), "einen Ordner FOLDER mit Fotos angeben", "give a FOLDER of photos"),
+        (("explain", "stifness_varying"), "ist stiffness_varying gemeint?", "did you mean stiffness_varying?"),
+        (("predict", "x", "--displacement-mm", "5;6"), "ist keine Liste von Zahlen", "is no list of numbers"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_wrong_use_is_told_in_the_language_asked_for(arguments, german, english):
+    done = call(*arguments, "--language", "de")
+    assert done.exit_code == 2
+    assert german in done.stderr and done.stderr.startswith("Aufruf:")
+    other = call(*arguments)
+    assert english in other.stderr and other.stderr.startswith("Usage:")
 
 
 def test_errors_of_the_command_itself_are_german_too():

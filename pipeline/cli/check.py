@@ -13,6 +13,7 @@ import click
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.run import found, nothing_found
 from pipeline.cli.speech import say, told
+from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
 
 if TYPE_CHECKING:
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
     from pipeline.settings import Settings
 
 
-@click.command(short_help="What would run and what is wrong.")
+@click.command(cls=Spoken)
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
-@click.option("--timeout", type=POSITIVE, metavar="SECONDS", help="Limit per specimen.")
-@click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
+@click.option("--timeout", type=POSITIVE, metavar="SECONDS")
+@click.option("--json", "as_json", is_flag=True)
 @language_option
 @settings_options
 @click.pass_context

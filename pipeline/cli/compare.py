@@ -11,6 +11,7 @@ import click
 from pipeline.cli.options import chosen_settings, language_option, settings_options
 from pipeline.cli.predict import echo_findings
 from pipeline.cli.speech import entry, say, told
+from pipeline.cli.spoken import Spoken
 
 if TYPE_CHECKING:
     from pipeline.compare import Comparison
@@ -18,11 +19,11 @@ if TYPE_CHECKING:
 MISSING = 3
 
 
-@click.command(short_help="Whether two results differ.")
+@click.command(cls=Spoken)
 @click.argument("a", type=click.Path(path_type=Path))
 @click.argument("b", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Everything as JSON on stdout.")
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV of the ratio with its band.")
+@click.option("--json", "as_json", is_flag=True)
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False))
 @language_option
 @settings_options
 @click.pass_context
@@ -33,13 +34,7 @@ def compare(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Say whether the results A and B differ beyond their bands.
-
-    A and B are result.json files or their folders: before and after a change, two cables, two laboratories. Only
-    curvatures that both visited are compared.
-
-    Exit codes: 0 compared, whatever came out; 3 not comparable.
-    """
+    """Say whether the results A and B differ beyond their bands."""
     from pipeline.compare import compare as compared
     from pipeline.result import read_result
 

@@ -10,6 +10,7 @@ import click
 
 from pipeline.cli.options import chosen_options, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, language, table, told
+from pipeline.cli.spoken import Spoken
 from pipeline.messages import DECIMAL, Message
 
 if TYPE_CHECKING:
@@ -18,12 +19,11 @@ if TYPE_CHECKING:
 COMPARED = 5  # places along the visited range at which f_EI is laid beside the truth
 
 
-@click.command(short_help="Measure a simulated specimen of known truth.")
+@click.command(cls=Spoken)
 @click.option(
-    "-o", "--out", default="cablebend-demo", type=click.Path(path_type=Path, file_okay=False), show_default=True,
-    help="Folder for the specimen, its truth and the results.",
-)  # fmt: skip
-@click.option("--seed", default=0, show_default=True, help="Chooses the cable, the camera and the noise.")
+    "-o", "--out", default="cablebend-demo", type=click.Path(path_type=Path, file_okay=False), show_default=True
+)
+@click.option("--seed", default=0, show_default=True)
 @language_option
 @settings_options
 @click.pass_context

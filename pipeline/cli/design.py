@@ -10,39 +10,28 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import columns, entry, language, say, table, told
+from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
 
 if TYPE_CHECKING:
     from pipeline.diagnosis.plans.design import Design
 
 
-@click.command(short_help="What a planned test could see.")
-@click.option(
-    "--length-mm", default=181.0, show_default=True, type=POSITIVE, help="Cable length between the bearing axes."
-)
-@click.option(
-    "--ei-rest", default=0.018, show_default=True, type=POSITIVE, help="Expected bending stiffness at rest, N m^2."
-)
-@click.option(
-    "--ei-far", default=0.008, show_default=True, type=POSITIVE, help="Expected bending stiffness far from rest, N m^2."
-)
-@click.option(
-    "--kc", default=4.5, show_default=True, type=POSITIVE,
-    help="Curvature over which one goes over into the other, 1/m.",
-)  # fmt: skip
-@click.option("--k0", default=2.0, show_default=True, help="Expected pre-curvature, 1/m.")
-@click.option("--steps", default=3, show_default=True, type=click.IntRange(1, 100), help="Loading steps.")
-@click.option("--step-mm", default=4.6, show_default=True, type=POSITIVE, help="Displacement of a step.")
-@click.option("--mounted/--no-mounted", default=True, show_default=True, help="Photograph the force-free cable.")
-@click.option("--unload/--no-unload", default=False, show_default=True, help="Measure the way back in the same steps.")
-@click.option("--photos/--no-photos", default=True, show_default=True, help="Photos, or forces alone.")
-@click.option("--px-per-mm", default=11.0, show_default=True, type=POSITIVE, help="Scale of the photos.")
-@click.option(
-    "--force-noise", default=0.003, show_default=True, type=POSITIVE,
-    help="Noise of a force sample, share of the largest.",
-)  # fmt: skip
-@click.option("--samples", default=8, show_default=True, type=click.IntRange(1), help="Force samples in a hold.")
-@click.option("--json", "as_json", is_flag=True, help="The outlook as JSON on stdout.")
+@click.command(cls=Spoken)
+@click.option("--length-mm", default=181.0, show_default=True, type=POSITIVE)
+@click.option("--ei-rest", default=0.018, show_default=True, type=POSITIVE)
+@click.option("--ei-far", default=0.008, show_default=True, type=POSITIVE)
+@click.option("--kc", default=4.5, show_default=True, type=POSITIVE)
+@click.option("--k0", default=2.0, show_default=True)
+@click.option("--steps", default=3, show_default=True, type=click.IntRange(1, 100))
+@click.option("--step-mm", default=4.6, show_default=True, type=POSITIVE)
+@click.option("--mounted/--no-mounted", default=True, show_default=True)
+@click.option("--unload/--no-unload", default=False, show_default=True)
+@click.option("--photos/--no-photos", default=True, show_default=True)
+@click.option("--px-per-mm", default=11.0, show_default=True, type=POSITIVE)
+@click.option("--force-noise", default=0.003, show_default=True, type=POSITIVE)
+@click.option("--samples", default=8, show_default=True, type=click.IntRange(1))
+@click.option("--json", "as_json", is_flag=True)
 @language_option
 @settings_options
 def design(

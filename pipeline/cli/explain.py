@@ -10,6 +10,7 @@ import click
 
 from pipeline.cli.options import language_option
 from pipeline.cli.speech import entry, language
+from pipeline.cli.spoken import Spoken, wrong_use
 
 if TYPE_CHECKING:
     from pipeline.report.words import Words
@@ -18,15 +19,11 @@ if TYPE_CHECKING:
 LABEL = re.compile(r"\w[\w ]{,16}: +")
 
 
-@click.command(short_help="What a cause or a message is and what to do.")
+@click.command(cls=Spoken)
 @click.argument("name", required=False)
 @language_option
 def explain(name: str | None) -> None:
-    """Explain a cause of deviations, or the code of a message.
-
-    NAME is a cause such as bearing_friction, or the code that stands beside a message, such as photo/blur. Without NAME
-    all causes are listed, with `codes` all codes.
-    """
+    """Explain a cause of deviations, or the code of a message."""
     from pipeline.diagnosis.causes import CATALOGUE
     from pipeline.report.words import Words, documented_codes
 
@@ -45,8 +42,9 @@ def explain(name: str | None) -> None:
         meant = words.code(name)
         if meant is None:
             near = get_close_matches(name, (*causes, *codes), n=1)
-            hint = f"; did you mean {near[0]}?" if near else ": `explain` lists all causes, `explain codes` all codes."
-            raise click.BadParameter(f"no cause and no code is called {name!r}{hint}")
+            raise (
+                wrong_use("cli.no-name-near", name=name, near=near[0]) if near else wrong_use("cli.no-name", name=name)
+            )
         click.echo("\n".join((name, *map(_line, meant))))
 
 

@@ -11,7 +11,9 @@ from typing import Any
 import click
 
 from pipeline import __version__
+from pipeline.cli.options import language_option
 from pipeline.cli.speech import note, refuse
+from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import Message
 from pipeline.threads import one_thread
@@ -34,7 +36,7 @@ COMMANDS = (
 INTERRUPTED = 130
 
 
-class Commands(click.Group):
+class Commands(Spoken, click.Group):
     """Commands found by name in their modules; a file that cannot be used is one sentence and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -53,6 +55,10 @@ class Commands(click.Group):
         try:
             with _ended_alike():
                 return super().invoke(ctx)
+        except click.UsageError as error:
+            with (error.ctx or ctx).scope(cleanup=False):  # click itself says it when the language is forgotten
+                error.show()
+            ctx.exit(error.exit_code)
         except InputError as error:
             refuse(error)
             ctx.exit(2)
@@ -79,12 +85,7 @@ def _ended_alike() -> Iterator[None]:
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="cablebend")
+@language_option
 def main() -> None:
-    """Bending stiffness characteristic of cables from photos and forces.
-
-    A specimen is a folder with specimen.toml, a force log and photos; `cablebend init FOLDER` writes the first for you.
-
-    Exit codes: 0 all measured; 1 finished, but a specimen failed; 2 usage or configuration; 3 nothing could be
-    measured; 130 interrupted, the same command resumes.
-    """
+    """Bending stiffness characteristic of cables from photos and forces."""
     one_thread()

@@ -8,17 +8,15 @@ import click
 
 from pipeline.cli.options import language_option
 from pipeline.cli.speech import say
+from pipeline.cli.spoken import Spoken, wrong_use
 
 
-@click.command(short_help="Write a specimen.toml to fill in.")
+@click.command(cls=Spoken)
 @click.argument("folders", nargs=-1, type=click.Path(path_type=Path), metavar="[FOLDER]...")
-@click.option("--settings", "as_settings", is_flag=True, help="Print all settings, with default, unit and reason.")
+@click.option("--settings", "as_settings", is_flag=True)
 @language_option
 def init(folders: tuple[Path, ...], as_settings: bool) -> None:
-    """Write a commented specimen.toml to fill in into each FOLDER of photos.
-
-    With --settings print all settings as TOML instead, to be saved and given to `cablebend run --settings FILE`.
-    """
+    """Write a commented specimen.toml to fill in into each FOLDER of photos."""
     from pipeline.batch.orders import quoted
     from pipeline.intake.template import write_template
     from pipeline.settings import Settings
@@ -29,7 +27,7 @@ def init(folders: tuple[Path, ...], as_settings: bool) -> None:
         click.echo(commented_settings(Settings()))
         return
     if not folders:
-        raise click.UsageError("give a FOLDER of photos, or --settings")
+        raise wrong_use("cli.no-folder")
     for folder in folders:
         path = write_template(folder, Settings().intake)
         say("cli.fill-in", path=path, quoted=quoted(folder))

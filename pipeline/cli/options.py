@@ -22,17 +22,14 @@ SETTINGS_FILE, ASSIGNMENTS = "cablebend.settings_file", "cablebend.assignments"
 
 def settings_options(command: Command) -> Command:
     """Add ``--settings FILE`` and ``--set section.key=value``, for `chosen_settings`."""
-    told = "Settings in TOML; `cablebend init --settings` prints all with default, unit and reason."
     file = click.Path(path_type=Path, dir_okay=False, exists=True)
-    one = {"metavar": "SECTION.KEY=VALUE", "help": "Change one setting; repeatable."}
-    command = _kept("--set", "assignments", multiple=True, **one)(command)
-    return _kept("--settings", "settings_file", type=file, metavar="FILE", help=told)(command)
+    command = _kept("--set", "assignments", multiple=True, metavar="SECTION.KEY=VALUE")(command)
+    return _kept("--settings", "settings_file", type=file, metavar="FILE")(command)
 
 
 def language_option(command: Command) -> Command:
     """Add ``--language``: the language of what the command says, for `speech` and `chosen_settings`."""
-    told = "Language of reports and messages; English by default. This help is English."
-    return _kept("--language", type=click.Choice(["de", "en"]), help=told)(command)
+    return _kept("--language", type=click.Choice(["de", "en"]))(command)
 
 
 def _kept(*names: str, **look: Any) -> Callable[[Command], Command]:

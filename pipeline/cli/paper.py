@@ -6,9 +6,13 @@ from pathlib import Path
 
 import click
 
+from pipeline.cli.options import language_option
+from pipeline.cli.spoken import Spoken
 
-@click.command(short_help="The source paper's virtual experiments.")
-@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
+
+@click.command(cls=Spoken)
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False))
+@language_option
 def paper(out: Path) -> None:
     """Compute everything of the paper that needs no real cable: paper.json, paper.html and figures."""
     from pipeline.report.paper import statements, write_paper

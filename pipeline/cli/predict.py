@@ -11,6 +11,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, note, say, told
+from pipeline.cli.spoken import Spoken, wrong_use
 from pipeline.messages import Message
 
 if TYPE_CHECKING:
@@ -25,25 +26,19 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
     try:
         return [float(number) for text in texts for number in text.split(",")]
     except ValueError as error:
-        raise click.BadParameter(f"{' '.join(texts)!r} is no list of numbers such as 5,10,15.") from error
+        raise wrong_use("cli.no-list", text=" ".join(texts)) from error
 
 
-@click.command(short_help="Forces and shapes of a new experiment.")
+@click.command(cls=Spoken)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option(
-    "--displacement-mm", "displacements_mm", required=True, multiple=True, callback=millimetres,
-    metavar="MM[,MM...]", help="Displacement of each step; repeatable.",
-)  # fmt: skip
-@click.option("--length-mm", type=POSITIVE, help="Cable length; that of the specimen.")
-@click.option(
-    "--zero", default="natural", show_default=True, type=click.Choice(["natural", "length"]),
-    help="Displacement is counted from the mounted, force-free cable, or from the chord that equals the length.",
-)  # fmt: skip
-@click.option("--extrapolate", is_flag=True, help="Compute steps beyond the visited curvatures too, and mark them.")
-@click.option("--json", "as_json", is_flag=True, help="Everything as JSON on stdout.")
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV of forces and shapes with bands."
+    "--displacement-mm", "displacements_mm", required=True, multiple=True, callback=millimetres, metavar="MM[,MM...]"
 )
+@click.option("--length-mm", type=POSITIVE)
+@click.option("--zero", default="natural", show_default=True, type=click.Choice(["natural", "length"]))
+@click.option("--extrapolate", is_flag=True)
+@click.option("--json", "as_json", is_flag=True)
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False))
 @language_option
 @settings_options
 @click.pass_context
@@ -57,14 +52,7 @@ def predict(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Predict forces and shapes of a new experiment by the model identified in RESULT.
-
-    RESULT is a result.json or its folder. Steps that bend the cable more than it was ever bent are refused.
-
-    A result that is not usable is refused: its numbers are none of the cable's.
-
-    Exit codes: 0 all steps predicted; 1 some were refused; 3 nothing could be predicted.
-    """
+    """Predict forces and shapes of a new experiment by the model identified in RESULT."""
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
 
@@ -76,7 +64,7 @@ def predict(
         note(Message("sentences", sentences=[unusable]))
         ctx.exit(MISSING)
     if length_mm is None and measured.specimen.length_m is None:
-        raise click.UsageError("the result tells no length: give --length-mm")
+        raise wrong_use("cli.no-length")
     try:
         prediction = predicted(
             measured,
@@ -89,7 +77,7 @@ def predict(
     except ValueError as error:
         raise click.UsageError(f"{error}.") from error
     except ArithmeticError as error:
-        raise click.UsageError(f"the numbers of {result} are none of a cable ({error}).") from error
+        raise wrong_use("cli.no-cable", path=result, why=str(error)) from error
     if prediction is None:
         note(Message("prediction.no-curve", name=name))
         ctx.exit(MISSING)

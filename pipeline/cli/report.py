@@ -8,11 +8,12 @@ import click
 
 from pipeline.cli.options import chosen_settings, language_option, settings_options
 from pipeline.cli.speech import refuse, told
+from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import Message
 
 
-@click.command(short_help="Draw reports again without measuring.")
+@click.command(cls=Spoken)
 @click.argument("out", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @language_option
 @settings_options

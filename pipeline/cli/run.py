@@ -11,6 +11,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, language_option, settings_options
 from pipeline.cli.speech import entry, note, refuse, say, told
+from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import UNREADABLE, Message
 
@@ -19,18 +20,14 @@ if TYPE_CHECKING:
     from pipeline.settings import IntakeSettings
 
 
-@click.command(short_help="Measure specimens and write their reports.")
+@click.command(cls=Spoken)
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
-@click.option(
-    "-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the results."
-)
-@click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine; one a core by default.")
-@click.option("--scheduler", metavar="ADDRESS", help="Measure on the dask cluster with this scheduler.")
-@click.option("--timeout", type=POSITIVE, metavar="SECONDS", help="Limit per specimen.")
-@click.option(
-    "--no-reports", is_flag=True, help="Leave report.html and report.pdf out; the same command without this draws them."
-)
-@click.option("--json", "as_json", is_flag=True, help="Results as JSON on stdout.")
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False))
+@click.option("--workers", type=click.IntRange(min=1))
+@click.option("--scheduler", metavar="ADDRESS")
+@click.option("--timeout", type=POSITIVE, metavar="SECONDS")
+@click.option("--no-reports", is_flag=True)
+@click.option("--json", "as_json", is_flag=True)
 @language_option
 @settings_options
 @click.pass_context
@@ -44,11 +41,7 @@ def run(
     no_reports: bool,
     as_json: bool,
 ) -> None:
-    """Measure specimens and write their reports.
-
-    FOLDER is a specimen or any folder above specimens. What was measured before with the same inputs, settings and
-    program is kept, so the same command resumes an interrupted run.
-    """
+    """Measure specimens and write their reports."""
     from pipeline.batch import Store, run_batch
     from pipeline.cli.progress import progress
 

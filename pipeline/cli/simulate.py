@@ -9,6 +9,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, language_option
 from pipeline.cli.speech import say
+from pipeline.cli.spoken import Spoken
 
 
 def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Any]:
@@ -26,34 +27,21 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
         raise click.BadParameter(f"{error}.") from error
 
 
-@click.command(short_help="A virtual experiment as a specimen folder.")
+@click.command(cls=Spoken)
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--hide", "effects", multiple=True, metavar="NAME=VALUE[,VALUE]", callback=effect)
+@click.option("--length-mm", default=181.0, show_default=True, type=POSITIVE)
+@click.option("--diameter-mm", default=4.6, show_default=True, type=POSITIVE)
+@click.option("--ei-rest", "EI0", default=0.018, show_default=True, type=POSITIVE)
+@click.option("--ei-far", "EI1", default=0.0075, show_default=True, type=POSITIVE)
+@click.option("--kc", default=4.5, show_default=True, type=POSITIVE)
+@click.option("--k0", "K0", default=2.0, show_default=True)
 @click.option(
-    "--hide", "effects", multiple=True, metavar="NAME=VALUE[,VALUE]", callback=effect,
-    help="Hide a cause, as `cablebend explain` names them; repeatable.",
-)  # fmt: skip
-@click.option(
-    "--length-mm", default=181.0, show_default=True, type=POSITIVE, help="Cable length between the bearing axes."
+    "--protocol", "plan", default="loading", show_default=True, type=click.Choice(["three", "loading", "unloading"])
 )
-@click.option("--diameter-mm", default=4.6, show_default=True, type=POSITIVE, help="Diameter of the cable.")
-@click.option(
-    "--ei-rest", "EI0", default=0.018, show_default=True, type=POSITIVE, help="Bending stiffness at rest, N m^2."
-)
-@click.option(
-    "--ei-far", "EI1", default=0.0075, show_default=True, type=POSITIVE, help="Bending stiffness far from rest, N m^2."
-)
-@click.option(
-    "--kc", default=4.5, show_default=True, type=POSITIVE,
-    help="Curvature at which it changes from one to the other, 1/m.",
-)  # fmt: skip
-@click.option("--k0", "K0", default=2.0, show_default=True, help="Pre-curvature, 1/m.")
-@click.option(
-    "--protocol", "plan", default="loading", show_default=True, type=click.Choice(["three", "loading", "unloading"]),
-    help="Loading steps only; mounted and loading; these and back.",
-)  # fmt: skip
-@click.option("--steps", default=6, show_default=True, type=click.IntRange(1, 200), help="Loading steps.")
-@click.option("--step-mm", default=2.3, show_default=True, type=POSITIVE, help="Displacement of a step.")
-@click.option("--seed", default=0, show_default=True, help="Chooses the noise.")
+@click.option("--steps", default=6, show_default=True, type=click.IntRange(1, 200))
+@click.option("--step-mm", default=2.3, show_default=True, type=POSITIVE)
+@click.option("--seed", default=0, show_default=True)
 @language_option
 def simulate(
     folder: Path,

@@ -11,7 +11,8 @@ import numpy as np
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import Result, leading, trusted
-from pipeline.result.headline import opening, refusal
+from pipeline.result.answer import refusal
+from pipeline.result.headline import opening
 from pipeline.settings import ReportSettings
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -40,6 +41,8 @@ class FirstScreen:
     pre_curvatures : tuple of (way, value ± std)
     hidden : tuple of str
         What could hide in the data and would change f_EI by more than its band.
+    doubt : str
+        What the bands leave open.
     """
 
     sentence: str
@@ -50,6 +53,7 @@ class FirstScreen:
     tone: str
     pre_curvatures: tuple[tuple[str, str], ...]
     hidden: tuple[str, ...] = ()
+    doubt: str = ""
 
 
 def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
@@ -76,6 +80,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
             for way, (value, std) in _all_pre_curvatures(result).items()
         ),
         hidden=_hidden(result, words, settings),
+        doubt=words("band_unexplained") if diagnosis and diagnosis.verdict == "unexplained" else "",
     )
 
 
@@ -89,7 +94,7 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
     if curve is None or diagnosis is None:
         return ()
     band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
-    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.blind_spots]
+    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.could_hide]
     worst = sorted((one for one in spots if one[0] > band), key=lambda one: -one[0])[:MOST_HIDDEN]
     return tuple(
         words(

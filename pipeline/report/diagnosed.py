@@ -10,7 +10,7 @@ from pipeline.report import maps, ranking
 from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import residual_map, titled
 from pipeline.report.words import Words
-from pipeline.result import CauseRow, DiagnosisPart, NextExperiment, ResidualMap, Result
+from pipeline.result import CauseRow, DiagnosisPart, NextExperiment, ResidualMap, Result, TwinPart
 from pipeline.settings import ReportSettings
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
@@ -72,7 +72,7 @@ def diagnosis_view(
                 bias=words.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), SHARE_DIGITS),
                 settled=words.settled(spot.name),
             )
-            for spot in part.blind_spots
+            for spot in part.could_hide
         ],
         next_what=words.said(following.said).sentence if following else "",
         next_separates=_separates(following, words) if following else "",
@@ -100,15 +100,27 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
         if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
             share = words("does_not_suffice")
-        twins = [words.cause(name) for name in cause.class_ if name != cause.name]
-        tail = f"; {words('same_class', names=', '.join(twins))}" if twins else ""
-        line = f"{words.cause(cause.name)}: {estimate} ({share}){tail}"
-        for twin in cause.twins:
-            chance = words.number(100.0 * twin.probability, SHARE_DIGITS)
-            said = {"name": words.cause(twin.name), "share": chance, "settled": words.settled(twin.name)}
-            line += f"; {words('fits_too', **said)}"
+        line = f"{words.cause(cause.name)}: {estimate} ({share})"
+        settled = {twin.name: twin for twin in cause.twins}
+        alike = [name for name in cause.class_ if name != cause.name]
+        fitting = [name for name in settled if name not in cause.class_]
+        for key, names in (("same_class", alike), ("fits_too", fitting[:LIKELIEST])):
+            if names:
+                line += f"; {words(key, names=', '.join(_twin(name, settled.get(name), words) for name in names))}"
         named.append(NamedCause(line, *words.about(cause.name)))
     return named
+
+
+LIKELIEST = 3
+"""Other names that are told where no more than noise is left by them; all are in result.json."""
+
+
+def _twin(name: str, twin: TwinPart | None, words: Words) -> str:
+    """Another name for a cause; how likely it is and what settles it, where it was tried."""
+    if twin is None:
+        return words.cause(name)
+    share = words.number(100.0 * twin.probability, SHARE_DIGITS)
+    return words("other_name", name=words.cause(name), share=share, settled=words.settled(name))
 
 
 def _gain(part: DiagnosisPart, words: Words) -> list[str]:

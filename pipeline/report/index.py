@@ -185,7 +185,8 @@ DATA = "\N{OBJECT REPLACEMENT CHARACTER}data\N{OBJECT REPLACEMENT CHARACTER}"
 
 
 def _verdict(row: IndexRow) -> str:
-    return "fault" if row.state == "unusable" else row.verdict
+    """What was found; a verdict on a model that nothing was measured with is none."""
+    return {"unusable": "fault", "failed": "none"}.get(row.state, row.verdict)
 
 
 def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
@@ -212,7 +213,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
 
 def _causes(row: IndexRow, words: Words) -> str:
     """The causes that were named, and the names that cannot be told from them; where none suffices, nothing."""
-    if row.verdict not in ("named", "class", "two_causes"):
+    if _verdict(row) not in ("named", "class", "two_causes"):
         return ""
     named = f" {words('and')} ".join(words.cause(name) for name in row.causes)
     return f" {words('or')} ".join((named, *(words.cause(name) for name in row.twins)))

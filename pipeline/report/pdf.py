@@ -104,7 +104,7 @@ def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
     settings = settings or ReportSettings()
     words = Words(settings.language)
     with style(SMALL):
-        sheets = [_answer_sheet(result, words, settings)]
+        sheets = [answer_sheet(result, words, settings)]
         if result.steps or curves(result):
             sheets.append(_mechanics_sheet(result, words, settings))
         view = diagnosis_view(result, words, settings, figures=False)
@@ -130,19 +130,23 @@ def _head(result: Result) -> str:
     return " · ".join(part for part in (result.specimen.id, result.specimen.description.get("type", "")) if part)
 
 
-def _answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
+def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
     """Answer, main figure, adequacy, agreement, K0 three ways, what to do next, warnings."""
     sheet, said = Sheet(_head(result)), first_screen(result, words, settings)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
         figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words, settings)
         sheet.text(words("convention", coverage=words.number(100.0 * settings.band_coverage)), color=LIGHT["muted"])
+        if said.doubt:
+            sheet.text(said.doubt, bold=True)
     parts = [("what_next", said.advice)]
     if result.status != "failed":
         parts += [
             ("adequate", f"{said.verdict[:1].upper()}{said.verdict[1:]}. {said.model}" if said.verdict else said.model),
             ("two_ways", said.agreement),
         ]
+    if said.hidden:
+        parts.append(("hidden_here", " ".join(f"{line[:1].upper()}{line[1:]}" for line in said.hidden)))
     for title, text in parts:
         sheet.text(words(title), bold=True)
         sheet.text(text)

@@ -150,8 +150,16 @@ def answer_of(result: Result) -> Answer:
     fault = data_fault(result, curve)
     if curve is None:
         first = next((f.said for f in result.findings if f.level == "error"), Message("answer.none"))
-        return Answer(False, fault or first, None)
+        return Answer(False, fault or refusal(result) or first, None)
     return Answer(fault is None, fault or _why(result, curve.method), curve)
+
+
+def refusal(result: Result) -> Message | None:
+    """Why the first photo was refused, if all of them were."""
+    photos = result.photos
+    if not photos or not all(photo.reason for photo in photos):
+        return None
+    return Message("photos.one", image=photos[0].image, said=photos[0].said)
 
 
 def _why(result: Result, method: str) -> Message:

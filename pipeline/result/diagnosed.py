@@ -203,3 +203,9 @@ class DiagnosisPart(SaidPart):
     left_out_photos: list[int] = Field([], description="steps whose photo contradicts all else; a finding says why")
     left_out_forces: list[int] = Field([], description="steps whose force contradicts all else")
     corrected_forces: list[ForceCorrectionPart] = Field([], description="forces that both ways use as corrected")
+
+    @property
+    def could_hide(self) -> list[BlindSpot]:
+        """Blind spots but for causes that were found: those are in the answer."""
+        found = {name for cause in self.causes for name in cause.class_}
+        return [spot for spot in self.blind_spots if self.verdict == "unexplained" or spot.name not in found]

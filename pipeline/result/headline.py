@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from pipeline.messages import Message
-from pipeline.result.answer import leading
+from pipeline.result.answer import leading, refusal
 from pipeline.result.visited import Visited
 from pipeline.result.whole import Result
 
@@ -38,14 +38,6 @@ def headline(result: Result) -> Message:
         key = "opening.agree" if agreement.compatible else "opening.disagree"
         said.append(Message(key, rms=agreement.rms_relative))
     return Message("sentences", sentences=said if diagnosis is None else [*said, diagnosis.said])
-
-
-def refusal(result: Result) -> Message | None:
-    """Why the first photo was refused, if all of them were."""
-    photos = result.photos
-    if not photos or not all(photo.reason for photo in photos):
-        return None
-    return Message("photos.one", image=photos[0].image, said=photos[0].said)
 
 
 def _unmeasured(result: Result) -> Message:

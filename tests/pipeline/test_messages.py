@@ -30,6 +30,8 @@ MADE = (
     "photo/outlier",
     "force/outlier",
     "cli.",
+    "help.",
+    "click.",
     "plan.",
 )
 

@@ -27,6 +27,7 @@ EVERYTHING = replace(
     right=Support(stiffness=1e-3, friction_moment=2e-4),
     friction=InternalFriction(1e-3, 1.5),
     plastic_rate=0.05,
+    grown=np.full((2, 31), 0.2),
 )
 
 

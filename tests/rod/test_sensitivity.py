@@ -247,6 +247,27 @@ def beside(name: str) -> Vary:
     return vary
 
 
+GIVEN = replace(
+    EVERYTHING,
+    friction=None,
+    plastic_rate=0.0,
+    left=Support(stiffness=2e-3),
+    right=Support(rigid_length=3e-3),
+    grown=np.outer([0.0, 0.1, 0.25, 0.4, 0.4, 0.4], np.sin(np.pi * XI)),
+)
+
+
+def given_set(test: BendingTest, h: float) -> BendingTest:
+    return replace(test, grown=test.grown + h * np.outer(np.arange(6.0), BASIS))
+
+
+RUBBING = replace(EVERYTHING, friction=None, plastic_rate=0.0, friction_by_step=1e-4 * np.array([0, 1, -1, 2, 1, -1.0]))
+
+
+def rubbing(test: BendingTest, h: float) -> BendingTest:
+    return replace(test, friction_by_step=test.friction_by_step + h * np.array([0, 1, 2, -1, 1, 3.0]))
+
+
 def stick_angles(test: BendingTest, h: float) -> BendingTest:
     ends = [replace(s, stick_angle=s.stick_angle + h) for s in (test.left, test.right)]
     return replace(test, left=ends[0], right=ends[1])
@@ -264,6 +285,9 @@ def inner_knot(test: BendingTest, h: float) -> BendingTest:
         (BESIDE, beside("stick_curvature"), 3e-4),
         (stick_angles(EVERYTHING, 0.03), stick_angles, 3e-5),
         (EVERYTHING, inner_knot, 1e-3),
+        (GIVEN, given_set, 3e-4),
+        (RUBBING, rubbing, 3e-6),
+        (replace(GIVEN, law_stays=True), given_set, 3e-4),
     ],
 )
 def test_toward_what_has_no_name(test: BendingTest, vary: Vary, h: float) -> None:

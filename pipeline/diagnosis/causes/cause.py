@@ -35,6 +35,8 @@ class Variant:
         otherwise than in proportion looks elsewhere when it is large.
     power : float
         Power of the amount with which its trace grows.
+    of_law : bool
+        Whether a law of any form takes this form of the cause over: the data cannot tell them apart.
     known : float
         Multiple of the usual amount that is the standard deviation of what is known of the amount beforehand; infinite
         where nothing is.
@@ -50,6 +52,7 @@ class Variant:
     trace: float = 1.0
     power: float = 1.0
     known: float = np.inf
+    of_law: bool = False
 
     @property
     def has_place(self) -> bool:

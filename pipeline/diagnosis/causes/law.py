@@ -2,7 +2,8 @@
 
 nonlinear_stiffness  the law of the base model may have any form; a cause in the paper's own two steps alone
 hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
-plastic_set          K0 grows with the largest curvature reached; the law moves along or stays (see `rod.section`)
+plastic_set          K0 grows with the largest curvature reached, where it was reached; the law moves along or stays
+                     (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all
 stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
 
 Where nothing but the cable resists, moments multiplied alike multiply the force and leave the shapes as they were.
@@ -67,11 +68,20 @@ class Hysteresis:
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Elements that slip after some share of the range of curvatures; a round loop is a sum of them."""
+        """Elements that slip after some share of the range of curvatures; a round loop is a sum of them.
+
+        On loading alone they are part of the law.
+        """
         # what has not slipped over the whole range is elastic, and no other than the law itself
         reach = (0.01 * facts.curvature_scale, 0.9 * facts.curvature_scale)
         return tuple(
-            Variant("with a sharp corner", at=share * facts.curvature_scale, tuned=("at",), at_range=reach)
+            Variant(
+                "with a sharp corner",
+                at=share * facts.curvature_scale,
+                tuned=("at",),
+                at_range=reach,
+                of_law=not facts.returns,
+            )
             for share in (0.05, 0.12, 0.25, 0.5, 0.8)
         )
 
@@ -79,6 +89,15 @@ class Hysteresis:
         """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is."""
         friction = InternalFriction(max(amount, 0.0), variant.at, 1, beside=model.bending.friction)
         return replace(model, bending=replace(model.bending, friction=friction))
+
+
+FORMS = (
+    "with a law that moves along",
+    "with a law that stays",
+    "alike all along the cable",
+    "in a half sine along the cable",
+)
+"""How K0 grows: where the cable bends, by ``at`` 0 and 1; or by the largest bend anywhere."""
 
 
 @dataclass(frozen=True)
@@ -98,21 +117,26 @@ class PlasticSet:
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """The law moves along with the new rest, or (``at`` 1) stays; from the first bend on, or beyond ``width``.
+        """Where the cable bends, the law moving along with the new rest or not; or all along with the largest bend.
 
-        On loading alone a threshold is part of the law: a law of any form follows it.
+        From the first bend on, or beyond ``width``. On loading alone a set where the cable bends is part of the law.
         """
         threshold = 0.3 * facts.curvature_scale
         late = Variant(width=threshold, tuned=("width",), width_range=(0.0, 3.0 * threshold))
         return tuple(
-            replace(form, label=label, at=at)
-            for form in ((Variant(), late) if facts.returns else (Variant(),))
-            for label, at in (("with a law that moves along", 0.0), ("with a law that stays", 1.0))
+            replace(form, label=FORMS[at], at=float(at), of_law=at < 2 and not facts.returns)
+            for at in range(len(FORMS) if len(facts.bends) else 2)
+            for form in (Variant(), late)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let ``amount`` of the largest excess curvature beyond the threshold stay."""
         threshold = max(variant.width, 0.0)
+        if variant.at > 1.5 and len(facts.bends):
+            bends = amount * np.maximum(facts.bends - threshold, 0.0)
+            at = np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
+            along = np.ones_like(at) if variant.at < 2.5 else np.sin(np.pi * at)
+            return replace(model, bending=replace(model.bending, grown=np.outer(bends, along)))
         grows = replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5, set_threshold=threshold)
         return replace(model, bending=grows)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.causes.cause import PLAIN, Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
@@ -44,12 +44,32 @@ class BearingFriction:
         return (Variant("that slips at once"), yielding)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0."""
+        """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
+
+        A form of `by_step` adds ``amount`` at the step ``at``.
+        """
         bending = model.bending
+        if np.isfinite(variant.known):
+            more = amount * np.eye(len(facts.branch))[int(variant.at)]
+            before = 0.0 if bending.friction_by_step is None else bending.friction_by_step
+            return replace(model, bending=replace(bending, friction_by_step=before + more))
         angle = variant.at or bending.left.stick_angle
         left = replace(bending.left, friction_moment=amount, stick_angle=angle)
         right = replace(bending.right, friction_moment=amount, stick_angle=angle)
         return replace(model, bending=replace(bending, left=left, right=right))
+
+
+SCATTER = 0.3
+"""Of a bearing's friction: standard deviation from step to step. Dry friction scatters so between slides alike."""
+
+
+def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:
+    """Forms in which a cause of some amount differs from step to step; empty for causes that do not."""
+    if not isinstance(cause, BearingFriction) or not amount > 0.0:
+        return ()
+    known = SCATTER * amount / cause.plausible(facts)
+    pushed = (k for k, branch in enumerate(facts.branch) if branch != "mounted")
+    return tuple(Variant("differing from step to step", at=float(k), known=known) for k in pushed)
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,14 @@ where they add up to one spot or one step, that is tried in their place.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import form_between
+from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
@@ -108,6 +111,26 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
             break
         fitted = simplest
     return fitted
+
+
+def differing_by_step(observation: Observation, fitted: Fit, cause: Cause) -> Fit:
+    """The model with a cause that differs from step to step, where its evidence is larger.
+
+    The amounts by which it differs are known beforehand to be about zero, so the evidence of both models compares: by
+    the chi-square, prior knowledge included, and by how much better each amount is known afterwards.
+    """
+    own = fitted.extension.terms_of(cause)
+    amount = fitted.amount(own[0])[0] if len(own) == 1 else 0.0
+    terms = tuple(Term(cause, variant) for variant in by_step(cause, amount, fitted.extension.facts))
+    if not terms:
+        return fitted
+    extension = replace(fitted.extension, terms=(*fitted.extension.terms, *terms))
+    found = fit_from(observation, extension, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
+    if found.run.prediction is None:
+        return fitted
+    known = len(terms) * np.log(terms[0].variant.known * cause.plausible(fitted.extension.facts))
+    wider = sum(sign * np.linalg.slogdet(one.covariance)[1] for sign, one in ((1, found), (-1, fitted)))
+    return found if 0.5 * (fitted.chi2 - found.chi2 + wider) > known else fitted
 
 
 def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:

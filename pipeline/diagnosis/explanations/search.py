@@ -121,6 +121,8 @@ class Search:
         found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
         if best is not None and second is not None:
             found += beside_best(bench, best, second)
+        # what the linear model promised of two causes counts no more: they were fitted
+        self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         self.add(list(self._pruned(found)))
         likelier = self.posterior.total(count=2) > sum(SHARES[2])

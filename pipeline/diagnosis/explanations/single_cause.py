@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import LEAST
-from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, with_more_forms
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, differing_by_step, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.fit import FITS, Fit
@@ -50,6 +50,7 @@ def refit_one(
             for setting, one in best.items():
                 best[setting] = _several(observation, one, kind, setting, hopeless=hopeless)
         found = min(best.values(), key=_cost, default=None)
+        found = None if found is None else differing_by_step(observation, found, kind)
     return None if found is None else explanation_of((cause,), base, found)
 
 

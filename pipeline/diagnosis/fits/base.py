@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.camera import axes_off, scaled
-from pipeline.diagnosis.fits.laws import COEFFICIENTS, AnyLaw, FewPoints, Law
+from pipeline.diagnosis.fits.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_photographed
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer
 from rod.bending_test import BendingTest
 from rod.characteristic import ParametricCurve
@@ -56,6 +56,8 @@ class Base:
     elements : int
     first : 1/m
         K0 of the first guess.
+    seen : (p + 1,) or None
+        Unknowns of the law and K0 (1/m) as the photos show them by the moment P y.
     straight : bool
         K0 is held at zero (where the machinery starts from the poorest model).
     moved : tuple of int
@@ -72,6 +74,7 @@ class Base:
     length_std: float
     elements: int
     first: float = 0.0
+    seen: Array | None = None
     straight: bool = False
     axis_std: float = 0.0
     axis_parallax_std: float = 0.0
@@ -152,6 +155,12 @@ class Base:
         axes = np.zeros(len(self.axes))
         return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, 0.0, 0.0])
 
+    def as_seen(self) -> Array:
+        """Vector of a first guess by the photos alone; the neutral one where they do not tell."""
+        if self.seen is None or self.straight:
+            return self.neutral()
+        return np.asarray(np.r_[self.seen, self.neutral()[self.law.size + 1 :]])
+
     def stiffer(self, vector: Array, factor: float) -> Array:
         """A vector of this or an extended model with all of the law so much stiffer."""
         return np.asarray(np.r_[vector[: self.law.size] + self.law.stiffer(factor), vector[self.law.size :]])
@@ -197,7 +206,7 @@ def start(
     straight: bool = False,
     exact: float = 0.0,
 ) -> Base:
-    """Base model with its first guess: a constant stiffness by regression of photographed curvature on the moment P y.
+    """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
     The law is one of any form, or a spline of ``points``. A displacement that is known to ``exact`` (m) or better has
@@ -222,11 +231,18 @@ def start(
         slope, rest = np.ptp(K) / max(float(np.max(np.abs(m))), 1e-30), 0.0
     reach = max(float(np.quantile(K, 0.995)) - rest, 0.2 * facts.curvature_scale)
     stiffness = float(1.0 / slope)
-    few = FewPoints(np.linspace(0.0, reach, points), stiffness)
-    anything = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
+    law: Law = FewPoints(np.linspace(0.0, reach, points), stiffness)
+    seen = None
+    if not points:
+        law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
+        shown = as_photographed(m, K, unit=stiffness)
+        if shown is not None:
+            law, coefficients, bend = shown
+            seen = np.r_[coefficients, bend]
     moved = tuple(np.flatnonzero(facts.displacement_std > exact).tolist())
     return Base(
-        law=few if points else anything,
+        law=law,
+        seen=seen,
         length=test.length,
         scale_std=max(test.scale_std, EXACT),
         length_std=max(test.length_std / test.length, EXACT),

@@ -36,6 +36,11 @@ class Term(NamedTuple):
         """How many numbers it has in the vector."""
         return 1 + len(self.variant.tuned)
 
+    @property
+    def sign(self) -> int:
+        """1 if its amount cannot be negative; what is known beforehand lies to both sides of zero."""
+        return 0 if np.isfinite(self.variant.known) else self.cause.sign
+
     def numbers(self, amount: float) -> Array:
         """Its numbers (size,) in the vector at an amount, the form as it is."""
         return np.array([amount, *(getattr(self.variant, name) for name in self.variant.tuned)])
@@ -121,7 +126,7 @@ class Extension:
         if not self.base.admissible(vector[: len(self.base.names)]):
             return False
         for at, term in zip(self.amounts_at, self.terms, strict=True):
-            if term.cause.sign * vector[at] < 0.0:
+            if term.sign * vector[at] < 0.0:
                 return False
             for j, name in enumerate(term.variant.tuned):
                 low, high = term.variant.range(name)
@@ -133,8 +138,8 @@ class Extension:
         """The vector (p,) with amounts of a wrong sign at zero and places at the end of the range they have left."""
         inside = vector.copy()
         for at, term in zip(self.amounts_at, self.terms, strict=True):
-            if term.cause.sign:
-                inside[at] = term.cause.sign * max(term.cause.sign * inside[at], 0.0)
+            if term.sign:
+                inside[at] = term.sign * max(term.sign * inside[at], 0.0)
             for j, name in enumerate(term.variant.tuned):
                 inside[at + 1 + j] = np.clip(inside[at + 1 + j], *term.variant.range(name))
         return inside

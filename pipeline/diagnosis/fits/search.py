@@ -75,10 +75,11 @@ class Suspicion:
         return int(own[descending(statistic)[0]])
 
 
-def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause]) -> Suspicion:
+def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, of_law: bool = False) -> Suspicion:
     """Score every form of every cause about a fitted model.
 
-    Causes that are in the model already are scored with forms of theirs only if forms may be combined.
+    Causes that are in the model already are scored with forms of theirs only if forms may be combined. What a law of
+    any form takes over is no explanation of anything; ``of_law`` asks for such forms alone.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause]) -> S
     for index, cause in enumerate(causes):
         if cause.name in present and not cause.combines:
             continue
-        for variant in cause.variants(facts):
+        for variant in (form for form in cause.variants(facts) if form.of_law == of_law):
             term = Term(cause, variant)
             amount = TRACE * variant.trace * cause.plausible(facts)
             columns.append(direction(observation, fitted, term, amount=amount))

@@ -45,8 +45,8 @@ def lasting(extension: Extension, vector: Array) -> Bounds:
     """What no cable goes beyond (m, p): the signs of amounts, the ranges of places."""
     rows, least = [], []
     for at, term in zip(extension.amounts_at, extension.terms, strict=True):
-        if term.cause.sign:
-            size = term.cause.sign * term.cause.plausible(extension.facts)
+        if term.sign:
+            size = term.sign * term.cause.plausible(extension.facts)
             rows.append(np.eye(1, extension.size, at)[0] / size)
             least.append(-vector[at] / size)
         for j, name in enumerate(term.variant.tuned, start=at + 1):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.base import Base, start
+from pipeline.diagnosis.fits.extended import stiffness_change_linear
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import FITS, ITERATIONS, Fit, fit, fit_from
 from pipeline.diagnosis.fits.laws import AnyLaw
@@ -51,6 +52,8 @@ class Workbench:
     observation : Observation
     base : Fit
     suspicion : Suspicion
+    in_law : Suspicion
+        Forms of causes that the law takes over.
     maxima : (draws,)
         Sorted null distribution of the largest statistic.
     limit : float
@@ -62,6 +65,7 @@ class Workbench:
     observation: Observation
     base: Fit
     suspicion: Suspicion
+    in_law: Suspicion
     maxima: Array
     limit: float
 
@@ -69,6 +73,16 @@ class Workbench:
     def largest(self) -> float:
         """Largest admissible statistic."""
         return float(self.suspicion.statistic.max(initial=0.0))
+
+    def shown(self, cause: int) -> Suspicion:
+        """Scores of a cause in forms that can be told from the law; in others where it has no such form."""
+        return self.suspicion if self.suspicion.of(cause).size else self.in_law
+
+    def stiffness_bias(self, cause: int) -> float:
+        """Relative change of f_EI by a cause of plausible size, in the form that changes it most; 0 without forms."""
+        columns = np.hstack([one.columns[:, one.of(cause)] for one in (self.suspicion, self.in_law)])
+        size = self.suspicion.causes[cause].plausible(self.facts)
+        return float(stiffness_change_linear(self.base, columns, np.array(size)).max(initial=0.0))
 
 
 def prepare(
@@ -112,14 +126,19 @@ def prepare(
         # laid along itself the law moves a little, and a cable that was about to snap over may do so
         again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))
         fitted = next((found for found in again if found.run.prediction is not None), fitted)
-    suspicion = suspect(observation, fitted, causes)
-    return scored(test, observation, fitted, suspicion, settings)
+    return scored(test, observation, fitted, causes, settings)
 
 
 def scored(
-    test: MeasuredTest, observation: Observation, fitted: Fit, suspicion: Suspicion, settings: DiagnosisSettings
+    test: MeasuredTest,
+    observation: Observation,
+    fitted: Fit,
+    causes: Sequence[Cause],
+    settings: DiagnosisSettings,
 ) -> Workbench:
-    """The workbench of a fitted model: null distribution and threshold of its family of scores."""
+    """The workbench of a fitted model: all causes scored, null distribution and threshold of these scores."""
+    fitted = replace(fitted, extension=replace(fitted.extension, facts=_with_bends(fitted)))
+    suspicion, in_law = (suspect(observation, fitted, causes, of_law=of_law) for of_law in (False, True))
     maxima = null_maxima(
         suspicion.scores.unit,
         suspicion.sign,
@@ -128,7 +147,14 @@ def scored(
         estimated=observation.estimated(len(fitted.residual)),
     )
     limit = threshold(maxima, settings.false_alarm)
-    return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, maxima, limit)
+    return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, in_law, maxima, limit)
+
+
+def _with_bends(fitted: Fit) -> Facts:
+    """The facts with the largest bend that the cable had reached at each step by the fitted model."""
+    rest = fitted.extension.base.pre_curvature(fitted.vector)
+    bends = [float(step.kappa.max()) - rest for step in fitted.run.steps]
+    return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])
 
 
 def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
@@ -136,11 +162,13 @@ def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
     best: Fit | None = None
     shift = 0.1 * facts.curvature_scale
     freedom = observation.rows.count - len(base.names)
-    for stiffness, bend in ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift)):
+    neutral = ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift))
+    starts = [base.neutral(stiffness=stiffness, bend=bend) for stiffness, bend in neutral]
+    for vector in (base.as_seen(), *starts):
         found = fit(
             observation,
             Extension(base, facts),
-            base.neutral(stiffness=stiffness, bend=bend),
+            vector,
             iterations=2 * ITERATIONS,
         )
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):

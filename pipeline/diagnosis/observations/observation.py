@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.observations.common_waves import CommonWaves, common_waves
+from pipeline.diagnosis.observations.common_errors import CommonErrors, common_errors
 from pipeline.diagnosis.observations.force_noise import common_rounding, force_noise
 from pipeline.diagnosis.observations.noise import (
     PhotoNoise,
@@ -119,7 +119,7 @@ class Observation:
         Freedom of each step's ``force_std``, where each has a level of its own; else empty.
     force_common : tuple of float
         Error (N) of each step that all its samples have alike (rounding, see `force_noise`); empty where there is none.
-    common : CommonWaves or None
+    common : CommonErrors or None
         What all photos err alike.
     photos : tuple of PhotoData
     photo_noise : PhotoNoise
@@ -138,7 +138,7 @@ class Observation:
     added: Array | float = 0.0
     force_own: tuple[float, ...] = ()
     force_common: tuple[float, ...] = ()
-    common: CommonWaves | None = None
+    common: CommonErrors | None = None
 
     def joined(self, values: Array) -> Array:
         """Values (N, ...) of rows whitened photo by photo, with what all photos err alike."""
@@ -216,7 +216,7 @@ def observe(
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
     rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
-    alike = common_waves([photo.sections for photo in photos], [photo.whiten for photo in photos])
+    alike = common_errors([photo.sections for photo in photos], [photo.whiten for photo in photos])
     rounding = tuple(common_rounding(test.steps, level.std).tolist())
     observed = Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, common=alike)
     return replace(observed, force_own=level.own, force_common=rounding)

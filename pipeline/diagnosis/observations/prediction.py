@@ -10,7 +10,7 @@ load cell that drifts, a camera that looks askew. A cause changes either of the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,8 @@ class Facts:
         Largest force, and largest force times bow.
     curvature_scale : 1/m
         Range of the curvatures met.
+    bends : (n,) 1/m
+        Largest bend from rest up to each step, by a fitted model; empty before any is.
     rest_side : {"natural", "up", "down"}
         To which photos show the mounted cable bowed; ``natural`` without such a photo.
     """
@@ -71,6 +73,7 @@ class Facts:
     force_scale: float
     moment_scale: float
     curvature_scale: float
+    bends: Array = field(default_factory=lambda: np.zeros(0))
     rest_side: Branch = "natural"
 
     @property

@@ -134,8 +134,9 @@ def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -
         memory, last = model.bending.rod.virgin, None
         for i in index:
             start = near.steps[i] if near is not None and usable and near.steps[i].good else last
+            memory = replace(memory, step=i)
             hold = model.bending.hold("forces", 0.0) if free else model.bending.hold("displacements", displacement[i])
-            here = solve(model.bending.rod, hold, memory=memory, start=start, branch=side, patient=patient)
+            here = solve(model.bending.rod_at(i), hold, memory=memory, start=start, branch=side, patient=patient)
             counted(here.iterations)
             if not here.good:
                 return (here,)

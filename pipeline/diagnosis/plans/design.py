@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.fits.base import Base
-from pipeline.diagnosis.fits.extended import curve, stiffness_change_linear
+from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.laws import following
-from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import Facts
@@ -233,8 +232,7 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         vector,
         near=made,
     )
-    suspicion = suspect(observation, fitted, SUSPECTS)
-    return scored(test, observation, fitted, suspicion, settings)
+    return scored(test, observation, fitted, SUSPECTS, settings)
 
 
 def _table(plan: Plan, protocol: Protocol, settings: DiagnosisSettings) -> Array:
@@ -250,7 +248,7 @@ def _cause_plan(
     others: list[tuple[Protocol, Array]],
     settings: DiagnosisSettings,
 ) -> CausePlan:
-    suspicion, cause = bench.suspicion, bench.suspicion.causes[index]
+    suspicion, cause = bench.shown(index), bench.suspicion.causes[index]
     own = suspicion.of(index)
     plausible = cause.plausible(bench.facts)
     if own.size == 0:
@@ -259,8 +257,7 @@ def _cause_plan(
         )
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
-    smallest = detectable_amount(bench.observation, bench.base, suspicion, index, power=settings.power)
-    bias = stiffness_change_linear(bench.base, suspicion.columns[:, own], np.full(own.size, plausible))
+    smallest = detectable_amount(bench.observation, bench.base, bench.suspicion, index, power=settings.power)
     twin, closeness = nearest(table)
     separated = None
     if closeness[index] > settings.twin_cosine:
@@ -277,7 +274,7 @@ def _cause_plan(
         surviving_fraction=float(suspicion.scores.surviving[best]),
         nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
         twin_cosine=float(closeness[index]),
-        stiffness_bias_at_plausible_size=float(bias.max()),
+        stiffness_bias_at_plausible_size=bench.stiffness_bias(index),
         visible=smallest <= plausible,
         separated_by=separated,
     )

@@ -3,6 +3,7 @@
 A fit whitens its rows by the noise that is likeliest beforehand. What is known less well is integrated over here:
 
     slow      slow errors of a photo and errors of its bearing axes, times 0.3, 1 or 3
+    waves     errors of each photo along the cable, rough ones as below, none or up to the scatter of a section
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
     shapes    something else in the shapes, a share of the length across the cable
@@ -33,10 +34,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.noise import by_axes
+from pipeline.diagnosis.observations.common_errors import shared_light
+from pipeline.diagnosis.observations.noise import by_axes, slow_errors
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Facts
-from rod.measurement import slow_covariance
 
 Array = NDArray[np.float64]
 Forms = Callable[[Array], Array]
@@ -49,6 +50,13 @@ several standard deviations of a hold are something else: no band of f_EI may ta
 
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
+
+WAVES = {False: 0.7, True: 0.3}
+"""Whether photos have waves, with probabilities beforehand: light, ground and print that no photo tells from the cable
+move its midline by a few hundredths of a pixel, a part of what single sections scatter."""
+
+FAINTEST = 0.1
+"""Of the scatter of a section: fainter waves are none."""
 
 FORCES = (0.0, *np.geomspace(1e-3, 0.3, 5))
 """Of the largest force."""
@@ -71,12 +79,16 @@ class Spread(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A kind of something else: ``shapes`` for the first of `SLOW`, ``holds``, and pairs of positions in the sizes."""
+    """A kind of something else: ``shapes`` for the first of `SLOW`, ``holds``, and pairs of positions in the sizes.
+
+    ``noise``: it is none, but noise of the photos.
+    """
 
     shapes: tuple[Spread, ...]
     holds: Spread
     pairs: NDArray[np.int_]
     chance: float
+    noise: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +138,7 @@ class ErrorGrid:
     log_det : (slow,)
         Of the covariance that takes away.
     kinds : tuple of Kind
-        The first has nothing else.
+        Those of noise alone come first.
     displacements : (N, m)
         Whitened sensitivities to the displacements, per m.
     """
@@ -141,7 +153,7 @@ class ErrorGrid:
     @property
     def plain(self) -> ErrorGrid:
         """Without something else."""
-        return replace(self, kinds=self.kinds[:1])
+        return replace(self, kinds=tuple(kind for kind in self.kinds if kind.noise))
 
     def products(self, columns: Array, known: Array, added: Array) -> Products:
         """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k)."""
@@ -177,7 +189,7 @@ class ErrorGrid:
             square=table[:, own * (own + count) :],
             log_det=np.concatenate(log_det),
             log_prior=np.concatenate(log_prior),
-            rest=positions[:, 1] > 0,
+            rest=np.array([not kind.noise for kind in self.kinds])[positions[:, 1]],
             moved=np.zeros(grid),
             sizes=positions,
         )
@@ -252,19 +264,30 @@ def error_grid(observation: Observation, facts: Facts, displacements: Array) -> 
     every = np.array([(a, b) for a in range(len(SHAPES)) for b in range(len(FORCES))])
     none = Spread(np.zeros((0, len(photos))), np.zeros(0))
     over_steps = (_smooth_over_steps(count), np.eye(count))
-    kinds = [Kind((none,) * len(SLOW), _of_holds(observation, facts, forces, over_steps[1]), every[:1], 1.0)]
+    held = [_of_holds(observation, facts, forces, smooth) for smooth in over_steps]
+    by_power = []
     for smooth, power in zip(over_steps, (2, 1), strict=True):
         shown = _shown(observation, facts, photos, partial(_waves, power=power))
-        shapes = tuple(_of_photos(observation, photos, root, shown, smooth) for root in roots)
-        kinds.append(Kind(shapes, _of_holds(observation, facts, forces, smooth), every[1:], 1.0 / 3.0))
+        by_power.append(tuple(_of_photos(observation, photos, root, shown, smooth) for root in roots))
+    kinds = [Kind((none,) * len(SLOW), held[1], every[:1], 1.0, noise=True)]
+    if len(faint := every[_faint(observation, facts)[every[:, 0]] & (every[:, 1] == 0)]):
+        kinds = [kinds[0]._replace(chance=WAVES[False]), Kind(by_power[1], held[1], faint, WAVES[True], noise=True)]
+    kinds += [Kind(shapes, holds, every[1:], 1.0 / 3.0) for shapes, holds in zip(by_power, held, strict=True)]
     bumps = _shown(observation, facts, photos, lambda u: np.exp(-0.5 * (np.subtract.outer(u, PLACES) / WIDTH) ** 2))
     waves_and_bumps = np.hstack([_shown(observation, facts, photos, partial(_waves, power=0)), bumps])
     alone = every[(every[:, 1] == 0) & (every[:, 0] > 0)]
     for pattern in waves_and_bumps.T:
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
-        kinds.append(Kind((spread,), kinds[0].holds, alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
+        kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
     return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), displacements)
+
+
+def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
+    """Which of `SHAPES` are waves of a photo, and nothing else."""
+    scatter = np.median([np.median(photo.sections.std) for photo in observation.photos]) if observation.photos else 0.0
+    size = facts.length * np.array(SHAPES)
+    return np.asarray((size >= FAINTEST * scatter) & (size <= scatter) & (size > 0.0))
 
 
 def _waves(u: Array, *, power: int) -> Array:
@@ -324,9 +347,9 @@ def _slow_errors(observation: Observation, photos: NDArray[np.int_]) -> Array:
         own = np.flatnonzero(step == photo.step)
         sections, axes = photo.whiten[:, 1:], photo.whiten @ by_axes(photo.sections, photo.chord)
         share[np.ix_(own, own)] = (
-            sections @ slow_covariance(photo.sections.s, photo.sections.slow) @ sections.T
-            + 0.5 * photo.stated_chord_std**2 * axes @ axes.T
+            sections @ slow_errors(photo.sections) @ sections.T + 0.5 * photo.stated_chord_std**2 * axes @ axes.T
         )
     if observation.common is None:
         return share
+    share += shared_light([photo.sections for photo in observation.photos], [p.whiten for p in observation.photos])
     return observation.common.whitened(observation.common.whitened(share).T)

@@ -96,12 +96,16 @@ def widening(
 def _refits(
     grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifts: dict[tuple[int, bool], Array]
 ) -> Iterator[_Parts]:
-    """Components of the base model and of every refit, for the error models that count; some lie beside their fit."""
+    """Components of the base model and of every refit, for the error models that count; some lie beside their fit.
+
+    A cause beside something else that was weighed by the linear model alone lies about the base model as well.
+    """
     chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
     for one in posterior.believed:
         fitted = one.found.fitted if one.found else base
-        if one.probability > NEGLIGIBLE and (one.found or not one.causes):
-            chances.setdefault(id(fitted), (fitted, {}))[1][one.something_else] = one.probability
+        if one.probability > NEGLIGIBLE and (one.found or one.something_else or not one.causes):
+            chance = chances.setdefault(id(fitted), (fitted, {}))[1]
+            chance[one.something_else] = chance.get(one.something_else, 0.0) + one.probability
     for fitted, chance in chances.values():
         here, found = stated(fitted, centre.kappa), moments(grid if True in chance else grid.plain, fitted)
         for rest, probability in chance.items():

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import stiffness_change, stiffness_change_linear
+from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.detectable import detectable_amount, in_any_form
 from pipeline.diagnosis.posterior.explanation import Explanation
@@ -34,33 +35,33 @@ def table(
     bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, gain: GainPart | None
 ) -> list[CauseRow]:
     """One row for every cause, the loudest first; ``gain`` is that of the accepted explanation."""
-    suspicion, scores = bench.suspicion, bench.suspicion.scores
-    p_values = adjusted_p(suspicion.statistic, bench.maxima) if suspicion.terms else suspicion.statistic
     twin, closeness = nearest(_closeness(bench))
     refitted = {e.causes[0]: e for e in conclusion.singles}
     rows = []
-    for index, cause in enumerate(suspicion.causes):
-        loudest = suspicion.best(index)
+    for index, cause in enumerate(bench.suspicion.causes):
+        suspicion = bench.shown(index)
+        loudest, scores = suspicion.best(index), suspicion.scores
         if loudest is None:
             rows.append(_unseen_row(cause.name, cause.unit))
             continue
         found = refitted.get(index)
-        size = _as_scored(bench, loudest) if found is None else _as_refitted(bench, found, loudest)
-        detectable = detectable_amount(bench.observation, bench.base, suspicion, index, power=settings.power)
-        whatever = in_any_form(bench.base, suspicion, index, power=settings.power)
+        size = _as_scored(bench, suspicion, loudest) if found is None else _as_refitted(bench, found, loudest)
+        detectable = detectable_amount(bench.observation, bench.base, bench.suspicion, index, power=settings.power)
+        hides = bench.in_law.of(index).size > 0
+        whatever = np.inf if hides else in_any_form(bench.base, suspicion, index, power=settings.power)
         accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
         rows.append(
             CauseRow(
                 name=cause.name,
                 z=float(scores.z[loudest]),
-                p_adjusted=float(p_values[loudest]),
+                p_adjusted=float(adjusted_p(suspicion.statistic, bench.maxima)[loudest]),
                 estimate=_finite(size.estimate),
                 std=size.std if size.std < UNKNOWN * cause.plausible(bench.facts) else 0.0,
                 unit=cause.unit,
                 minimal_detectable=detectable if np.isfinite(detectable) else None,
                 detectable_in_any_form=whatever if np.isfinite(whatever) else None,
                 surviving_fraction=float(scores.surviving[loudest]),
-                nearest_twin=suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
+                nearest_twin=bench.suspicion.causes[twin[index]].name if twin[index] >= 0 else "",
                 twin_cosine=float(closeness[index]),
                 delta_chi2=size.gain,
                 heldout_excess_removed=gain.heldout_excess_removed if gain and accepted_alone else None,
@@ -79,9 +80,6 @@ class _Size(NamedTuple):
     gain: float | None
 
 
-FRICTION = "hysteresis"
-"""On loading alone friction between the wires is part of the law, exactly: nothing tells them apart."""
-
 UNKNOWN = 1e3
 """Plausible sizes; a std beyond them says that the data do not determine the amount, and 0 is what the table takes for
 that."""
@@ -94,9 +92,9 @@ def _as_refitted(bench: Workbench, found: Explanation, direction: int) -> _Size:
     return _Size(estimate, std, stiffness_change(bench.base, found.fitted), found.gain)
 
 
-def _as_scored(bench: Workbench, direction: int) -> _Size:
+def _as_scored(bench: Workbench, suspicion: Suspicion, direction: int) -> _Size:
     """By the linear model alone, for causes that were not worth a refit."""
-    suspicion, own = bench.suspicion, [direction]
+    own = [direction]
     shift = stiffness_change_linear(bench.base, suspicion.columns[:, own], suspicion.scores.estimate[own])
     scores = suspicion.scores
     return _Size(float(scores.estimate[direction]), float(scores.std[direction]), float(shift[0]), None)
@@ -120,25 +118,20 @@ def _closeness(bench: Workbench) -> Array:
 def seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
     """Rows of causes that a plausible size would have shown, the clearest first.
 
-    One form of friction between the wires may be seen on loading alone, but another is part of the law.
+    A cause that is part of the law in one of its forms may hide in it.
     """
-    causes = [cause for cause in bench.suspicion.causes if bench.facts.returns or cause.name != FRICTION]
-    plausible = {cause.name: cause.plausible(bench.facts) for cause in causes}
+    told = [cause for k, cause in enumerate(bench.suspicion.causes) if not bench.in_law.of(k).size]
+    plausible = {cause.name: cause.plausible(bench.facts) for cause in told}
     seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible.get(r.name, 0.0)]
     return sorted(seen, key=lambda row: (row.minimal_detectable or 0.0) / plausible[row.name])
 
 
 def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSettings) -> list[BlindSpot]:
     """Causes that cannot be seen at a plausible size but would move f_EI, the most harmful first."""
-    suspicion = bench.suspicion
     known = {row.name for row in seen} | {LAW}
     spots = []
-    for index, cause in enumerate(suspicion.causes):
-        own = suspicion.of(index)
-        if cause.name in known or own.size == 0:
-            continue
-        sizes = np.full(own.size, cause.plausible(bench.facts))
-        bias = float(stiffness_change_linear(bench.base, suspicion.columns[:, own], sizes).max())
+    for index, cause in enumerate(bench.suspicion.causes):
+        bias = 0.0 if cause.name in known else bench.stiffness_bias(index)
         if bias >= settings.harm:
             settled = str(entry("settled", cause.name))
             spots.append(BlindSpot(name=cause.name, stiffness_bias_at_plausible_size=bias, settled_by=settled))

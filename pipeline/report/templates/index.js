@@ -27,7 +27,7 @@
     if (cells[HREF]) node(name, "a", { href: cells[HREF] }, cells[NAME]); else name.textContent = cells[NAME];
     const shape = node(line, "td", { class: "shape" });
     if (cells[SHAPES]) node(node(shape, "svg", { viewBox: `0 0 ${data.size[0]} ${data.size[1]}`, role: "img", "aria-label": say.shape_alt }), "path", { d: cells[SHAPES] });
-    if (data.typed) node(line, "td", {}, cells[TYPE]);
+    if (data.typed) node(line, "td", { class: "kind" }, cells[TYPE]);
     node(line, "td", {}, row.state);
     const verdict = node(line, "td", {}, row.verdict);
     if (cells[CAUSES]) { node(verdict, "br"); node(verdict, "b", {}, cells[CAUSES]); }

@@ -184,14 +184,6 @@ class CurveSettings(StageSettings):
         description="widths; standard deviation of the running mean that is left alone: of a wave four widths long, the"
         " lay of a twisted pair, a twentieth is left, of a soft spot that long nine tenths",
     )
-    ramps_doubt: float = Field(
-        0.2,
-        ge=0,
-        le=1,
-        description="of the way that fitted ramps of shading and shadow move an edge; so far its place stays open: over"
-        " 135 scenes of two renderers 0.1 to 0.25 was likeliest, with 0.5 bright cables were stated off by 0.35 px that"
-        " were off by 0.05",
-    )
     light_length_share: float = Field(
         0.35,
         gt=0,

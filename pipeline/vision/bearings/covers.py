@@ -123,8 +123,10 @@ def find_again(
         if cover.radius_px is None or not near or not cover.sure:
             continue
         rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
-        most = settings.same_radius * cover.radius_px
-        if rim is None or rim.rim < settings.min_rim or max(rim.radius_std, abs(rim.radius - cover.radius_px)) > most:
+        if rim is None:
+            continue
+        play = np.hypot(settings.same_radius * cover.radius_px, np.hypot(cover.radius_std_px or 0.0, rim.radius_std))
+        if abs(rim.radius - cover.radius_px) > play:
             continue
         circle = with_rings(photo, rim, radius, settings)
         if circle.marked or circle.rim >= settings.sure_rim:

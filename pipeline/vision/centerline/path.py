@@ -17,6 +17,8 @@ from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
 from pipeline.vision.rough import Bearing, RoughCable
 
+_BLOCK = 1.5  # half widths before what hides a cable up to a given axis: its border may lie aslant by 45 degrees or so
+
 
 def fit_along(
     points: Array,
@@ -103,7 +105,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=settings.penalty_order)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=settings.penalty_order, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
-    span = _span(path, (float(along[first]), float(along[last])), covers, half_width, settings)
+    margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
+    span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width, settings)
     if span is None:
         return _lost(rough, 0.0)
     tolerance = settings.width_tolerance * (1.0 if known else 2.0)

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from pipeline.report.answer import first_screen
+from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.document import report_html
 from pipeline.report.evidence import main_figure, pointer_data
 from pipeline.report.figures import steps_of_answer
 from pipeline.report.maps import photos_of_answer
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
-from pipeline.result import BlindSpot, set_aside
+from pipeline.result import BlindSpot, TwinPart, set_aside
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
@@ -36,6 +37,26 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
     assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading in the same steps."
+
+
+def test_what_was_found_hides_no_more(diagnosed):
+    spots = ("hysteresis", 0.3), ("bearing_friction", 0.25), ("plastic_set", 0.2)
+    told = first_screen(with_spots(diagnosed("class"), *spots), WORDS, SETTINGS).hidden
+    assert [line.split(",")[0] for line in told] == ["plastic set"]
+    told = first_screen(with_spots(diagnosed("unexplained"), *spots), WORDS, SETTINGS).hidden
+    assert len(told) == 3
+
+
+def test_other_names_of_a_cause_are_told_once_the_likeliest_first(diagnosed):
+    result = diagnosed("class")
+    others = ["bearing_friction", "plastic_set", "rigid_ends", "camera_tilt", "force_drift"]
+    twins = [TwinPart(name=name, probability=0.1**place, settled_by="") for place, name in enumerate(others, 1)]
+    cause = result.diagnosis.causes[0].model_copy(update={"twins": twins})
+    result = result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"causes": [cause]})})
+    (named,) = diagnosis_view(result, WORDS, SETTINGS, figures=False).named
+    friction = "bearing friction (10 %; settled by unloading in the same steps)"
+    assert f"cannot be told apart here from {friction}; no more than noise is left either by plastic set" in named.line
+    assert [named.line.count(WORDS.cause(name)) for name in others] == [1, 1, 1, 1, 0]
 
 
 @pytest.mark.parametrize("language", ["en", "de"])

@@ -14,7 +14,7 @@ from pipeline.messages import Message
 from pipeline.report.index import write_index
 from pipeline.report.row import POINTS, as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
-from pipeline.result import FindingPart
+from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
 
 
@@ -46,6 +46,25 @@ def test_summary_has_a_row_a_specimen(batch, tmp_path):
     assert table.reason[3] == "force.csv: the log is empty; export it again."
     assert table.id[2].startswith("'=")
     assert table.report[0] == "a/report.html"
+
+
+def test_no_verdict_and_no_cause_stands_beside_a_fault(diagnosed, tmp_path):
+    result = diagnosed("named")
+    fault = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
+    wrong = result.model_copy(update={"findings": [fault], "answer_": None})
+    page = write_index([wrong], tmp_path)[0].read_text(encoding="utf-8")
+    assert "data at fault" in page and "<br><b>" not in page
+
+    told = PhotoPart.told(Message("photo/blank", brightness=0.03))
+    photos = [photo.model_copy(update={"status": "rejected", **told}) for photo in result.photos]
+    error = FindingPart(code="identify/inverse-no-data", level="error", message="no loaded step has both")
+    lost = result.diagnosis.model_copy(update={"verdict": "underpowered", "causes": [], "extended": None})
+    parts = {"photos": photos, "findings": [error], "diagnosis": lost, "answer_": None}
+    nothing = {"inverse": None, "balance": None, "agreement": None, "status": "failed"}
+    pages = write_index([result.model_copy(update=parts | nothing)], tmp_path)
+    page = pages[0].read_text(encoding="utf-8")
+    assert "too weak" not in page and f"{photos[0].image}: the picture shows nothing" in page
+    assert "the picture shows nothing" in pd.read_csv(pages[1]).reason[0]
 
 
 def test_page_links_every_report_and_escapes_names(batch, tmp_path):

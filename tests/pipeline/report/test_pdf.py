@@ -5,9 +5,10 @@ import re
 import pytest
 
 from pipeline.messages import Message
-from pipeline.report.pdf import Sheet, list_troubles, pdf_bytes, printable, write_pdf
+from pipeline.report.canvas import style
+from pipeline.report.pdf import Sheet, answer_sheet, list_troubles, pdf_bytes, printable, write_pdf
 from pipeline.report.words import Words
-from pipeline.result import FindingPart
+from pipeline.result import BlindSpot, FindingPart
 from pipeline.settings import ReportSettings
 
 
@@ -22,6 +23,19 @@ def test_pages_and_bytes(diagnosed, tmp_path):
     assert pages(content) == 4
     assert content == pdf_bytes(diagnosed("named"))
     assert b"CreationDate" not in content
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_first_page_says_what_bands_leave_open_and_what_could_hide(diagnosed, language):
+    settings, words, result = ReportSettings(language=language), Words(language), diagnosed("unexplained")
+    spot = BlindSpot(name="hysteresis", stiffness_bias_at_plausible_size=0.27, settled_by="")
+    result = result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"blind_spots": [spot]})})
+    with style():
+        sheets = [answer_sheet(one, words, settings) for one in (result, diagnosed("named"))]
+    told = [" ".join(" ".join(text.get_text() for text in sheet.figure.texts).split()) for sheet in sheets]
+    hidden = f"{words.cause('hysteresis').capitalize()}, "
+    assert [words("band_unexplained") in text for text in told] == [True, False]
+    assert [words("hidden_here") in text and hidden in text and "27 % " in text for text in told] == [True, False]
 
 
 def test_photos_change_the_file(diagnosed):

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.observations.common_waves import common_waves
+from pipeline.diagnosis.observations.common_errors import common_errors
 from pipeline.diagnosis.observations.noise import Sections, section_covariance, smooth_basis
 
 LENGTH = 0.18
 COMMON = (2e-6, 8e-3)
 
 
-def sections(count, common=COMMON):
+def sections(count, common=COMMON, light=3e-6, turned=0.0):
     s, flat = np.linspace(0.01, 0.17, count), np.zeros(count)
-    std = np.full(count, 4e-6)
-    return Sections(s, s, flat, flat, std, 3, 1e-4, 5e-4, ((3e-6, 0.06), (1e-6, 8e-3)), common)
+    theta, std = turned + np.linspace(1.0, -1.0, count), np.full(count, 4e-6)
+    return Sections(s, s, flat, theta, std, 3, 1e-4, 5e-4, ((light, 0.06), (1e-6, 8e-3)), common)
 
 
 def whitening(own):
@@ -25,11 +25,15 @@ def whitening(own):
 
 
 def test_rows_of_all_photos_have_unit_covariance():
-    photos = [sections(60), sections(50), sections(60)]
+    photos = [sections(60), sections(50, turned=0.3), sections(60)]
     whiten = [whitening(own) for own in photos]
-    found = common_waves(photos, whiten)
+    found = common_errors(photos, whiten)
     at = np.concatenate([own.s for own in photos])
     alike = COMMON[0] ** 2 * np.exp(-0.5 * (np.subtract.outer(at, at) / COMMON[1]) ** 2)
+    theta = np.concatenate([own.theta for own in photos])
+    photo = np.repeat([0, 1, 2], [len(own.s) for own in photos])
+    lamp = 0.8 * 9e-12 * np.exp(-0.5 * (np.subtract.outer(theta, theta) / 0.5) ** 2)
+    alike += lamp * np.not_equal.outer(photo, photo)  # within a photo it is in the whitening already
     whole, ends = np.zeros((36, len(at))), np.cumsum([0, *(len(own.s) for own in photos)])
     for k, root in enumerate(whiten):
         whole[12 * k : 12 * k + 12, ends[k] : ends[k + 1]] = root[:, 1:]
@@ -43,7 +47,7 @@ def test_rows_of_all_photos_have_unit_covariance():
 
 
 def test_nothing_alike():
-    photos = [sections(60, (0.0, 0.0))] * 3
-    assert common_waves(photos, [whitening(own) for own in photos]) is None
-    assert common_waves([sections(60)], [whitening(sections(60))]) is None
-    assert common_waves([], []) is None
+    photos = [sections(60, (0.0, 0.0), light=0.0)] * 3
+    assert common_errors(photos, [whitening(own) for own in photos]) is None
+    assert common_errors([sections(60)], [whitening(sections(60))]) is None
+    assert common_errors([], []) is None

@@ -1,0 +1,52 @@
+"""What goes on from step to step: friction that differs, and a set of all the cable; by collocation, no rod of ours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.effects import LARGEST, PROTOCOLS
+from fixtures.hidden import hidden_test
+from pipeline.diagnosis import diagnose
+from pipeline.faults import faults_of_input
+
+
+def found(cable, protocol, seed):
+    """Part of the result, and whether f_EI lies in its band."""
+    part, _, _ = diagnose(faults_of_input(hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed)), None)
+    K, f, std = (
+        np.array(row) for row in (part.extended.kappa_per_m, part.extended.tangent_Nm2, part.extended.tangent_std_Nm2)
+    )
+    truth = cable.law(K - cable.K0)[1]
+    assert np.sqrt(np.mean((f / truth - 1.0) ** 2)) < 0.02
+    return part, float(np.mean(np.abs(f - truth) <= 1.96 * std))
+
+
+def test_friction_of_the_bearings_that_differs_from_step_to_step():
+    factors = (1.0, 0.7, 1.5, 0.8, 1.2, 0.6, 1.4)
+    part, covered = found(Cable(bearing_friction=1.2e-3, friction_varies=factors), "loop", 41)
+    assert part.verdict == "named" and part.causes[0].name == "bearing_friction", part.headline
+    assert len(part.causes[0].forms) == 7 and covered > 0.9
+    # the mean is known no better than the single ones scatter
+    assert part.causes[0].estimate == pytest.approx(1.2e-3, rel=0.3)
+
+
+def half_sine(u):
+    return np.sin(np.pi * u)
+
+
+@pytest.mark.parametrize(("protocol", "profile"), [("loop", half_sine), ("six", np.ones_like)])
+def test_a_set_that_goes_with_the_largest_bend_anywhere(protocol, profile):
+    part, covered = found(Cable(set_rate=0.05, set_from=3.0, set_profile=profile), protocol, 23)
+    assert part.causes[0].name == "plastic_set", part.headline
+    form = part.causes[0].forms[0]
+    assert form.label == ("in a half sine along the cable" if profile is half_sine else "alike all along the cable")
+    assert part.causes[0].estimate == pytest.approx(0.05, abs=4.0 * part.causes[0].std) and covered > 0.9
+
+
+def test_a_set_where_the_cable_bends_is_part_of_the_law_on_loading():
+    test = hidden_test(Cable(set_rate=0.05, set_from=3.0), PROTOCOLS["six"], largest=LARGEST, seed=23)
+    part, _, _ = diagnose(faults_of_input(test), None)
+    assert part.verdict == "adequate", part.headline
+    assert {"plastic_set", "hysteresis"} <= {spot.name for spot in part.blind_spots}
