@@ -33,6 +33,15 @@ STEEP = 4.0
 STEEPEST = 0.95
 """Sine of the largest tilt."""
 
+DISTORTED = 0.01
+"""Radial distortion at half the picture's diagonal by a common zoom lens."""
+
+
+def tilt_of(length: float) -> float:
+    """Perspective term, 1/m, of two degrees seen from twice a cable's length."""
+    return float(np.tan(np.radians(2.0)) / (2.0 * length))
+
+
 Move = Callable[[Array, Array], tuple[Array, Array]]
 
 
@@ -85,11 +94,19 @@ def axes_off(errors: Array) -> Observer:
     """Observer that takes the bearing axes at (left along, left across, right along, right across) (4,) m off them.
 
     A fifth number is the part of their way from the centre of the picture by which both are seen farther out. The chord
-    frame is laid through what is taken for the axes.
+    frame is laid through what is taken for the axes. Three more are what is left of tilt along and across the chord
+    (1/m) and of the lens's distortion.
     """
-    parallax = errors[4]
+    parallax, along, across, lens = errors[4:]
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        square = facts.half_diagonal**2
+
+        def move(x: Array, y: Array) -> tuple[Array, Array]:
+            grow = (1.0 + lens * (x * x + y * y) / square) / (1.0 + along * x + across * y)
+            return x * grow, y * grow
+
+        prediction = seen_through(move)(prediction, facts)
         left = errors[:2] - parallax * facts.picture_centre
         span = (1.0 + parallax) * prediction.chord + errors[2] - errors[0]
         rise = errors[3] - errors[1]
@@ -145,7 +162,7 @@ class LensDistortion:
 
     def plausible(self, facts: Facts) -> float:
         """One percent at half the diagonal: a common zoom lens."""
-        return 0.01
+        return DISTORTED
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """One form."""
@@ -176,7 +193,7 @@ class CameraTilt:
 
     def plausible(self, facts: Facts) -> float:
         """Two degrees seen from twice the cable's length."""
-        return float(np.tan(np.radians(2.0)) / (2.0 * facts.length))
+        return tilt_of(facts.length)
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Tilt along and across the chord, each without and with what it foreshortens, seen from ``width`` (m)."""

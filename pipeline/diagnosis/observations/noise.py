@@ -33,10 +33,9 @@ STRETCH_SPREAD = 0.5
 """Logarithm of that factor; a photo's own estimate of its correlation length scatters by half, and a stretch chosen by
 chance made one null in fifty look like a cause."""
 
-ALIKE, TURN = 0.8, 0.5
-"""Part of the variance of the light's error that goes by the direction of the cable under the lamp, and the angle (rad)
-over which it becomes another: what a lamp does to both edges goes with the cosine of its direction to the cable, and
-faster where a flank turns into shade. The rest goes along the cable, on each photo for itself."""
+TURN = 0.5
+"""Angle (rad) over which the light's error becomes another: what a lamp does to both edges goes with the cosine of its
+direction to the cable, and faster where a flank turns into shade."""
 
 PRIOR_WEIGHT = 20.0
 """Samples that the noise level stated by the photos counts for against the level seen."""
@@ -137,16 +136,14 @@ def section_covariance(sections: Sections, *, factor: float = 1.0, stretch: floa
 
 
 def slow_errors(sections: Sections) -> Array:
-    """Covariance (k, k) of the slow errors of a photo: of the light, and of waves that are its own."""
-    (std, length), *waves = sections.slow
-    own = slow_covariance(sections.s, ((std, length),))
-    return np.asarray(light_alike(sections, sections) + (1.0 - ALIKE) * own + slow_covariance(sections.s, tuple(waves)))
+    """Covariance (k, k) of the slow errors of a photo: its own, and what the light does to all photos alike."""
+    return np.asarray(light_alike(sections, sections) + slow_covariance(sections.s, sections.slow))
 
 
 def light_alike(one: Sections, other: Sections) -> Array:
     """Covariance (k, j) of what the light does to two photos, or to one, wherever the cable has the same direction."""
     turn = np.subtract.outer(one.theta, other.theta) / TURN
-    return np.asarray(ALIKE * one.slow[0][0] * other.slow[0][0] * np.exp(-0.5 * turn**2))
+    return np.asarray(one.slow[0][0] * other.slow[0][0] * np.exp(-0.5 * turn**2))
 
 
 def by_axes(sections: Sections, chord: float) -> Array:

@@ -32,7 +32,7 @@ def test_rows_of_all_photos_have_unit_covariance():
     alike = COMMON[0] ** 2 * np.exp(-0.5 * (np.subtract.outer(at, at) / COMMON[1]) ** 2)
     theta = np.concatenate([own.theta for own in photos])
     photo = np.repeat([0, 1, 2], [len(own.s) for own in photos])
-    lamp = 0.8 * 9e-12 * np.exp(-0.5 * (np.subtract.outer(theta, theta) / 0.5) ** 2)
+    lamp = 9e-12 * np.exp(-0.5 * (np.subtract.outer(theta, theta) / 0.5) ** 2)
     alike += lamp * np.not_equal.outer(photo, photo)  # within a photo it is in the whitening already
     whole, ends = np.zeros((36, len(at))), np.cumsum([0, *(len(own.s) for own in photos)])
     for k, root in enumerate(whiten):
