@@ -32,17 +32,17 @@ DISPLACED = "rig_compliance displacement_offset length_error"
 TURNING_BACK = "bearing_friction hysteresis plastic_set"
 
 BORDERLINE = [
-    ("six", "camera_tilt", 0.001824, IN_THE_PICTURE, ""),
-    ("six", "camera_tilt", 0.001831, IN_THE_PICTURE, "camera_tilt in_plane_load lens_distortion scale_error"),
+    ("six", "camera_tilt", 0.001860, IN_THE_PICTURE, ""),
+    ("six", "camera_tilt", 0.001864, IN_THE_PICTURE, "camera_tilt in_plane_load lens_distortion scale_error"),
     ("six", "camera_tilt", 0.002120, IN_THE_PICTURE, "camera_tilt in_plane_load lens_distortion scale_error"),
-    ("six", "in_plane_load", 0.03592, LOADS, ""),
-    ("six", "in_plane_load", 0.03616, LOADS, "in_plane_load force_offset"),
-    ("six", "rig_compliance", 4.801e-6, DISPLACED, "rig_compliance displacement_offset"),
-    ("six", "rig_compliance", 4.835e-6, DISPLACED, "rig_compliance"),
-    ("six", "displacement_offset", 4.272e-6, DISPLACED, ""),
-    ("six", "displacement_offset", 4.286e-6, DISPLACED, "displacement_offset length_error"),
-    ("loop", "bearing_friction", 7.600e-5, TURNING_BACK, "bearing_friction hysteresis plastic_set"),
-    ("loop", "bearing_friction", 7.620e-5, TURNING_BACK, "bearing_friction plastic_set"),
+    ("six", "in_plane_load", 0.03662, LOADS, ""),
+    ("six", "in_plane_load", 0.03671, LOADS, "in_plane_load force_offset"),
+    ("six", "rig_compliance", 4.825e-6, DISPLACED, "rig_compliance displacement_offset"),
+    ("six", "rig_compliance", 4.842e-6, DISPLACED, "rig_compliance"),
+    ("six", "displacement_offset", 4.323e-6, DISPLACED, ""),
+    ("six", "displacement_offset", 4.334e-6, DISPLACED, "displacement_offset length_error"),
+    ("loop", "bearing_friction", 7.638e-5, TURNING_BACK, "bearing_friction hysteresis plastic_set"),
+    ("loop", "bearing_friction", 7.680e-5, TURNING_BACK, "bearing_friction plastic_set"),
     ("loop", "force_offset", 0.01104, LOADS, ""),
     ("loop", "force_offset", 0.01108, LOADS, "force_offset in_plane_load displacement_offset"),
 ]
