@@ -85,8 +85,10 @@ def equivalent(curve: TangentCurve, bounds: tuple[float, float] | None = None) -
     tangent = np.interp(grid, curve.kappa, curve.tangent)
     stiffness = float(weight @ tangent)
     if curve.factor.shape[1]:
-        columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
-        std, bound = float(np.linalg.norm([weight @ column for column in columns])), False
+        left = np.clip(np.searchsorted(curve.kappa, grid) - 1, 0, len(curve.kappa) - 2)
+        share = (weight * (grid - curve.kappa[left]) / np.diff(curve.kappa)[left])[:, None]  # of the node to the right
+        mean = (weight[:, None] - share) * curve.factor[left] + share * curve.factor[left + 1]
+        std, bound = float(np.linalg.norm(mean.sum(axis=0))), False
     else:
         # errors that all have one sign: no correlation along the curve makes the mean less certain than that
         std, bound = float(weight @ np.interp(grid, curve.kappa, curve.tangent_std)), True

@@ -6,7 +6,6 @@ summary, mean of repeat specimens) reads rows alone: a result with its photos is
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -250,12 +249,18 @@ def _message(stored: Any) -> Message | None:
     return None if stored is None else Message.read(stored)
 
 
-def _numbers(values: Any, count: int | None = None) -> tuple[Any, ...]:
+def _numbers(values: Any, count: int) -> tuple[Any, ...]:
     """Finite numbers, so many of them."""
-    numbers = tuple(float(value) for value in values)
-    if (count is not None and len(numbers) != count) or not all(map(math.isfinite, numbers)):
+    return tuple(_table(values, count).tolist())
+
+
+def _table(values: Any, *shape: int) -> Array:
+    """Finite numbers, so many of them; -1 for any number."""
+    table = np.array(values, dtype=float)
+    fits = table.ndim == len(shape) and all(asked in (-1, n) for asked, n in zip(shape, table.shape, strict=True))
+    if (table.size and not fits) or not np.isfinite(table).all():
         raise ValueError("numbers that are not finite, or too few or many")
-    return numbers
+    return table if fits else table.reshape(shape)  # a view of each would be kept ten thousand times
 
 
 def _end_of(values: Any) -> End | None:
@@ -266,14 +271,13 @@ def _end_of(values: Any) -> End | None:
 
 
 def _curve(data: Any) -> RowCurve:
-    tangent = np.array(_numbers(data["tangent"]))
+    tangent = _table(data["tangent"], -1)
     (low, high), count = _numbers(data["range"], 2), tangent.size
     if count < 2 or not low < high:
         raise ValueError("a curve of nothing")
-    factor = [np.array(_numbers(column, count)) for column in data["factor"]]
     return RowCurve(
         kappa=np.linspace(low, high, count),
         tangent=tangent,
-        tangent_std=np.array(_numbers(data["tangent_std"], count)),
-        factor=np.column_stack([np.zeros((count, 0)), *factor]),
+        tangent_std=_table(data["tangent_std"], count),
+        factor=_table(data["factor"], -1, count).T,
     )

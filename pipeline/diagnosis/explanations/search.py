@@ -28,12 +28,12 @@ from pipeline.diagnosis.explanations.pair_fits import (
 )
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.displacements import displacement_columns
-from pipeline.diagnosis.fits.fit import Fit, fit_from
+from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.diagnosis.posterior.hypotheses import Hypothesis, Posterior, posterior
+from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import refitted, weighed
 from pipeline.diagnosis.statistics.pairs import Pair
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -125,7 +125,8 @@ class Search:
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         self.add(list(self._pruned(found)))
-        if self.posterior.total(count=2) < PAIRS_MATTER and best is not None and len(best.fitted.extension.terms) == 1:
+        likelier = self.posterior.total(count=2) > sum(SHARES[2])
+        if not likelier and best is not None and len(best.fitted.extension.terms) == 1:
             return
         forms = with_all_forms(bench, found)
         new = [one for one in forms if one not in found]
@@ -152,40 +153,40 @@ class Search:
                 yield explanation_of(left, self.bench.base, rest)
 
     def pairs_speak(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> bool:
-        """Whether two causes, or something else, may explain more than the best single cause."""
-        bench = self.bench
-        for pair in linear[:1]:
-            own = weighed(self.grid, linear_fit(bench, pair)).own
-            causes = (int(bench.suspicion.owner[pair.first]), int(bench.suspicion.owner[pair.second]))
-            self.hypotheses.append(Hypothesis(causes, own.plain, own.rest))
+        """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
+        bench, rest, ahead = self.bench, self.hypotheses[0].rest, 0.0
         if best is not None and second is not None:
             beside = weighed(self.grid.plain, best.fitted, second)
-            mine = next(one for one in self.hypotheses if one.found is best)
+            mine = next(one.plain for one in self.hypotheses if one.found is best)
             for cause, (plain, _) in beside.further.items():
                 if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
-                    lost = mine.plain - beside.own.plain
-                    self.hypotheses.append(Hypothesis((*best.causes, cause), plain + lost, self.hypotheses[0].rest))
+                    self.hypotheses.append(Hypothesis((*best.causes, cause), plain + mine - beside.own.plain, rest))
+            # how far the linear model is off for the best single cause it is for pairs
+            direction = bench.suspicion.best(best.causes[0])
+            ahead = 0.0 if direction is None else mine - linearly(bench, self.grid, (direction,)).plain
+        for pair in linear:
+            found = linearly(bench, self.grid, (pair.first, pair.second))
+            self.hypotheses.append(found._replace(plain=found.plain + ahead, rest=rest, found=None))
         believed = self.posterior
         composed = best is not None and len(best.fitted.extension.terms) > 1
-        return composed or believed.total(count=2) + believed.total(something_else=True) > PAIRS_MATTER
+        beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
+        return composed or believed.total(count=2) + believed.total(something_else=True) > beforehand
 
 
 CONFIRMED = 0.5
 """Share of a score's chi-square that its refit must remove: a score that no refit confirms is no finding."""
 
-PAIRS_MATTER = 0.02
-"""Probability of two causes, or of something else, from which pairs are refitted."""
 
-
-def linear_fit(bench: Workbench, pair: Pair) -> Fit:
-    """The linear model of the base with two further columns, as if it had been fitted with both amounts zero."""
-    base, columns = bench.base, bench.suspicion.columns[:, [pair.first, pair.second]]
-    terms = [bench.suspicion.terms[k] for k in (pair.first, pair.second)]
+def linearly(bench: Workbench, grid: ErrorGrid, directions: tuple[int, ...]) -> Hypothesis:
+    """Causes by the linear model of the base with further columns, as if it had been fitted with all amounts zero."""
+    base, seen = bench.base, bench.suspicion
+    terms = [seen.terms[k] for k in directions]
     held = tuple(term._replace(variant=replace(term.variant, tuned=())) for term in terms)
     extension = replace(base.extension, terms=(*base.extension.terms, *held))
-    return replace(
-        base, extension=extension, vector=np.r_[base.vector, 0.0, 0.0], jacobian=np.hstack([base.jacobian, columns])
-    )
+    vector, columns = np.r_[base.vector, np.zeros(len(terms))], seen.columns[:, directions]
+    fitted = replace(base, extension=extension, vector=vector, jacobian=np.hstack([base.jacobian, columns]))
+    causes = tuple(int(seen.owner[k]) for k in directions)
+    return refitted(grid.plain, explanation_of(causes, base, fitted), bench.facts)
 
 
 def _foreseen(bench: Workbench, found: Explanation) -> bool:
@@ -207,6 +208,6 @@ def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
     believed = search.posterior.explanations(count=1)
     best = believed[0].found if believed else max(singles, key=lambda e: e.gain, default=None)
     second = None if best is None else search.beside(best)
-    if search.pairs_speak(best, second, linear):
+    if search.pairs_speak(best, second, every):
         search.pairs(best, second, linear or every)
     return search
