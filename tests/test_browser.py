@@ -32,20 +32,11 @@ from tests.pipeline.report.virtual_result import measured_result
 
 pytestmark = pytest.mark.browser
 
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--force-prefers-reduced-motion",  # else a click may meet a page that still scrolls
-)
+# --force-prefers-reduced-motion: else a click may meet a page that still scrolls
+FLAGS = """--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking
+    --disable-component-update --disable-sync --force-prefers-reduced-motion"""
 PHONE, DESK = 380, 1280
-ROWS = 2000
-MANY = 5000
+ROWS, MANY = 2000, 5000
 
 
 @pytest.fixture(scope="session")
@@ -53,7 +44,7 @@ def browser(tmp_path_factory):
     options = Options()
     options.binary_location = shutil.which("chromium")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
+    for flag in (*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
         options.add_argument(flag)
     driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     yield driver
