@@ -259,7 +259,8 @@ def _cause_plan(
     best = int(own[np.argmax(norm)])
     smallest = detectable_amount(bench.observation, bench.base, bench.suspicion, index, power=settings.power)
     twin, closeness = nearest(table)
-    separated = None
+    # what the law takes over on loading alone shows on the way back
+    separated = Message("next.unload") if bench.in_law.of(index).size else None
     if closeness[index] > settings.twin_cosine:
         freed = [(other[index, twin[index]], protocol.what) for protocol, other in others]
         better = [pair for pair in freed if pair[0] < settings.twin_cosine]
