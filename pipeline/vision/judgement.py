@@ -126,7 +126,7 @@ def _judge(
             return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
         if cut.contrast < _FAINT * cut.texture:  # a fold of the cloth may leave the picture
             return refused(photo, "photo/contrast.faint", contrast_to_noise=cut.contrast / cut.texture)
-        return _unsharp(photo, standout, cut, settings) or axes if axes.code == "photo/bearing" else axes
+        return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
     short = short_of_axis(standout, cut, axes, stage)
     if short is not None:
         return _goes_on_beyond(photo, short)
@@ -163,10 +163,10 @@ def crossing(photo: Photo, place: Sequence[float] | Array) -> Rejected:
     return refused(photo, "photo/crossing", u_px=u, v_px=v)
 
 
-def _unsharp(photo: Photo, standout: Standout, cut: CrossCut, settings: VisionSettings) -> Rejected | None:
+def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None:
     """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
-    closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights, settings.segmentation)
+    closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights)
     moved = _moved(photo, closeup, width)
     if moved is not None or closeup.blur_px <= _BLURRED * width:
         return moved
@@ -195,8 +195,8 @@ def _axes(
         width = cut.usual_width * standout.reduction  # the mask is wider by the shadow, covers would be
     cover = cable.bearings.cover_radius(width)
     ends = (
-        find_end(strip.path[::-1], reading, standout, cover, settings.bearings),
-        find_end(strip.path, reading, standout, cover, settings.bearings),
+        find_end(strip.path[::-1], reading, standout, cover),
+        find_end(strip.path, reading, standout, cover),
     )
     hidden = cover is not None or cable.bearings.given_px is not None
     leaving = [end.place for end in ends if at_border(end.place, photo, width)]
@@ -248,7 +248,7 @@ def _assemble(
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
     kept = without_specks(_seen(standout, cut, stage), cut.usual_width)
-    unlike = unlike_from(path, kept, axes, cut.usual_width, stage)
+    unlike = unlike_from(path, kept, axes, cut.usual_width)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)
     width = cut.usual_width * standout.reduction
@@ -290,9 +290,9 @@ def _settled(
     """The strip from close by, its axes with the left one first, and its path (n, 2) px between them."""
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
         path, axes = path[::-1], axes[::-1]
-    closeup = take_closeup(photo, path, width, weights, settings.segmentation)
-    right, path = settle_end(axes[1], path, closeup, width, settings.bearings)
-    left, backward = settle_end(axes[0], path[::-1], closeup, width, settings.bearings)
+    closeup = take_closeup(photo, path, width, weights)
+    right, path = settle_end(axes[1], path, closeup, width)
+    left, backward = settle_end(axes[0], path[::-1], closeup, width)
     return closeup, (left, right), backward[::-1]
 
 

@@ -19,8 +19,6 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array, PhotoHints, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.photo import PhotoSettings
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import SoughtCovers
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
@@ -80,13 +78,13 @@ def find_cable(
     if hints is not None:
         photo, cable = with_hints(photo, cable, hints)
     found = _find_near(photo, settings, cable, near)
-    if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness, settings):
+    if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness):
         return found
     # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
     widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness, settings)
     for width in widths:
         again = _find_near(photo, settings, replace(cable, diameter_px=width), near)
-        if _is_slender(again, cable.slenderness, settings):
+        if _is_slender(again, cable.slenderness):
             return again
     return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
 
@@ -102,7 +100,7 @@ def _find_near(photo: Photo, settings: VisionSettings, cable: Cable, near: Rough
     if cable.path_px:
         return _along_clicks(photo, settings, cable)
     if near is not None and cable.region is None:
-        found = _find_in(photo, settings, cable, _surroundings(near, photo, settings.segmentation))
+        found = _find_in(photo, settings, cable, _surroundings(near, photo))
         if isinstance(found, RoughCable):
             return found
     return _find_in(photo, settings, cable, cable.region)
@@ -119,7 +117,7 @@ def _along_clicks(photo: Photo, settings: VisionSettings, cable: Cable) -> Rough
     return _chosen(photo, judged, _RIVAL_SHARE)
 
 
-def _is_slender(found: RoughCable | Rejected, slenderness: float, settings: VisionSettings) -> bool:
+def _is_slender(found: RoughCable | Rejected, slenderness: float) -> bool:
     """True for a cable about as many times as long as wide as it is stated to be."""
     if isinstance(found, Rejected):
         return False
@@ -138,7 +136,7 @@ def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
 def _widths(photo: Photo, slenderness: float, settings: VisionSettings) -> list[float]:
     """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
     standout = stand_out(photo, choose_reduction(photo.size, None, settings.segmentation), settings.segmentation)
-    wanted = _wanted(standout, Cable(), settings.segmentation)
+    wanted = _wanted(standout, Cable())
     for readings in read_photo(standout, wanted, settings.segmentation):
         longest = max(reading.longest for reading in readings)
         if longest >= wanted.least_length:
@@ -154,15 +152,13 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
         if alone is not None:
             return alone
     standout = stand_out(photo, reduction, stage, window=window)
-    wanted = _wanted(standout, cable, stage)
+    wanted = _wanted(standout, cable)
     judged: list[_Judged] = []
     for readings in read_photo(standout, wanted, stage):
         if readings[0].longest < wanted.least_length:
             if judged:
                 break
-            return _blank(photo, settings.photo) or _nothing(
-                photo, standout, readings[0], known=wanted.width is not None
-            )
+            return _blank(photo) or _nothing(photo, standout, readings[0], known=wanted.width is not None)
         judged += [_judged(photo, standout, reading, wanted, cable, settings) for reading in readings]
         outcome = _chosen(photo, judged, _RIVAL_SHARE)
         if isinstance(outcome, RoughCable) and _is_settled(outcome):
@@ -177,12 +173,12 @@ def _find_alone(
     stage = settings.segmentation
     coarser = _FIRST_COARSER
     standout = stand_out(photo, coarser * reduction, stage, window=window)
-    enough = int(coarser * narrowest(standout, stage) / stage.cells_across)
+    enough = int(coarser * narrowest(standout) / stage.cells_across)
     if enough < 2:
         return None
     if enough < coarser:
         standout = stand_out(photo, enough * reduction, stage, window=window)
-    wanted = _wanted(standout, cable, stage)
+    wanted = _wanted(standout, cable)
     reading = read_alone(standout, wanted, stage)
     if reading is None:
         return None
@@ -292,7 +288,7 @@ def _lies_on(found: RoughCable, paths: list[Array]) -> bool:
     return any(median(cKDTree(path).query(body)[0]) < found.half_width_px for path in paths)
 
 
-def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wanted:
+def _wanted(standout: Standout, cable: Cable) -> Wanted:
     width = None if cable.diameter_px is None else cable.diameter_px / standout.reduction
     if cable.length_px is None:
         least, most = _MIN_LENGTH_SHARE * max(standout.residual.shape[:2]), np.inf
@@ -302,7 +298,7 @@ def _wanted(standout: Standout, cable: Cable, stage: SegmentationSettings) -> Wa
     return Wanted(width, least, most, across_objects=cable.bearings.cover_radius(1.0) is None)
 
 
-def _blank(photo: Photo, stage: PhotoSettings) -> Rejected | None:
+def _blank(photo: Photo) -> Rejected | None:
     """A picture of one level, such as that of a lens cap."""
     darkest, brightest = levels(photo)
     if brightest - darkest > _BLANK_RANGE:
@@ -321,7 +317,7 @@ def _nothing(photo: Photo, standout: Standout, reading: Reading, *, known: bool)
     )
 
 
-def _surroundings(near: RoughCable, photo: Photo, stage: SegmentationSettings) -> Window:
+def _surroundings(near: RoughCable, photo: Photo) -> Window:
     """Where the cable can be one step later: its box on the neighbour photo and a share of its size around."""
     low, high = near.path_px.min(axis=0), near.path_px.max(axis=0)
     margin = _SEARCH_MARGIN_SHARE * float((high - low).max()) + 4.0 * near.half_width_px

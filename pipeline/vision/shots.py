@@ -246,7 +246,7 @@ def with_fixed_cover(
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
     limit = settings.series.max_fixed_shift_m * calibration.scale.px_per_m
-    fixed = fixed_cover(found, limit, settings.series)
+    fixed = fixed_cover(found, limit)
     if fixed is None:
         return shots
     settled = list(shots)

@@ -79,7 +79,7 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes, stage: Segmenta
     return None
 
 
-def unlike_from(path: Array, kept: slice, axes: Axes, width: float, stage: SegmentationSettings) -> Place | None:
+def unlike_from(path: Array, kept: slice, axes: Axes, width: float) -> Place | None:
     """Where a strip (n, 2) in px, points a cell apart, begins to look unlike the part of it that is ``kept``, long.
 
     A cable whose sheath changes its colour is a strip of one width, but what one colour tells ends with that; under a

@@ -93,7 +93,7 @@ def find_bearings(
         return _assign_given(ends, hints.given_px, settings)
     radius = hints.cover_radius(width_px)
     if radius is None:
-        return _visible_end(ends[0], width_px, settings), _visible_end(ends[1], width_px, settings)
+        return _visible_end(ends[0], width_px), _visible_end(ends[1], width_px)
     std = settings.radius_std if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
     expected = Radius(radius, std)
     axes: list[Bearing | None] = [None, None]
@@ -117,7 +117,7 @@ def _assign_given(
     return bearings[0], bearings[1]
 
 
-def _visible_end(end: CableEnd, width_px: float, settings: BearingSettings) -> Bearing:
+def _visible_end(end: CableEnd, width_px: float) -> Bearing:
     kind: AxisKind = "clamp" if end.at_object else "end"
     std = _END_STD_WIDTHS * width_px
     return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)

@@ -100,7 +100,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, setti
             break
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
-            votes = _votes(window, radius.px / window.reduction, on_cable, settings, sectors=sectors) * prior
+            votes = _votes(window, radius.px / window.reduction, on_cable, sectors=sectors) * prior
             found = _best_circle(fits, window, votes, softness)
             if found is not None and found.rim >= settings.sure_rim:
                 return found
@@ -108,7 +108,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, setti
                 partial = found
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
-    votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool), settings) * ahead
+    votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool)) * ahead
     farther = _best_circle(fits, window, votes, 1.0)
     return farther if farther is not None and farther.rim >= settings.sure_rim else partial
 
@@ -245,9 +245,7 @@ def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
     return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
 
 
-def _votes(
-    window: _Window, radius: float, blind: NDArray[np.bool_], settings: BearingSettings, *, sectors: int = 1
-) -> NDArray[np.float32]:
+def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], *, sectors: int = 1) -> NDArray[np.float32]:
     """Change of the mean grey value across a circle around each cell, colours together, sector by sector of it.
 
     That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all

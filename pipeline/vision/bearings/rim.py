@@ -86,13 +86,13 @@ def fit_circle(
     span = max(4.0, settings.search_radii * radius)
     parameters = np.array([*center, radius])
     if not on_cover:
-        parameters = _best_shift(photo, parameters, ray, span, softness, expected, settings)
+        parameters = _best_shift(photo, parameters, ray, span, softness, expected)
     reach = max(3.0, settings.near_radii * radius)
     for beside in (False, True):
         slopes = _radial_slopes(photo, parameters, ray, reach, softness, _POOLED_RAYS, one_sign=on_cover)
         edge, trust = _radial_edges(slopes, reach, softness, settings)
         if beside and not on_cover:
-            edge = _without_light(slopes, edge, settings)
+            edge = _without_light(slopes, edge)
         fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
         if fitted is None:
             return None
@@ -115,7 +115,7 @@ def fit_circle(
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
     doubt = 0.0 if rim >= settings.sure_rim else excess
     # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
-    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge, settings)[2] ** 2 - softness**2, 0.0)))
+    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - softness**2, 0.0)))
     parts = [np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt, bevel]
     radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
@@ -199,15 +199,7 @@ def _smoothed_slope(profile: NDArray[np.float32], across: float, along: float) -
     return pooled[wrap:-wrap].reshape(profile.shape)
 
 
-def _best_shift(
-    photo: Photo,
-    parameters: Array,
-    ray: Array,
-    span: float,
-    softness: float,
-    expected: Radius,
-    settings: BearingSettings,
-) -> Array:
+def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softness: float, expected: Radius) -> Array:
     """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
     slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness, _POOLED_RAYS)
     step = span / 12.0
@@ -250,7 +242,7 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: Beari
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
 
-def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> Array:
+def _without_light(slopes: _Slopes, edge: Array) -> Array:
     """Edges freed of the pull of a shadow beside the rim.
 
     About each edge the slope is ``A G(t - e) + a + b Phi(t)``: the blurred step and the light's slope on both sides;
@@ -258,7 +250,7 @@ def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> A
     """
     if np.isfinite(edge).sum() < 12:
         return edge
-    t, around, sigma = _spread(slopes, edge, settings)
+    t, around, sigma = _spread(slopes, edge)
     bell = np.exp(-0.5 * (t / sigma) ** 2)
     design = np.column_stack([bell, t * bell / sigma**2, np.ones_like(t), ndtr(t / sigma)])
     solved = around @ np.linalg.pinv(design).T
@@ -268,7 +260,7 @@ def _without_light(slopes: _Slopes, edge: Array, settings: BearingSettings) -> A
     return np.asarray(edge + np.clip(shift, -sigma, sigma))
 
 
-def _spread(slopes: _Slopes, edge: Array, settings: BearingSettings) -> tuple[Array, Array, float]:
+def _spread(slopes: _Slopes, edge: Array) -> tuple[Array, Array, float]:
     """Offsets (m,) about the edges, slopes ``(n, m)`` there, and the spread (px) of their median over all edges."""
     found = np.isfinite(edge)
     t = np.arange(-_LIGHT_REACH_PX, _LIGHT_REACH_PX + 0.25, 0.5)

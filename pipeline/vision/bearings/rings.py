@@ -53,7 +53,7 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     if whole and rim.std < _CERTAIN_CENTER_PX:
         return rim
     if not (whole and rim.std < _SURE_CENTER_RADII * expected.px):
-        center = _roundest(photo, center, expected.px, settings)
+        center = _roundest(photo, center, expected.px)
     rings = _rings(photo, center, expected.px, settings)
     if not rings:
         return rim
@@ -108,12 +108,12 @@ def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSetti
     found: list[Circle] = []
     for _ in range(_MARK_TRIES):
         place = places[int(np.argmax(roundness))]
-        found += _rings(photo, _roundest(photo, place, reach, settings), reach, settings)
+        found += _rings(photo, _roundest(photo, place, reach), reach, settings)
         roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
     return sorted(found, key=lambda ring: ring.std)
 
 
-def _roundest(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> Array:
+def _roundest(photo: Photo, center: Array, radius: float) -> Array:
     """Place within reach of ``center`` about which the cover is most round, to a hundredth of its radius."""
     reach = _ASTRAY_RADII * radius
     for finer in range(3):

@@ -65,7 +65,7 @@ class Fixed:
     astray: tuple[int, ...]
 
 
-def fixed_cover(found: Sequence[RoughCable], limit_px: float, settings: SeriesSettings) -> Fixed | None:
+def fixed_cover(found: Sequence[RoughCable], limit_px: float) -> Fixed | None:
     """The cover that stands still on most photos; None where none does (to ``limit_px``), or the axes are no covers."""
     if len(found) < _LEAST_STEADY or any(axis.kind != "cover" for c in found for axis in (c.left, c.right)):
         return None

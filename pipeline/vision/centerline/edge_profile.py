@@ -148,9 +148,7 @@ def _shaded(
     return shape, slope
 
 
-def fit_profiles(
-    pixels: Pixels, s: Array, *, blur: float, settings: CurveSettings, thin: bool = True
-) -> tuple[Profiles, Profiles | None]:
+def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) -> tuple[Profiles, Profiles | None]:
     """Profiles in windows of neighbouring sections: with ramps, and for ``thin`` cables by the plain error function.
 
     Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take

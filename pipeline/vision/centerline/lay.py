@@ -50,23 +50,23 @@ def without_lay(
         In the same order. Of the common wiggle only that part is taken which chance does not make of the photos' own
         noise; a single photo is returned as it is.
     """
-    shapes = relieved([line.shape for line in lines if isinstance(line, Centerline)], diameter_m, settings)
+    shapes = relieved([line.shape for line in lines if isinstance(line, Centerline)], diameter_m)
     rest = iter(shapes)
     return tuple(replace(line, shape=next(rest)) if isinstance(line, Centerline) else line for line in lines)
 
 
-def relieved(shapes: list[MeasuredShape], diameter_m: float, settings: CurveSettings) -> list[MeasuredShape]:
+def relieved(shapes: list[MeasuredShape], diameter_m: float) -> list[MeasuredShape]:
     """Shapes of one cable without the fast wiggle that they have in common; see `without_lay`."""
     if len(shapes) < 2:
         return shapes
     pitch = _LAY_PITCH_WIDTHS * diameter_m
     grid = np.arange(0.0, max(float(shape.s[-1]) for shape in shapes) + pitch, pitch)
-    wiggle = _common(np.array([_fast(shape, grid, settings) for shape in shapes]))
+    wiggle = _common(np.array([_fast(shape, grid) for shape in shapes]))
     spare = len(shapes) / (len(shapes) - 1.0)
     return [_relieved(shape, grid, wiggle, spare=spare) for shape in shapes]
 
 
-def _fast(shape: MeasuredShape, grid: Array, settings: CurveSettings) -> Array:
+def _fast(shape: MeasuredShape, grid: Array) -> Array:
     """Distance (g,) m of the sections from their curve on the grid, without what a bend could do; nan where unseen."""
     across = shape.section_offsets()
     cell = np.rint(shape.section_s / (grid[1] - grid[0])).astype(int).clip(0, grid.size - 1)

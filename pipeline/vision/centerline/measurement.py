@@ -215,7 +215,6 @@ def _fit(
         s=s,
         length=float(s[-1] + after),
         diameter=median(width),
-        settings=options,
         breaks=breaks,
         witness=_half_widths(s, sections.balance, width, std, options),
     )
@@ -303,7 +302,7 @@ def centerline_of(
         width_std_m=scatter * middle,
         mirrored=chord.mirrored,
         quality=quality,
-        findings=rough.findings + beside_axis(float(misses.max()), middle, options),
+        findings=rough.findings + beside_axis(float(misses.max()), middle),
     )
 
 

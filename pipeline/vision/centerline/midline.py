@@ -159,8 +159,8 @@ def measure_sections(
     rows = max(1, int(median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
     thin = half_width < _SMALL_RADIUS_PX
-    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), settings=settings, thin=thin)
-    profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter, settings) else shaded
+    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), thin=thin)
+    profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter) else shaded
     edges = fit_edges(pixels, s, profiles, settings=settings)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
@@ -168,7 +168,7 @@ def measure_sections(
         return None
     place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
     keep = np.asarray(good.any(axis=1))
-    keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width, settings)
+    keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
     keep = _from_stretch_to_stretch(keep)
     if np.count_nonzero(keep) < settings.least_sections:
         return None
@@ -192,7 +192,7 @@ def measure_sections(
         std=np.hypot(*(trust * std.T)),
         width=width,
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
-        systematic_std=_systematic(profiles, s, median(width), doubt, diameter, settings),
+        systematic_std=_systematic(profiles, s, median(width), doubt, diameter),
         share=float(np.mean(keep)),
         profiles=profiles,
         contrast=median(step),
@@ -202,9 +202,7 @@ def measure_sections(
     )
 
 
-def _serves(
-    plain: Profiles, shaded: Profiles, half_width: float, diameter: float | None, settings: CurveSettings
-) -> bool:
+def _serves(plain: Profiles, shaded: Profiles, half_width: float, diameter: float | None) -> bool:
     """True unless widths by the plain error function are far less constant, or less like the cable's, than by ramps."""
 
     def unlike(profiles: Profiles) -> float:
@@ -218,7 +216,7 @@ def _serves(
     return unlike(plain) <= _RAMPS_WORTH * unlike(shaded)
 
 
-def _of_usual_width(width: Array, settings: CurveSettings) -> NDArray[np.bool_]:
+def _of_usual_width(width: Array) -> NDArray[np.bool_]:
     """Sections ``(k,)`` but those of a stretch as wide as the cable is not: its edges there are those of other things.
 
     A pale sleeve before a pale ground leaves the edges of shadows and shades, 0.3 diameters off.
@@ -281,9 +279,7 @@ def _by_light(profiles: Profiles, s: Array, floor: float) -> Array:
     return np.asarray((0.5 * profiles.at(s, "shift")) ** 2 + floor**2)
 
 
-def _systematic(
-    profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None, settings: CurveSettings
-) -> float:
+def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None) -> float:
     """Standard deviation, px, of the slow sideways error of the midline; see the module's text.
 
     Edges count by the shares with which they make the midpoint; ``doubt`` (2, n) are their variances by the light.

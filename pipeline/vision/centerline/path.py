@@ -54,7 +54,6 @@ def fit_along(
     s: Array,
     length: float,
     diameter: float,
-    settings: CurveSettings,
     breaks: tuple[float, ...] = (),
     witness: Witness | None = None,
 ) -> CurveFit:
@@ -106,7 +105,7 @@ def fit_along(
     return fit(None, 8)
 
 
-def _path_intervals(length: float, diameter: float, settings: CurveSettings) -> int:
+def _path_intervals(length: float, diameter: float) -> int:
     wanted = length / (_PATH_KNOT_DIAMETERS * diameter)
     return int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
 
@@ -127,12 +126,12 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
     points, s = _guides(rough, along, half_width)
-    intervals = _path_intervals(float(along[-1]), 2.0 * half_width, settings)
+    intervals = _path_intervals(float(along[-1]), 2.0 * half_width)
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
-    span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width, settings)
+    span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
     tolerance = _WIDTH_TOLERANCE * (1.0 if known else 2.0)
@@ -210,7 +209,7 @@ def _cover(bearing: Bearing, blur: float) -> Cover:
 
 
 def _span(
-    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float, settings: CurveSettings
+    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float
 ) -> tuple[float, float] | None:
     """Range of s in which the cable is seen and neither edge is hidden."""
     s = np.arange(seen[0], seen[1], 1.0)

@@ -100,7 +100,7 @@ def refusal_of_band(image: str, kappa: Array, std: Array, length: float, options
     return None if band <= most else Rejected(image, Message("photo/contrast.band", band=min(band, 9.99), most=most))
 
 
-def beside_axis(miss: float, width: float, options: CurveSettings) -> tuple[Finding, ...]:
+def beside_axis(miss: float, width: float) -> tuple[Finding, ...]:
     """Finding about a curve that passes ``miss`` (m) beside an axis, of a cable ``width`` (m) wide."""
     if miss <= 0.5 * _AXIS_DISTANCE_RADII * width:
         return ()

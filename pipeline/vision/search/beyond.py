@@ -71,7 +71,7 @@ def fades(standout: Standout, cut: CrossCut, width: float, settings: Segmentatio
     path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
     near = slice(round(0.75 * width), round(settings.beyond_least_widths * width))
     before = median(step[::-1][near])
-    _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0], settings)
+    _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0])
     if len(ahead) < near.stop or before <= 0.0:
         return False
     ahead = ahead[: near.stop + round(width)]
@@ -102,7 +102,7 @@ def rest_ahead(
     """
     path, width = cut.path[::-1] if at_start else cut.path, cut.usual_width
     leaving = end_direction(path, width)
-    usual = median(_weber(standout, cut, width, settings))
+    usual = median(_weber(standout, cut, width))
     facing = [
         (float(np.hypot(*(rest[0] - path[-1]))), rest)
         for other in others
@@ -112,7 +112,7 @@ def rest_ahead(
     for gap, rest in sorted(facing, key=lambda found: found[0]):
         for known in {True, cut.known}:
             more = cut_across(standout, rest, width, settings, known=known, weights=cut.weights)
-            if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual, settings)) > 0.5:
+            if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
                 return gap
     return None
 
@@ -182,17 +182,17 @@ def _ahead(
     A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place; and
     the width of a mask, by which the strip's edges were sought, may be that of the cable or not.
     """
-    usual = median(_weber(standout, cut, width, settings))
+    usual = median(_weber(standout, cut, width))
     best, scraps = None, 0
     for lead in _BEYOND_LEADS_WIDTHS:
-        led, ahead = _led_into_picture(standout, path, width, lead, settings)
+        led, ahead = _led_into_picture(standout, path, width, lead)
         if not _may_go_on(standout, cut, ahead, width, usual, settings):
             continue
         for known in {True, cut.known}:
             more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
             if more.dark != cut.dark:
                 continue
-            alike = _alike(standout, more, width, usual, settings)
+            alike = _alike(standout, more, width, usual)
             scraps = max(scraps, int(alike.sum()))
             # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
             stop = min(_end_of_more(more, alike, width, cut.contrast, settings), len(ahead))
@@ -260,9 +260,7 @@ def _may_fade(
     return bool(np.count_nonzero(strong) * len(ahead) / len(rows) >= 0.4 * (near.stop - near.start))
 
 
-def _led_into_picture(
-    standout: Standout, path: Array, width: float, lead: tuple[float, float], settings: SegmentationSettings
-) -> tuple[Array, Array]:
+def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple[float, float]) -> tuple[Array, Array]:
     """The path, and what it is led on by beyond its last point as far as the picture goes."""
     body, outward = straight_body(path, width, lead[0] * width)
     reach = float(np.hypot(*(path[-1] - body[-1])))
@@ -275,18 +273,16 @@ def _led_into_picture(
 
 def shaded(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> NDArray[np.bool_]:
     """Sections ``(k,)`` that look like most of the strip but for the light on them."""
-    return _alike(standout, cut, width, median(_weber(standout, cut, width, settings)), settings)
+    return _alike(standout, cut, width, median(_weber(standout, cut, width)))
 
 
-def _alike(
-    standout: Standout, cut: CrossCut, width: float, usual: float, settings: SegmentationSettings
-) -> NDArray[np.bool_]:
+def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDArray[np.bool_]:
     low, high = _BEYOND_CONTRAST
-    share = _weber(standout, cut, width, settings) / usual
+    share = _weber(standout, cut, width) / usual
     return (np.abs(cut.width / width - 1.0) < _BEYOND_WIDTH_OFF) & (share > low) & (share < high)
 
 
-def _weber(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array:
+def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     """Step of each section by the brightness of its ground."""
     _, normal = path_normals(cut.path)
     beside = (cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]).astype(np.float32)

@@ -73,7 +73,7 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
     """
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
-    for picture, level in _pictures(standout, settings):
+    for picture, level in _pictures(standout):
         readings = list(_readings(picture, level, wanted, settings))
         long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
         if long:
@@ -90,10 +90,10 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
         yield (best,)
 
 
-def narrowest(standout: Standout, settings: SegmentationSettings) -> float:
+def narrowest(standout: Standout) -> float:
     """Width of the narrowest strips on the likeliest picture that take up more than a trace of it; 0 without any."""
-    picture, level = next(_pictures(standout, settings))
-    widths = ridge_widths((picture > level).astype(np.uint8), settings)
+    picture, level = next(_pictures(standout))
+    widths = ridge_widths((picture > level).astype(np.uint8))
     most = max((width * length for width, length in widths), default=0.0)
     return min((width for width, length in widths if width * length > _TRACE_SHARE * most), default=0.0)
 
@@ -103,7 +103,7 @@ def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSetting
 
     That is no second strip, no branch and no return of the strip to its own neighbourhood: few cells blur a crossing.
     """
-    picture, level = next(_pictures(standout, settings))
+    picture, level = next(_pictures(standout))
     readings = list(_readings(picture, level, wanted, settings))
     strips = [strip for reading in readings for strip in reading.strips[:2]]
     if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
@@ -122,12 +122,7 @@ def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> 
     if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
         return True
     partners = [o for o in reading.strips if o is not strip and o.length > settings.min_partner_widths * width]
-    meets = [
-        _touches(end, a, b, settings)
-        for other in partners
-        for a, b in ((strip, other), (other, strip))
-        for end in (0, -1)
-    ]
+    meets = [_touches(end, a, b) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)]
     return any(meets)
 
 
@@ -141,7 +136,7 @@ def _arms(path: Array, junction: Array, reach: float) -> int:
     return int((np.hypot(*(path[[0, -1]] - junction).T) < reach).sum())
 
 
-def _touches(end: int, strip: Strip, other: Strip, settings: SegmentationSettings) -> bool:
+def _touches(end: int, strip: Strip, other: Strip) -> bool:
     """True if an end of ``strip`` lies on the course of ``other``, away from the ends of that.
 
     Each counts by its own width: a ruler beside the cable is wider than that.
@@ -159,10 +154,10 @@ def approaches_itself(path: Array, width: float) -> bool:
     return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
 
 
-def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tuple[Image, float]]:
+def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
     """Pictures in ground sigmas and levels, the likeliest first."""
     distance = standout.distance()
-    otsu, *higher = _levels(distance, settings)
+    otsu, *higher = _levels(distance)
     yield distance, otsu
     for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
         if level > _LOWEST_LEVEL:
@@ -170,7 +165,7 @@ def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tu
     brightness = standout.brightness()
     for sign in (-1.0, 1.0):
         picture = np.maximum(np.float32(sign) * brightness, 0.0)
-        level, *higher = _levels(picture, settings)
+        level, *higher = _levels(picture)
         if level > _LEAST_LEVEL:
             for tried in (level, *higher, 0.5 * level):
                 yield picture, tried
@@ -178,7 +173,7 @@ def _pictures(standout: Standout, settings: SegmentationSettings) -> Iterator[tu
         yield distance, level
 
 
-def _levels(picture: Image, settings: SegmentationSettings) -> list[float]:
+def _levels(picture: Image) -> list[float]:
     """Otsu's level, and those that split what stands above it once more: ground, shadow and cable are three classes.
 
     Levels are sought on the square root: noise and strong things get a like share of the range.
@@ -199,7 +194,7 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
     above = picture > level
     if above.mean() > _MAX_COVERED_SHARE:
         return
-    widths = [(wanted.width, np.inf)] if wanted.width is not None else _guess_widths(above, settings)
+    widths = [(wanted.width, np.inf)] if wanted.width is not None else _guess_widths(above)
     largest = 0.0
     for width, length in widths:
         if width * length < largest:
@@ -214,8 +209,8 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
 
 def _banded(standout: Standout, wanted: Wanted, width: float, settings: SegmentationSettings) -> Iterator[Reading]:
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
-    for picture, level in _pictures(standout, settings):
-        mask = strip_mask(picture > level, width, settings)
+    for picture, level in _pictures(standout):
+        mask = strip_mask(picture > level, width)
         if mask.mean() > _MAX_COVERED_SHARE:
             continue
         for most in _BAND_WIDTHS:
@@ -229,7 +224,7 @@ def _banded(standout: Standout, wanted: Wanted, width: float, settings: Segmenta
 def _read(
     above: NDArray[np.bool_], width: float, level: float, wanted: Wanted, settings: SegmentationSettings
 ) -> Reading:
-    mask = strip_mask(above, width, settings)
+    mask = strip_mask(above, width)
     thick = thick_part(mask, settings.thick_widths * width)
     strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
     short = not strips or strips[0].length < wanted.least_length
@@ -241,14 +236,14 @@ def _read(
     return Reading(tuple(strips), mask, thick, width, level)
 
 
-def _guess_widths(above: NDArray[np.bool_], settings: SegmentationSettings) -> list[tuple[float, float]]:
+def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Widths and lengths of strips in the mask as it is, and once gaps of a highlight's size are closed.
 
     Those that may be largest in area come first.
     """
     mask = above.astype(np.uint8)
-    widths = ridge_widths(mask, settings)
-    closed = ridge_widths(strip_mask(above, widths[0][0], settings), settings) if widths else []
+    widths = ridge_widths(mask)
+    closed = ridge_widths(strip_mask(above, widths[0][0])) if widths else []
     new = [guess for guess in closed if all(abs(np.log(guess[0] / known)) > 0.2 for known, _ in widths)]
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
 

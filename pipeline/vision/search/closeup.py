@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.crosscut import path_normals
@@ -50,9 +49,7 @@ class Closeup:
     motion_px: float
 
 
-def take_closeup(
-    photo: Photo, path_px: Array, width_px: float, weights: Array, settings: SegmentationSettings
-) -> Closeup:
+def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) -> Closeup:
     """Project the corridor along ``path_px`` (k, 2) to grey and measure its noise and blur."""
     margin = _CORRIDOR_WIDTHS * width_px + 8.0
     low = np.maximum(np.floor(path_px.min(axis=0) - margin).astype(int), 0)

@@ -39,9 +39,7 @@ class CableEnd:
     at_object: bool = False
 
 
-def find_end(
-    path: Array, reading: Reading, standout: Standout, cover_radius_px: float | None, settings: BearingSettings
-) -> CableEnd:
+def find_end(path: Array, reading: Reading, standout: Standout, cover_radius_px: float | None) -> CableEnd:
     """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins.
 
     A cover hardly wider than the cable stays part of the strip and bends its skeleton; there the piece that is led
@@ -105,9 +103,7 @@ def _to_circle(start: Array, direction: Array, center: Array, radius: float) -> 
     return along - float(np.sqrt(max(radius**2 - aside**2, 0.0)))
 
 
-def settle_end(
-    axis: Bearing, path: Array, closeup: Closeup, width: float, settings: BearingSettings
-) -> tuple[Bearing, Array]:
+def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tuple[Bearing, Array]:
     """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
 
     The last sections of a path feel the end and are replaced by a parabola that continues the path.
@@ -120,7 +116,6 @@ def settle_end(
         Refined path; its last point is the end.
     closeup : Closeup
     width : px
-    settings : BearingSettings
     """
     if axis.kind not in ("end", "clamp"):
         return axis, path

@@ -65,21 +65,21 @@ class Strip:
         return float(np.hypot(*np.diff(self.path, axis=0).T).sum())
 
 
-def strip_mask(above: NDArray[np.bool_], width: float, settings: SegmentationSettings) -> Mask:
+def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
     """Mask of what stands out, closed over highlights and filled where writing and covers' rims leave holes."""
     mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSING_WIDTHS * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
         for contour, (_, _, _, parent) in zip(contours, tree[0] if tree is not None else (), strict=True)
-        if parent >= 0 and (cv2.contourArea(contour) < width**2 or _in_ring(contour, mask, width, settings))
+        if parent >= 0 and (cv2.contourArea(contour) < width**2 or _in_ring(contour, mask, width))
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
     return _morphology(mask, cv2.MORPH_OPEN, _disc(_OPENING_WIDTHS * width))
 
 
-def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float, settings: SegmentationSettings) -> bool:
+def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float) -> bool:
     """True for the hole of a ring that is as large as a cover and thinner than the cable: the rim of a cover.
 
     A cable that runs into it would make a loop of it, as if it crossed itself; a loop of cable is as thick as that.
@@ -150,7 +150,7 @@ def find_strips(
     return sorted(strips, key=lambda strip: -strip.length)
 
 
-def ridge_widths(mask: Mask, settings: SegmentationSettings) -> list[tuple[float, float]]:
+def ridge_widths(mask: Mask) -> list[tuple[float, float]]:
     """Widths (cells) that strips in the mask have and about how long they are in all, the longest first.
 
     The distance transform at the ridge is half the width; long strips of constant width pile up in its histogram.

@@ -48,7 +48,7 @@ def arc(
     turn = np.linspace(-0.7, 0.7, 300)
     path = np.column_stack([550.0 + BEND * np.sin(turn), 760.0 - BEND * np.cos(turn)])
     pixels = np.clip(np.rint(255.0 * (grey + noise)), 0, 255).astype(np.uint8)
-    return take_closeup(Photo("a.png", pixels, 8), path, WIDTH, np.ones(1), VisionSettings().segmentation)
+    return take_closeup(Photo("a.png", pixels, 8), path, WIDTH, np.ones(1))
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, 2.4])

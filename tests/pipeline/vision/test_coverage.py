@@ -76,9 +76,7 @@ def measured_on_second_renderer(seed: int, *, bright: bool = False, stated_m: fl
     path = led_astray(picture, rng, spacing=0.5 * look.radius, amount=0.06 * look.radius)
     out = np.minimum(*(np.hypot(*(path - end).T) for end in (path[0], path[-1])))
     seen = np.flatnonzero(out > COVER * scale)
-    closeup = take_closeup(
-        Photo("photo", picture.pixels, 8), path, 2.0 * look.radius, np.full(3, 1.0 / 3.0), VisionSettings().segmentation
-    )
+    closeup = take_closeup(Photo("photo", picture.pixels, 8), path, 2.0 * look.radius, np.full(3, 1.0 / 3.0))
     rough = RoughCable(
         image="photo",
         path_px=path,

@@ -35,7 +35,7 @@ def pixels_of(place, rng, *, noise, sections=240, rows=4, inside=0.0, outside=0.
 
 def fitted(pixels, *, ramps=True):
     s = np.arange(pixels.value.shape[1]) * 8.0
-    shaded, plain = fit_profiles(pixels, s, blur=0.8, settings=CurveSettings())
+    shaded, plain = fit_profiles(pixels, s, blur=0.8)
     profiles = shaded if ramps else plain
     return profiles, fit_edges(pixels, s, profiles, settings=CurveSettings())
 

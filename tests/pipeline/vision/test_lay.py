@@ -47,8 +47,8 @@ def lay(s):
 
 
 def test_what_all_photos_show_at_the_same_place_is_taken_off(shapes):
-    seen = relieved([pushed(shape, lay) for shape in shapes], DIAMETER, SETTINGS)
-    clean = relieved(shapes, DIAMETER, SETTINGS)
+    seen = relieved([pushed(shape, lay) for shape in shapes], DIAMETER)
+    clean = relieved(shapes, DIAMETER)
     for one, other in zip(seen, clean, strict=True):
         # the running mean of 1.5 widths keeps a hundredth of it; cells of the mean and noise in it some more
         assert abs(amplitude(one, other, lay)) < 0.1
@@ -59,7 +59,7 @@ def test_what_all_photos_show_at_the_same_place_is_taken_off(shapes):
 
 
 def test_what_one_photo_shows_stays(shapes):
-    seen = relieved([pushed(shapes[0], lay), *shapes[1:]], DIAMETER, SETTINGS)
+    seen = relieved([pushed(shapes[0], lay), *shapes[1:]], DIAMETER)
     assert amplitude(seen[0], shapes[0], lay) > 0.8  # a fifth is what one of five photos has in their mean
 
 
@@ -69,14 +69,14 @@ def test_what_a_bend_could_do_stays(shapes):
     def spot(s):
         return WAVE * np.exp(-0.5 * ((s - 0.09) / (4.0 * DIAMETER)) ** 2)
 
-    seen = relieved([pushed(shape, spot) for shape in shapes], DIAMETER, SETTINGS)
-    clean = relieved(shapes, DIAMETER, SETTINGS)
+    seen = relieved([pushed(shape, spot) for shape in shapes], DIAMETER)
+    clean = relieved(shapes, DIAMETER)
     for one, other in zip(seen, clean, strict=True):
         assert amplitude(one, other, spot) > 0.96  # 1 - 4 / sqrt(16 + 1.5^2 / 2) is what a mean of 1.5 widths takes
 
 
 def test_noise_alone_is_hardly_touched(shapes):
-    for one, shape in zip(relieved(shapes, DIAMETER, SETTINGS), shapes, strict=True):
+    for one, shape in zip(relieved(shapes, DIAMETER), shapes, strict=True):
         moved = np.hypot(one.section_x - shape.section_x, one.section_y - shape.section_y)
         # the mean of five photos has 0.45 of the noise of one; that it is chance must take half of it and more
         assert np.sqrt(np.mean(moved**2)) < 0.22 * shape.section_std.mean()
@@ -84,4 +84,4 @@ def test_noise_alone_is_hardly_touched(shapes):
 
 
 def test_a_single_photo_is_returned_as_it_is(shapes):
-    assert relieved(shapes[:1], DIAMETER, SETTINGS) == shapes[:1]
+    assert relieved(shapes[:1], DIAMETER) == shapes[:1]
