@@ -18,12 +18,13 @@ CASES = sorted(path.parent.relative_to(BROKEN).as_posix() for path in BROKEN.glo
 
 def codes_in_source() -> set[str]:
     """Codes of all `InputError`s: sentences with a remedy, and where none is in the catalogue what is given as code."""
-    codes = {key.partition(".")[0] for key, texts in catalogue("en").items() if len(texts) == 2}
+    told = {key.partition(".")[0] for key, texts in catalogue("en").items() if len(texts) == 2}
+    codes = {code for code in told if "/" in code}  # the help of commands has two texts as well
     for path in (ROOT / "pipeline").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "InputError":
-                told = [keyword.value for keyword in node.keywords if keyword.arg == "code"]
-                codes |= {value.value for value in told if isinstance(value, ast.Constant)}
+                given = [keyword.value for keyword in node.keywords if keyword.arg == "code"]
+                codes |= {value.value for value in given if isinstance(value, ast.Constant)}
     return codes
 
 

@@ -107,8 +107,11 @@ def test_exact_points_give_back_the_curvature():
     s, points = noisy(bow, np.random.default_rng(0), std=0.0, correlation=0.0)
     found = fit(s, points)
     at = np.linspace(0.0, LENGTH, 101)
-    # unseen ends included; a third of the 0.15 % that noise may make
-    assert np.max(np.abs(found.curve.curvature(at) - bow(at))) < 5e-4 * 9.0
+    error = np.abs(found.curve.curvature(at) - bow(at)) / 9.0
+    # where points are, by far less than the 0.15 % that noise may make
+    assert error[5:-5].max() < 1e-5
+    # in the 6 mm nobody saw, a tenth of the target for the last 10 mm: without noise rounding alone says how smooth
+    assert error.max() < 1.5e-3
 
 
 def test_ends_keep_pre_curvature_and_slope():
