@@ -85,7 +85,7 @@ class Directions:
         Everything that is one number, under the names of the table; ``stick_angle_left`` and ``.._right`` beside.
     laws : list of (column, MomentCurve, MomentCurve, step)
         From which law to which the characteristic goes when that parameter grows by the step.
-    grown, rubbing : dict of column -> (steps, n), (steps,)
+    grown, friction_by_step : dict of column -> (steps, n), (steps,)
         Of the set, and of the friction of both bearings, that are given step by step.
     """
 
@@ -99,14 +99,14 @@ class Directions:
     scalars: dict[str, Array] = field(default_factory=dict)
     laws: list[tuple[int, MomentCurve, MomentCurve, float]] = field(default_factory=list)
     grown: dict[int, Array] = field(default_factory=dict)
-    rubbing: dict[int, Array] = field(default_factory=dict)
+    friction_by_step: dict[int, Array] = field(default_factory=dict)
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
         return self.scalars.get(name, self.none)
 
     def given(self, changes: dict[int, Array], step: int) -> Array:
-        """Change at a step (q, ...) of what is given step by step, `grown` or `rubbing`; (q,) zeros if nothing is."""
+        """Change at a step (q, ...) of what is given step by step, `grown` or `friction_by_step`; (q,) zeros if nothing is."""
         if not changes:
             return self.none
         every = np.zeros((len(self.names), *next(iter(changes.values())).shape[1:]))
@@ -251,7 +251,10 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if test.friction is not None and other.friction is not None:
         made.slip[column] = (other.friction.slip - test.friction.slip)[:, 0] / step
         made.stick[column] = (other.friction.stick - test.friction.stick)[:, 0] / step
-    by_step = ((made.grown, test.grown, other.grown), (made.rubbing, test.friction_by_step, other.friction_by_step))
+    by_step = (
+        (made.grown, test.grown, other.grown),
+        (made.friction_by_step, test.friction_by_step, other.friction_by_step),
+    )
     for changes, old, new in by_step:
         if old is not None and new is not None:
             changes[column] = (new - old) / step
