@@ -60,7 +60,7 @@ class BearingFriction:
 
 
 SCATTER = 0.3
-"""Of a bearing's friction: standard deviation from step to step. Dry friction scatters so between slides alike."""
+"""Of a bearing's friction: standard deviation from step to step beforehand; an assumption, no measurement."""
 
 
 def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:

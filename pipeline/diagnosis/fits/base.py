@@ -32,7 +32,7 @@ AXES = ("left_along", "left_across", "right_along", "right_across", "parallax", 
 
 SQUARE = 0.05
 """Of the plausible tilt and distortion of a camera: what is left of them where it was set up with care, a tenth of a
-degree. Photos that are right to a hundredth of a pixel show that much, and it changes no f_EI."""
+degree. Photos that are right to a hundredth of a pixel show that much; it changes f_EI by a fifth of a percent."""
 
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""

@@ -125,7 +125,7 @@ class FewPoints:
 
 
 BINS = 40
-"""Of the moments that photos show: each holds the curvatures of a hundred sections or so."""
+"""Of the moments that photos show: each holds the curvatures of some dozens of sections."""
 
 SURE = 0.3
 """Standard deviation of log f_EI as photos show it by the moment P y alone."""
