@@ -106,7 +106,7 @@ class Directions:
         return self.scalars.get(name, self.none)
 
     def given(self, changes: dict[int, Array], step: int) -> Array:
-        """Change at a step (q, ...) of what is given step by step, `grown` or `friction_by_step`; (q,) zeros if nothing is."""
+        """Change at a step (q, ...) of what is given step by step; (q,) zeros if nothing is."""
         if not changes:
             return self.none
         every = np.zeros((len(self.names), *next(iter(changes.values())).shape[1:]))
