@@ -69,8 +69,8 @@ class OutOfPlaneBow:
         """Lean the plane of the cable so far that the largest bow stands ``amount`` up."""
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
-            bow = np.max(np.abs(prediction.y), axis=1, keepdims=True)
-            top = float(bow.max())
+            bow = np.max(np.abs(prediction.y), axis=-1, keepdims=True)
+            top = bow.max(axis=-2, keepdims=True)
             sine = amount / top * (np.maximum(bow, LEAST * top) / top) ** (variant.at - 1.0)
             lean = sine / (1.0 + np.abs(sine) ** SOFT) ** (1.0 / SOFT)
             flat = np.sqrt(1.0 - lean**2)

@@ -50,18 +50,18 @@ def seen_through(move: Move) -> Observer:
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
         centre = facts.picture_centre
-        chord = prediction.chord[:, None]
+        chord = prediction.chord[..., None]
         # the two bearings travel as two more points; a short tangent at every point carries its direction along
-        x = np.hstack([np.zeros_like(chord), chord, prediction.x]) - centre[:, :1]
-        y = np.hstack([np.zeros_like(chord), np.zeros_like(chord), prediction.y]) - centre[:, 1:]
-        direction = np.hstack([np.zeros_like(chord), np.zeros_like(chord), prediction.theta])
+        x = np.concatenate([np.zeros_like(chord), chord, prediction.x], axis=-1) - centre[:, :1]
+        y = np.concatenate([np.zeros_like(chord), np.zeros_like(chord), prediction.y], axis=-1) - centre[:, 1:]
+        direction = np.concatenate([np.zeros_like(chord), np.zeros_like(chord), prediction.theta], axis=-1)
         reach = 1e-4 * facts.length
         seen_x, seen_y = move(x, y)
         tip_x, tip_y = move(x + reach * np.cos(direction), y + reach * np.sin(direction))
-        span_x, span_y = seen_x[:, 1] - seen_x[:, 0], seen_y[:, 1] - seen_y[:, 0]
-        roll = np.arctan2(span_y, span_x)[:, None]
-        rel_x, rel_y = seen_x[:, 2:] - seen_x[:, :1], seen_y[:, 2:] - seen_y[:, :1]
-        turned = np.arctan2(tip_y - seen_y, tip_x - seen_x)[:, 2:] - roll
+        span_x, span_y = seen_x[..., 1] - seen_x[..., 0], seen_y[..., 1] - seen_y[..., 0]
+        roll = np.arctan2(span_y, span_x)[..., None]
+        rel_x, rel_y = seen_x[..., 2:] - seen_x[..., :1], seen_y[..., 2:] - seen_y[..., :1]
+        turned = np.arctan2(tip_y - seen_y, tip_x - seen_x)[..., 2:] - roll
         return replace(
             prediction,
             chord=np.hypot(span_x, span_y),
@@ -110,7 +110,7 @@ def axes_off(errors: Array) -> Observer:
         left = errors[:2] - parallax * facts.picture_centre
         span = (1.0 + parallax) * prediction.chord + errors[2] - errors[0]
         rise = errors[3] - errors[1]
-        roll = np.arctan2(rise, span)[:, None]
+        roll = np.arctan2(rise, span)[..., None]
         rel_x, rel_y = prediction.x - left[:, :1], prediction.y - left[:, 1:]
         return replace(
             prediction,

@@ -30,11 +30,9 @@ def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:
             reading(force, times, float(clock))
             for force, times, clock in zip(prediction.samples, facts.hold_times, facts.clock, strict=True)
         )
-        photo = [
-            float(reading(prediction.force[i : i + 1], facts.photo_time[i : i + 1], float(facts.clock[i]))[0])
-            for i in range(len(prediction.force))
-        ]
-        return replace(prediction, force=np.array(photo), samples=samples)
+        times = zip(facts.photo_time, facts.clock, strict=True)
+        photo = [reading(prediction.force[..., i], time, float(begin)) for i, (time, begin) in enumerate(times)]
+        return replace(prediction, force=np.stack(photo, axis=-1), samples=samples)
 
     return observer
 

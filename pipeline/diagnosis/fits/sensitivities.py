@@ -60,9 +60,10 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     assert here.prediction is not None and here.bare is not None
     bends, simulated = bending_numbers(extension, vector, base_model, here.model)
     by = combined(here, facts, bends)
-    shown = {j: observed(moved(here.bare, by, k, float(steps[j])), here.model, facts) for k, j in enumerate(bends.at)}
+    bent = observed(moved(here.bare, by, range(len(bends.at)), steps[bends.at]), here.model, facts)
+    shown: dict[int, Prediction] = {}
     for j in range(len(vector)):
-        if j in shown or j in simulated:
+        if j in bends.at or j in simulated:
             continue
         if j >= len(base.names):
             steps[j] *= SHORT
@@ -73,9 +74,10 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
         else:
             observers = plainly(extension, trial, base_model).observers
         shown[j] = observed(here.bare, replace(here.model, observers=observers), facts)
-    count, prior, at = observation.rows.count, extension.prior, list(shown)
+    count, prior = observation.rows.count, extension.prior
     table = np.zeros((count + len(prior), len(vector)))
-    table[:count, at] = columns_of(observation, here.prediction, list(shown.values()), steps[at])
+    for at, there in ((bends.at, bent), (list(shown), Prediction.varied(list(shown.values())))):
+        table[:count, at] = columns_of(observation, here.prediction, there, steps[at])
     table[count:] = prior
     for j in simulated:
         table[:, j] = _quotient(observation, extension, vector, base_model, here, j)
@@ -124,7 +126,7 @@ def profile_columns(
     given = [along_cable(term.cause, term.variant, cable) for term in terms]
     by = base_derivatives(here, facts, [(name, phi[::-1] if extension.turned else phi) for name, phi in given])
     assert here.prediction is not None and here.bare is not None
-    steps = [STEP * term.cause.plausible(facts) for term in terms]
-    shown = [observed(moved(here.bare, by, k, step), here.model, facts) for k, step in enumerate(steps)]
+    steps = np.array([STEP * term.cause.plausible(facts) for term in terms])
+    shown = observed(moved(here.bare, by, range(len(steps)), steps), here.model, facts)
     columns = columns_of(observation, here.prediction, shown, steps)
     return np.vstack([columns, np.zeros((len(extension.prior), len(terms)))])

@@ -9,7 +9,6 @@ Sign: that of the model, ``d residual = - column``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,56 +32,39 @@ class _Nodes(NamedTuple):
     slide: Array
 
 
-def columns_of(
-    observation: Observation, at: Prediction, moved: Sequence[Prediction], steps: Sequence[float] | Array
-) -> Array:
+def columns_of(observation: Observation, at: Prediction, moved: Prediction, steps: Array) -> Array:
     """Columns (N, k) per unit, rows as in ``observation.rows``.
 
     Parameters
     ----------
     observation : Observation
     at : Prediction
-    moved : (k,) of Prediction
-        Each a short step from ``at``.
+    moved : Prediction
+        Its k variations, each a short step away.
     steps : (k,)
         How far.
     """
-    parts = [_forces(observation, at, moved)]
+    parts = _forces(observation, at, moved)
     if observation.photos:
         places = observation.all_sections
         sine, cosine, nodes = _across(observation, at)
-        across = np.zeros((len(places.s), len(moved)))
-        for k, there in enumerate(moved):
-            off_x, off_y, turned, slid = (
-                there.x - at.x,
-                there.y - at.y,
-                there.theta - at.theta,
-                there.s - at.s,
-            )
-            for node in nodes:
-                here = places.step, node.at
-                across[:, k] += node.place * (cosine * off_y[here] - sine * off_x[here])
-                across[:, k] += node.turn * turned[here]
-                across[:, k] += node.slide * slid[node.at]
-        chord = np.column_stack([there.chord - at.chord for there in moved])
+        off = {name: getattr(moved, name) - getattr(at, name) for name in ("s", "x", "y", "theta")}
+        across = np.zeros((len(steps), len(places.s)))
+        for node in nodes:
+            here = slice(None), places.step, node.at
+            across += node.place * (cosine * off["y"][here] - sine * off["x"][here])
+            across += node.turn * off["theta"][here] + node.slide * off["s"][:, node.at]
+        chord = moved.chord - at.chord
         for photo, own in zip(observation.photos, places.of_photo, strict=True):
-            parts.append(photo.whiten @ np.vstack([chord[photo.step], across[own]]))
-    return np.asarray(observation.joined(np.vstack(parts)) / np.asarray(steps))
+            parts.append(photo.whiten @ np.vstack([chord[:, photo.step], across[:, own].T]))
+    return np.asarray(observation.joined(np.vstack(parts)) / steps)
 
 
-def _forces(observation: Observation, at: Prediction, moved: Sequence[Prediction]) -> Array:
-    """Changes (rows of forces, k)."""
+def _forces(observation: Observation, at: Prediction, moved: Prediction) -> list[Array]:
+    """Changes (h, k) of the holds."""
     common = observation.force_common or (0.0,) * len(observation.forces)
-    table = []
-    for there in moved:
-        column = [
-            of_hold((new - old)[: len(data)] / std, alike / std)
-            for data, old, new, std, alike in zip(
-                observation.forces, at.samples, there.samples, observation.force_std, common, strict=True
-            )
-        ]
-        table.append(np.concatenate(column))
-    return np.column_stack(table)
+    holds = zip(observation.forces, at.samples, moved.samples, observation.force_std, common, strict=True)
+    return [of_hold((new - old).T[: len(data)] / std, alike / std) for data, old, new, std, alike in holds]
 
 
 def _across(observation: Observation, at: Prediction) -> tuple[Array, Array, tuple[_Nodes, _Nodes]]:

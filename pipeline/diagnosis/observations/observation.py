@@ -277,13 +277,13 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
 
 
 def of_hold(off: Array, common: float) -> Array:
-    """Whitened residuals (h,) of a hold whose samples, of unit scatter each, share an error of ``common``.
+    """Whitened residuals (h, ...) of a hold whose samples, of unit scatter each, share an error of ``common``.
 
     The covariance is 1 + common^2 11^T, and the inverse of its root takes something off their mean.
     """
     if not common > 0.0 or not off.size:
         return off
-    return np.asarray(off - (1.0 - 1.0 / np.sqrt(1.0 + off.size * common**2)) * off.mean())
+    return np.asarray(off - (1.0 - 1.0 / np.sqrt(1.0 + len(off) * common**2)) * off.mean(axis=0))
 
 
 def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:

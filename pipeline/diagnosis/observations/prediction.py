@@ -177,6 +177,8 @@ def _by_chord(test: MeasuredTest, step: MeasuredStep) -> float:
 class Prediction:
     """What would be read at every step; ``n`` steps, ``v`` points along the cable.
 
+    Variations of one prediction are one too, with a leading axis in every array: observers let it through.
+
     Attributes
     ----------
     force : (n,) N
@@ -198,6 +200,16 @@ class Prediction:
     x: Array
     y: Array
     theta: Array
+
+    @classmethod
+    def varied(cls, each: Sequence[Prediction]) -> Prediction:
+        """Predictions as the variations of one."""
+        names = ("force", "chord", "s", "x", "y", "theta")
+        holds = zip(*(one.samples for one in each), strict=True)
+        return cls(
+            samples=tuple(np.stack(hold) for hold in holds),
+            **{name: np.stack([getattr(one, name) for one in each]) for name in names},
+        )
 
 
 Observer = Callable[[Prediction, Facts], Prediction]

@@ -154,16 +154,26 @@ def base_derivatives(here: Run, facts: Facts, names: Sequence[Parameter]) -> tup
     return tuple(found[i] for i in range(len(facts.branch)))
 
 
-def moved(bare: Prediction, by: tuple[Derivatives, ...], column: int, amount: float) -> Prediction:
-    """The bare prediction moved along a column of the derivatives; vertices may move along the cable."""
-    change = np.array([d.force[column] for d in by]) * amount
+def moved(bare: Prediction, by: tuple[Derivatives, ...], columns: Sequence[int], amounts: Array) -> Prediction:
+    """Variations of the bare prediction: moved along each of the columns (k,) of the derivatives by its amount (k,).
+
+    Vertices may move along the cable.
+    """
+    at, steps = list(columns), range(len(by))
+
+    def change(name: str, of: Sequence[int] = steps) -> Array:
+        """(k, steps, ...) of an array of the prediction."""
+        slopes = np.array([getattr(by[i], name)[..., at] for i in of])
+        return np.moveaxis(slopes * amounts, -1, 0)
+
+    force = change("force")
     return replace(
         bare,
-        force=bare.force + change,
-        samples=tuple(samples + change[i] for i, samples in enumerate(bare.samples)),
-        chord=bare.chord + amount * np.array([d.chord[column] for d in by]),
-        s=bare.s + amount * by[0].s[:, column],
-        x=bare.x + amount * np.array([d.x[:, column] for d in by]),
-        y=bare.y + amount * np.array([d.y[:, column] for d in by]),
-        theta=bare.theta + amount * np.array([d.theta[:, column] for d in by]),
+        force=bare.force + force,
+        samples=tuple(samples + force[:, i, None] for i, samples in enumerate(bare.samples)),
+        chord=bare.chord + change("chord"),
+        s=bare.s + change("s", of=[0])[:, 0],
+        x=bare.x + change("x"),
+        y=bare.y + change("y"),
+        theta=bare.theta + change("theta"),
     )
