@@ -24,19 +24,16 @@ from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
 
-LEAST_STEPS = 4
-"""A line of displacements is a zero or a scale that is off and takes two; two more are the least that scatter."""
-
 
 def displacement_columns(observation: Observation, fitted: Fit) -> Array:
     """Whitened sensitivities (N, k) of a fitted model to errors (m) of the displacements under load.
 
-    None (k = 0) with fewer than four of them, and where the model has such errors among its unknowns already.
+    None (k = 0) where the model has such errors among its unknowns already.
     """
     base, facts = fitted.extension.base, fitted.extension.facts
     at = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
     none, count = np.zeros((len(fitted.residual), 0)), len(base.names) - 2
-    if len(at) < LEAST_STEPS or base.moved:
+    if base.moved:
         return none
     loose = replace(base, moved=tuple(at), moved_std=np.ones(len(at)), moved_first=np.zeros(len(at)))
     vector = np.r_[fitted.vector[:count], np.zeros(len(at)), fitted.vector[count:]]
