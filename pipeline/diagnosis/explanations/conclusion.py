@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.diagnosis.explanations.search import Search
-from pipeline.diagnosis.fits.workbench import Workbench, from_both_sides
+from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Posterior
@@ -63,18 +63,12 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
     refits = believed.explanations()
     first = next((one for one in refits if len(one.causes) == count or unmodelled), None)
-    accepted = None if first is None or first.found is None else in_deeper_valley(bench, first.found)
+    accepted = None if first is None else first.found
     if accepted is None or unmodelled:
         alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)
         return Conclusion(believed, search.grid, accepted, alone, unmodelled=True, curtailed=search.curtailed)
     classes = _classes(bench, believed, accepted)
     return Conclusion(believed, search.grid, accepted, classes, unmodelled=False, curtailed=search.curtailed)
-
-
-def in_deeper_valley(bench: Workbench, found: Explanation) -> Explanation:
-    """The explanation fitted from both sides of its K0 as well, where no photo shows the force-free cable."""
-    fitted = from_both_sides(bench.observation, found.fitted)
-    return replace(found, fitted=fitted, gain=bench.base.chi2 - fitted.chi2)
 
 
 def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tuple[tuple[int, ...], ...]:

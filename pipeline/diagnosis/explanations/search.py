@@ -87,18 +87,10 @@ class Search:
         return [*best, *(one for _, one in new[LIKELIEST:])]
 
     def singles(self) -> list[Explanation]:
-        """Refit causes that matter or come near the best score; all where none explains what it promised."""
-        bench = self.bench
+        """Refit causes that matter or come near the best score."""
         linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
-        loading_only = "mounted" not in bench.facts.branch
-        near = candidates(bench.suspicion, any_sign=loading_only)
-        found = list(self._each([*near, *sorted(linear - set(near))]))
-        best = max(found, key=lambda e: e.gain, default=None)
-        if best is None or best.gain < CONFIRMED * bench.largest**2 or (loading_only and not _foreseen(bench, best)):
-            # a base model in a false valley of K0 points at the wrong causes: from other starts the right one may fit
-            tried = {*near, *linear}
-            found += self._each([k for k in range(len(bench.suspicion.causes)) if k not in tried])
-        return self.add(found)
+        near = candidates(self.bench.suspicion, any_sign="mounted" not in self.bench.facts.branch)
+        return self.add(list(self._each([*near, *sorted(linear - set(near))])))
 
     def _each(self, causes: Sequence[int]) -> Iterator[Explanation]:
         rival = np.inf
@@ -168,13 +160,8 @@ class Search:
             found = linearly(bench, self.grid, (pair.first, pair.second))
             self.hypotheses.append(found._replace(plain=found.plain + ahead, rest=rest, found=None))
         believed = self.posterior
-        composed = best is not None and len(best.fitted.extension.terms) > 1
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
-        return composed or believed.total(count=2) + believed.total(something_else=True) > beforehand
-
-
-CONFIRMED = 0.5
-"""Share of a score's chi-square that its refit must remove: a score that no refit confirms is no finding."""
+        return believed.total(count=2) + believed.total(something_else=True) > beforehand
 
 
 def linearly(bench: Workbench, grid: ErrorGrid, directions: tuple[int, ...]) -> Hypothesis:
@@ -187,12 +174,6 @@ def linearly(bench: Workbench, grid: ErrorGrid, directions: tuple[int, ...]) -> 
     fitted = replace(base, extension=extension, vector=vector, jacobian=np.hstack([base.jacobian, columns]))
     causes = tuple(int(seen.owner[k]) for k in directions)
     return refitted(grid.plain, explanation_of(causes, base, fitted), bench.facts)
-
-
-def _foreseen(bench: Workbench, found: Explanation) -> bool:
-    """Whether a score of admissible sign announced what a refit found, or it was found in another valley."""
-    announced = max(float(bench.suspicion.statistic[bench.suspicion.of(k)].max()) for k in found.causes)
-    return announced**2 >= CONFIRMED * min(found.gain, bench.limit**2)
 
 
 def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:

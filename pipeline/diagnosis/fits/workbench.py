@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extended import stiffness_change_linear
 from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import FITS, ITERATIONS, Fit, fit, fit_from
+from pipeline.diagnosis.fits.fit import ITERATIONS, Fit, fit, fit_from
 from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.noise import calibrate_photo_noise
@@ -35,10 +35,6 @@ Array = NDArray[np.float64]
 
 NULL_DRAWS = 20_000
 """Draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma."""
-
-OTHER_SIDE = 0.15
-"""Of the curvature scale: how far to both sides of a fitted K0 it is put to look for a deeper valley. The false one of
-a cable bent by 0.9 1/m, with a tenth of that scale more, lay at -0.7 1/m, and six of chi-square higher."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +105,7 @@ def prepare(
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
     base = start(test, facts, elements=settings.grid, exact=settings.displacement_std)
-    fitted = _robust_fit(observation, base, facts)
+    fitted = _first_fit(observation, base, facts)
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
         return ended(fitted.run.failed)
@@ -157,27 +153,16 @@ def _with_bends(fitted: Fit) -> Facts:
     return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])
 
 
-def _robust_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
-    """The best of several starts: a wrong base model has false minima, and a start may lack equilibrium."""
+def _first_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
+    """The model fitted from the law and K0 that photos show; from a constant one where that does not settle."""
     best: Fit | None = None
-    shift = 0.1 * facts.curvature_scale
-    freedom = observation.rows.count - len(base.names)
-    neutral = ((1.0, 0.0), (1.0, shift), (0.5, -shift), (2.0, 3.0 * shift))
-    starts = [base.neutral(stiffness=stiffness, bend=bend) for stiffness, bend in neutral]
-    for number, vector in enumerate((base.as_seen(), *starts)):
-        found = fit(
-            observation,
-            Extension(base, facts),
-            vector,
-            iterations=2 * ITERATIONS,
-        )
+    for vector in (base.as_seen(), base.neutral()):
+        found = fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
-        # only then K0 is seen directly; else it has a second valley, which may fit nearly as well
-        at_rest = "mounted" in facts.branch
-        if at_rest and best is not None and (best.chi2 < FITS * freedom or (number and best.converged)):
+        if best is not None and best.converged:
             break
-    return found if best is None else best
+    return best or found
 
 
 def laid_along(fitted: Fit) -> tuple[Extension, Array]:
@@ -188,25 +173,3 @@ def laid_along(fitted: Fit) -> tuple[Extension, Array]:
     basis = refreshed(law.rise, fitted.covariance[:count, :count], float(bends.min()), float(bends.max()))
     extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis)))
     return extension, np.r_[basis.projected(law.rise), fitted.vector[count:]]
-
-
-def from_both_sides(observation: Observation, fitted: Fit) -> Fit:
-    """The model fitted from both sides of its K0, and from a cable bent the other way at rest, where no photo shows it.
-
-    A law that rises from rest beside a K0 that is too small, or of the other sign, can fit three photos nearly as well
-    as one that falls from the true K0. So the starts have a law that rises nowhere: nothing less is known of it near
-    rest than that. The best of all.
-    """
-    base = fitted.extension.base
-    if "mounted" in fitted.extension.facts.branch or base.pre_curvature_index is None:
-        return fitted
-    best, count = fitted, base.law.size
-    apart = OTHER_SIDE * fitted.extension.facts.curvature_scale
-    for shift in (apart, -apart, -2.0 * base.pre_curvature(fitted.vector)):
-        vector = fitted.vector.copy()
-        vector[:count] = np.maximum.accumulate(vector[:count][::-1])[::-1]
-        vector[base.pre_curvature_index] += shift
-        found = fit_from(observation, fitted.extension, vector, fitted)
-        if found.run.prediction is not None and found.chi2 < best.chi2:
-            best = found
-    return best

@@ -9,7 +9,6 @@ from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import deviation, forms, largest_of, position_of, profile, wave
-from pipeline.diagnosis.explanations.conclusion import in_deeper_valley
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
 from pipeline.diagnosis.fits.extension import Extension, Term
@@ -54,7 +53,7 @@ def benched(cable, protocol, name, seed):
 def test_a_profile_of_no_form_is_found_to_the_noise_and_f_comes_back(name, cable, protocol):
     """Three spots left many times the noise of the first three, and put f_EI 2 to 31 % off."""
     bench = benched(cable, protocol, name, seed=60400)
-    found = in_deeper_valley(bench, refit_one(bench.observation, bench.base, bench.suspicion, 0))
+    found = refit_one(bench.observation, bench.base, bench.suspicion, 0)
     assert found.fitted.reduced_chi2 < FITS
     again = identified_again(bench.observation, found.fitted)
     law = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)
