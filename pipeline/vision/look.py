@@ -22,7 +22,7 @@ def look_at_photos(specimen: Specimen, settings: VisionSettings) -> tuple[Findin
     InputError
         The calibration photos cannot be used.
     """
-    shots, covers = find_cables(specimen, given_calibration(specimen, settings), settings)
+    shots, covers = find_cables(specimen, next(iter(given_calibration(specimen, settings)), None), settings)
     shots, sizes = of_one_size(shots, settings.series)
     refused = [shot.found for shot in shots if isinstance(shot.found, Rejected)]
     level: Level = "error" if len(refused) == len(shots) else "warning"

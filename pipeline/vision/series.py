@@ -34,6 +34,7 @@ from pipeline.vision.scale.calibration import (
     check_scale,
     from_found,
     from_number,
+    in_plane_of_cable,
 )
 from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
@@ -72,13 +73,14 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
 
 def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     """All photos with the diameter as stated."""
-    calibration = given_calibration(specimen, settings)
+    planes = given_calibration(specimen, settings)
+    calibration = next(iter(planes), None)
     shots, cover_findings = find_cables(specimen, calibration, settings)
     shots, sized = _together(shots, lambda some: of_one_size(some, settings.series))
     shots, size_findings = sized or (shots, (_UNTOLD,))
-    if calibration is None:
-        shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, settings),))
-        calibration = _by_what_is_seen(specimen, shots, settings) if told is None else told[0]
+    if calibration is None or len(planes) > 1:
+        shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, planes, settings),))
+        calibration = _by_what_is_seen(specimen, shots, planes, settings) if told is None else told[0]
     if calibration is None:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, Message("scale.none")))
@@ -109,8 +111,13 @@ def _together(shots: list[Shot], work: Callable[[list[Shot]], Told]) -> tuple[li
     return without(outcomes), told
 
 
-def _by_what_is_seen(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Calibration | None:
+def _by_what_is_seen(
+    specimen: Specimen, shots: list[Shot], planes: list[Calibration], settings: VisionSettings
+) -> Calibration | None:
+    """The calibration by bearings and cable, or which of the planes of a board is theirs."""
     found, displacements = _told_by(shots, [shot.found for shot in shots])
+    if planes:
+        return in_plane_of_cable(planes, specimen, found, displacements, settings.calibration)
     return from_found(specimen, found, displacements, settings.calibration)
 
 
@@ -156,14 +163,14 @@ def _with_pictures(shots: Sequence[Shot], lines: tuple[Line, ...]) -> tuple[Line
     return tuple(replace(line, preview=shot.preview) if line.preview is None else line for shot, line in pairs)
 
 
-def given_calibration(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
-    """The scale that specimen.toml gives, as a number or by a board; None if it gives none."""
+def given_calibration(specimen: Specimen, settings: VisionSettings) -> list[Calibration]:
+    """The scale that specimen.toml gives, as a number or by a board, which may show several planes; empty if none."""
     camera = specimen.camera
     if camera.scale_px_per_m is not None:
-        return from_number(camera.scale_px_per_m, settings.calibration)
+        return [from_number(camera.scale_px_per_m, settings.calibration)]
     if camera.calibration is not None and camera.board is not None:
         return calibrate_by_board(camera, specimen.diameter_m, settings)
-    return None
+    return []
 
 
 def _told_by(

@@ -40,8 +40,8 @@ _BOARD_SEARCH_PX = 2000  # px; long side at which the board is searched, corners
 _MAX_BOARD_RMS_PX = 0.5  # px; real boards reach 0.12 to 0.16 px, bent ones do not
 
 
-def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSettings) -> Calibration:
-    """Calibrate from the folder of ``camera``.
+def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSettings) -> list[Calibration]:
+    """Calibrate from the folder of ``camera``: one plane for all photos, or that of each photo.
 
     Raises
     ------
@@ -54,20 +54,34 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
     stage = settings.calibration
     views, findings = _read_views(camera.calibration, camera.board, settings)
     try:
-        fit = fit_views(views, stage)
+        fits = fit_views(views, stage)
     except (np.linalg.LinAlgError, cv2.error) as error:
         raise InputError(Message("calibration/no-board.plane"), path=camera.calibration) from error
-    raised, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, stage)
+    return [_calibration_of(fit, views, findings, camera, diameter_m, stage) for fit in fits]
+
+
+def _calibration_of(
+    fit: PlaneFit,
+    views: list[BoardView],
+    read: list[Finding],
+    camera: CameraSpec,
+    diameter_m: float,
+    settings: CalibrationSettings,
+) -> Calibration:
+    """The calibration by a fitted plane of the board's surface, raised to the axis of the cable."""
+    raised, height_std, height_findings = _raise_to_axis(fit, camera.distance_m, diameter_m, settings)
     plane = _magnified(fit.plane, raised)
-    middle = 0.5 * np.array([views[0].size], float)
     uniform = float(np.hypot(_BOARD_STD, height_std))
-    std = float(np.hypot(fit.scale_std, uniform))
     source = Message("scale.board", photos=len(views), lens=fit.lens_source)
-    scale = Scale(float(plane.local_scale(middle)[0]), std, source)
+    middle = 0.5 * np.array([views[0].size], float)
+    scale = Scale(float(plane.local_scale(middle)[0]), float(np.hypot(fit.scale_std, uniform)), source)
+    findings = list(read)
     if fit.rms_px > _MAX_BOARD_RMS_PX:
         findings.append(doubtful("calibration/residual", rms_px=fit.rms_px))
-    if fit.border_std > stage.max_border_std:
+    if fit.border_std > settings.max_border_std:
         findings.append(doubtful("calibration/border", std=fit.border_std))
+    if fit.photo:
+        findings.append(inferred("calibration/planes", image=fit.photo))
     aside = tuple(_magnified(other, raised) for other in fit.aside)
     return Calibration(plane, scale, (*findings, *height_findings), uniform, aside)
 

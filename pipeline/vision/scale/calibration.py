@@ -152,6 +152,30 @@ def _by_covers(found: list[RoughCable], specimen: Specimen, settings: Calibratio
     return Scale(2.0 * float(np.median(radii)) / specimen.rig.marker_diameter_m, std, Message("scale.covers"))
 
 
+def in_plane_of_cable(
+    planes: list[Calibration],
+    specimen: Specimen,
+    found: list[RoughCable],
+    displacements: Array,
+    settings: CalibrationSettings,
+) -> Calibration:
+    """Of the planes that a board was shown in, the one in which travel and length come out nearest to what is known.
+
+    Where others do nearly as well, what they differ by is in the scale's standard deviation.
+    """
+    parallax_std, misfits = axis_parallax_std(specimen, found, settings), []
+    for one in planes:
+        travel = _by_travel_on_plane(one, found, displacements, parallax_std)
+        seen = (travel, _by_length(one, found, specimen, settings))
+        misfits.append(sum(((s.px_per_m - 1.0) / _std(s, one.scale)) ** 2 for s in seen if s is not None))
+    chance = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
+    best = planes[int(np.argmax(chance))]
+    apart = np.array([one.scale.px_per_m / best.scale.px_per_m - 1.0 for one in planes])
+    spread = float(np.sqrt(chance @ apart**2 / chance.sum()))
+    scale = replace(best.scale, std_relative=math.hypot(best.scale.std_relative, spread))
+    return replace(best, scale=scale, uniform_std=math.hypot(best.uniform_std, spread))
+
+
 def check_scale(
     specimen: Specimen,
     calibration: Calibration,

@@ -5,8 +5,9 @@ together give the homography (tilt and scale) and the radial lens term ``k1``:
 
 ``board (X, Y) -> moved in the plane -> H^-1 -> ideal pixel -> r (1 + k1 (r / R)^2) -> photo``
 
-R half the picture's diagonal. From ten photos on they may show the board in any position; then the lens comes from
-all of them (camera matrix, k1, k2, p1, p2) and the plane from the first by name.
+R half the picture's diagonal. Three photos or more may show the board in any position, as they must to calibrate a
+lens: where one plane does not fit them, the lens comes from all (camera matrix, k1, k2, p1, p2), and each photo shows
+a plane of its own.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from pipeline.records import Array
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
-_LENS_PHOTOS = 10  # photos; from so many on they may show the board in any position
+_LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
+_DISTANCE_STD = 0.3  # relative; a distance known worse tells no more than a usual one
 _CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
 _LENS_SIGMAS = 3.0  # sigmas; a weaker k2 or tangential term adds more error than it removes
 _ONE_PLANE_RATIO = 1.5  # ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it
@@ -55,6 +57,8 @@ class PlaneFit:
     lens_source : Message
     aside : tuple of PlaneMap
         Maps one standard deviation away along each principal direction of the fit's covariance.
+    photo : str
+        Of which it is the plane; empty where it is that of all.
     """
 
     plane: PlaneMap
@@ -64,16 +68,17 @@ class PlaneFit:
     distance_m: float | None
     lens_source: Message
     aside: tuple[PlaneMap, ...]
+    photo: str = ""
 
 
-def fit_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
-    """Plane map of the board's surface from one photo or more."""
+def fit_views(views: list[BoardView], settings: CalibrationSettings) -> list[PlaneFit]:
+    """Plane maps of the board's surface from one photo or more: one for all, or that of each photo."""
     flat = _fit_plane_views(views, settings)
     if len(views) < _LENS_PHOTOS:
-        return flat
+        return [flat]
     free = _fit_free_views(views, settings)
     # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
-    return free if flat.rms_px > _ONE_PLANE_RATIO * free.rms_px else flat
+    return free if flat.rms_px > _ONE_PLANE_RATIO * free[0].rms_px else [flat]
 
 
 def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
@@ -214,8 +219,8 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float, settin
     return _Solution(q * scale, scale, np.asarray(np.linalg.pinv(slopes.T @ slopes)) * rms**2, rms)
 
 
-def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
-    """Ten or more positions: camera matrix and lens from all, the plane from the first photo."""
+def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> list[PlaneFit]:
+    """Any positions: camera matrix and lens from all, the plane of each photo."""
     objects = [np.column_stack([v.board_m, np.zeros(len(v.board_m))]).astype(np.float32) for v in views]
     images = [v.uv.astype(np.float32).reshape(-1, 1, 2) for v in views]
     simple = cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K2 | cv2.CALIB_ZERO_TANGENT_DIST
@@ -227,18 +232,29 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> Pl
     drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
     rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > _LENS_SIGMAS**2 * 3 else fits[0]
     lens = Lens(np.asarray(camera, np.float64), np.asarray(distortion, np.float64).ravel()[:5])
-    ideal = replace(views[0], uv=lens.undistort(views[0].uv))
-    rotation, _ = cv2.Rodrigues(turns[0])
-    # The board's z axis points away from or toward the camera; the distance from the plane is the same.
-    distance = float(abs(rotation[:, 2] @ np.ravel(shifts[0])))
+    focal, stds = float(lens.camera[0, 0]), np.ravel(stds)  # of fx, fy, cx, cy, k1
     middle, radius = _picture(views[0])
-    lens_std = float(np.ravel(stds)[4]) * (radius / float(lens.camera[0, 0])) ** 2  # fx, fy, cx, cy, k1
-    fit = _least_squares([ideal], np.append(0.0, _start([ideal], middle, radius)[0]), lens_std, settings)
-    plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
-    # OpenCV counts distances, here as above coordinates.
     source = Message("lens.photos", photos=len(views))
-    aside = _aside_of(plane, fit, middle, radius)
-    return PlaneFit(plane, float(rms) / np.sqrt(2.0), *_scale_stds(fit, middle, radius), distance, source, aside)
+    found = []
+    for view, turn, shift in zip(views, turns, shifts, strict=True):
+        ideal = replace(view, uv=lens.undistort(view.uv))
+        # The board's z axis points away from or toward the camera; the distance from the plane is the same.
+        distance = float(abs(cv2.Rodrigues(turn)[0][:, 2] @ np.ravel(shift)))
+        start = np.append(0.0, _start([ideal], middle, radius)[0])
+        fit = _least_squares([ideal], start, float(stds[4]) * (radius / focal) ** 2, settings)
+        plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
+        # OpenCV counts distances, here as above coordinates.
+        made = PlaneFit(
+            plane,
+            float(rms) / np.sqrt(2.0),
+            *_scale_stds(fit, middle, radius),
+            distance if stds[0] < _DISTANCE_STD * focal else None,
+            source,
+            _aside_of(plane, fit, middle, radius),
+            view.name,
+        )
+        found.append(made)
+    return found
 
 
 def _aside_of(plane: PlaneMap, fit: _Solution, middle: Array, radius: float) -> tuple[PlaneMap, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Specimen
+from pipeline.messages import Message
+from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Scale, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.photo import Photo
@@ -16,7 +17,14 @@ from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, St
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.board import calibrate_by_board, find_board
-from pipeline.vision.scale.calibration import axis_parallax_std, check_scale, from_found, from_number
+from pipeline.vision.scale.calibration import (
+    Calibration,
+    axis_parallax_std,
+    check_scale,
+    from_found,
+    from_number,
+    in_plane_of_cable,
+)
 from pipeline.vision.scale.corners import Window, refine_corners
 from pipeline.vision.scale.plane import Lens, PlaneMap
 from pipeline.vision.scale.plane_fit import BoardView, fit_views
@@ -85,7 +93,7 @@ def test_one_board_photo_takes_tilt_and_distortion_away(
     camera = replace(camera, distance_m=distance)
     board_photo(tmp_path, camera, ChessBoard(columns, 9, SQUARE))
     spec = CameraSpec(calibration=tmp_path, board=Board(columns, 9, SQUARE), distance_m=1e9)
-    calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+    calibration = calibrate_by_board(spec, 0.005, SETTINGS)[0]
     # Uncorrected, 1 % of distortion is 1 mm at the border and 2 degrees are 8 mm. A hundred corners to 0.008 px
     # leave 0.2 um, 5 um at the rim of the picture, which no corner reaches, where the lens counts six times.
     assert 1e6 * shape_error(calibration.plane, camera) < 5.0
@@ -99,9 +107,9 @@ def test_scale_of_the_axis_above_the_board_is_corrected_by_the_camera_distance(t
     # the board lies on the table, the camera's scale is that of the cable axis, half a diameter above
     board_photo(tmp_path, camera, ChessBoard(13, 7, SQUARE, height_m=-0.5 * diameter))
     spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=distance + 0.5 * diameter)
-    raised = calibrate_by_board(spec, diameter, SETTINGS)
+    raised = calibrate_by_board(spec, diameter, SETTINGS)[0]
     assert 1e6 * shape_error(raised.plane, camera) < 5.0  # as in the plane of the board, above
-    flat = calibrate_by_board(replace(spec, distance_m=None), diameter, SETTINGS)
+    flat = calibrate_by_board(replace(spec, distance_m=None), diameter, SETTINGS)[0]
     # without the distance the scale is off by h / Z = 0.75 %, 0.8 mm at a corner 0.11 m from the middle, and says so
     assert 1e6 * shape_error(flat.plane, camera) > 0.0075 * 0.1e6
     assert flat.scale.std_relative > 0.5 * 0.5 * diameter / distance  # told for the usual distance, twice this one
@@ -120,7 +128,7 @@ def test_charuco_board_is_found_whatever_its_dictionary(tmp_path: Path) -> None:
         spec = CameraSpec(
             calibration=tmp_path, board=Board(11, 7, SQUARE, charuco=True, marker_m=0.7 * SQUARE), distance_m=1e9
         )
-        calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+        calibration = calibrate_by_board(spec, 0.005, SETTINGS)[0]
         assert calibration.scale.px_per_m == pytest.approx(4_000.0, rel=2.5e-5)  # 0.01 px on the 400 px of the board
 
 
@@ -154,11 +162,11 @@ def test_no_corner_is_made_up_where_there_is_none() -> None:
 
 def test_small_board_says_that_it_does_not_tell_the_border(tmp_path: Path) -> None:
     camera = Camera(1200, 620, 5_400.0, k1=-0.01)
-    told = [fit_views(views_of(camera, [ChessBoard(*size, SQUARE)], 0.1, 1), STAGE) for size in ((6, 4), (19, 9))]
+    told = [fit_views(views_of(camera, [ChessBoard(*size, SQUARE)], 0.1, 1), STAGE)[0] for size in ((6, 4), (19, 9))]
     assert told[0].border_std > STAGE.max_border_std > told[1].border_std
     board_photo(tmp_path, camera, ChessBoard(4, 3, 0.006, (0.03, 0.01)))
     spec = CameraSpec(calibration=tmp_path, board=Board(4, 3, 0.006), distance_m=1e9)
-    calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+    calibration = calibrate_by_board(spec, 0.005, SETTINGS)[0]
     assert [finding.code for finding in calibration.findings] == ["calibration/border"]
 
 
@@ -177,7 +185,7 @@ def views_of(camera: Camera, poses: list[ChessBoard], noise_px: float, seed: int
 def test_several_photos_in_the_plane_share_one_fit() -> None:
     camera = Camera(2000, 1000, 9_000.0, k1=-0.01, perspective_per_m=(0.05, -0.04))
     poses = [ChessBoard(7, 5, SQUARE, (x, y), (0, 0, turn)) for x, y, turn in ((0.04, 0.03, 0.1), (0.14, 0.03, -0.4))]
-    errors = [shape_error(fit_views(views_of(camera, poses[:n], 0.1, 3), STAGE).plane, camera) for n in (1, 2)]
+    errors = [shape_error(fit_views(views_of(camera, poses[:n], 0.1, 3), STAGE)[0].plane, camera) for n in (1, 2)]
     # 0.1 px are 11 um: two boards hold all of the picture to three times the error of a corner, one small board at the
     # left tells little about the right half of it.
     assert 1e6 * errors[1] < 33.0
@@ -191,7 +199,7 @@ def test_scale_by_one_photo_is_as_sure_as_it_says() -> None:
         tilt = np.sin(np.radians(rng.uniform(-2.0, 2.0, 2))) / 0.4
         camera = Camera(1200, 620, 5_400.0, k1=float(rng.choice([-0.01, 0.0, 0.01])), perspective_per_m=tuple(tilt))
         board = ChessBoard(int(rng.integers(7, 15)), 7, SQUARE, (0.02, 0.02), (0.0, 0.0, rng.uniform(-0.05, 0.05)))
-        fit = fit_views(views_of(camera, [board], float(rng.uniform(0.05, 0.2)), seed), STAGE)
+        fit = fit_views(views_of(camera, [board], float(rng.uniform(0.05, 0.2)), seed), STAGE)[0]
         middle = 0.5 * np.array([camera.width, camera.height])
         about = middle + np.array([[2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]])
         x, y = camera.plane(about[:, 0], about[:, 1])
@@ -212,17 +220,35 @@ def test_ten_positions_give_the_lens_and_the_camera_distance() -> None:
         )
         for _ in range(11)
     ]
-    fit = fit_views(views_of(camera, poses, 0.1, 7), STAGE)
+    fit = fit_views(views_of(camera, poses, 0.1, 7), STAGE)[0]
     # foreshortening is about a fifth of 600 px of board: 0.1 px tell it to a thousandth, by a single corner
     assert fit.distance_m == pytest.approx(0.45, rel=1e-3)
     assert fit.rms_px == pytest.approx(0.1, rel=0.065)  # 2184 numbers tell it to 1.5 %: three of those, and 77 fitted
     assert 1e6 * shape_error(fit.plane, camera) < 200.0  # 0.05 % of the picture's 0.4 m, the boards leave the rim out
 
 
+def test_few_positions_tell_the_lens_and_the_cable_tells_which_plane_is_its_own() -> None:
+    """Three tilted boards and one in the plane of the cable, taken for one plane, put the scale 12 % off."""
+    camera = Camera(2000, 1200, 5_000.0, k1=-0.02, distance_m=0.45)
+    tilts = [(0.2, -0.1, 0.1), (-0.15, 0.2, -0.2), (0.1, 0.25, 0.05), (0.0, 0.0, 0.0)]
+    poses = [ChessBoard(13, 7, SQUARE, (0.05, 0.03), tilt) for tilt in tilts]
+    planes = [
+        Calibration(fit.plane, Scale(5_000.0, fit.scale_std, Message("scale.number")))
+        for fit in fit_views(views_of(camera, poses, 0.1, 7), STAGE)
+    ]
+    assert len(planes) == 4
+    travel = np.array([0.0, 0.01, 0.02, 0.03])
+    ends = [camera.project([0.1 + d, 0.28], [0.12, 0.12])[0] for d in travel]  # along the middle of the picture
+    cables = [found(left, right, middle=600.0) for left, right in ends]
+    best = in_plane_of_cable(planes, specimen(length_m=0.165), cables, travel, STAGE)  # the middle one of the four
+    assert best.plane is planes[3].plane
+    assert 1e6 * shape_error(best.plane, camera) < 200.0  # as with ten positions
+
+
 def test_positions_in_one_plane_give_no_distance() -> None:
     camera = Camera(2000, 1200, 6_000.0, distance_m=0.45)
     poses = [ChessBoard(9, 6, SQUARE, (0.06 + 0.005 * i, 0.03), (0.0, 0.0, 0.2 * i)) for i in range(11)]
-    assert fit_views(views_of(camera, poses, 0.1, 2), STAGE).distance_m is None
+    assert fit_views(views_of(camera, poses, 0.1, 2), STAGE)[0].distance_m is None
 
 
 def test_folder_without_a_board_is_the_users_error(tmp_path: Path) -> None:
@@ -253,15 +279,15 @@ def test_unreadable_calibration_photo_is_a_finding(tmp_path: Path) -> None:
     board_photo(tmp_path, Camera(1100, 600, 5_000.0), ChessBoard(13, 7, SQUARE))
     (tmp_path / "empty.jpg").write_bytes(b"")
     spec = CameraSpec(calibration=tmp_path, board=BOARD, distance_m=1.0)
-    calibration = calibrate_by_board(spec, 0.005, SETTINGS)
+    calibration = calibrate_by_board(spec, 0.005, SETTINGS)[0]
     assert [f.code for f in calibration.findings] == ["calibration/photo"]
     assert "empty.jpg" in calibration.findings[0].message
 
 
-def found(left: float, right: float, radius: float | None = None, std: float = 0.02) -> RoughCable:
-    """A cable whose axes lie at the given u; only what calibration reads is filled."""
-    path = np.column_stack([np.linspace(left, right, 50), np.zeros(50)])
-    bearings = [Bearing((u, 0.0), std, radius, 0.02 if radius else None) for u in (left, right)]
+def found(left: float, right: float, radius: float | None = None, std: float = 0.02, middle: float = 0.0) -> RoughCable:
+    """A cable whose axes lie at the given u and at v ``middle``; only what calibration reads is filled."""
+    path = np.column_stack([np.linspace(left, right, 50), np.full(50, middle)])
+    bearings = [Bearing((u, middle), std, radius, 0.02 if radius else None) for u in (left, right)]
     grey = np.zeros((1, 1), np.float32)
     return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 0.01, 1.0)
 

@@ -51,7 +51,7 @@ def test_errors_of_a_small_board_are_as_large_as_the_band_says() -> None:
         tilt = np.sin(np.radians(rng.uniform(-2.0, 2.0, 2))) / 0.4
         camera = Camera(1300, 640, 5_400.0, k1=float(rng.normal(0.0, STAGE.usual_lens)), perspective_per_m=tuple(tilt))
         board = ChessBoard(6, 5, SQUARE, (0.06, 0.03), (0.0, 0.0, rng.uniform(-0.05, 0.05)))
-        fit = fit_views(views_of(camera, [board], 0.15, seed), STAGE)
+        fit = fit_views(views_of(camera, [board], 0.15, seed), STAGE)[0]
         calibration = Calibration(fit.plane, from_number(5_400.0, STAGE).scale, aside=fit.aside)
         line = arc(camera)
         std = with_doubt_of_plane(line, calibration).kappa_std[3:-3]
