@@ -180,14 +180,14 @@ def predict(
     settings = settings or PredictSettings()
     length = result.specimen.length_m if length_m is None else length_m
     if not len(displacements_m) or not np.all(np.isfinite(displacements_m)):
-        raise ValueError("give finite displacements")
+        raise ValueError(Message("misuse.displacements"))
     model = identified_model(result)
     if model is None:
         return None
     if not (told := result.answer).usable:
-        raise ValueError(f"{result.specimen.id} is not usable, nor is what follows from it: {told.reason.rstrip('.')}")
-    if length is None or not (np.isfinite(length) and length > 0.0):
-        raise ValueError(f"a cable cannot be {length} m long")
+        raise ValueError(Message("comparison.unusable", name=result.specimen.id, reason=told.said))
+    if length is None:
+        raise ValueError(Message("cli.no-length"))
     _check_sizes(length, displacements_m, model)
     test = model.bending_test(length, zero=zero, elements=settings.elements)
     steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate, settings)
@@ -214,15 +214,12 @@ def _check_sizes(length: float, displacements: Sequence[float], model: Identifie
     """Refuse numbers that are of no test; `ValueError` says which."""
     low, high = LENGTHS_M
     if not low <= length <= high:
-        raise ValueError(f"a cable of {plain(1e3 * length)} mm is in no test: give its length in mm")
+        raise ValueError(Message("misuse.length", length_m=length))
     largest = max(displacements, key=abs)
     if abs(largest) >= length:
-        raise ValueError(
-            f"a displacement of {plain(1e3 * largest)} mm is none of a cable of {plain(1e3 * length)} mm: the bearings "
-            "would meet before; give it in mm"
-        )
+        raise ValueError(Message("misuse.bearings-meet", given_m=largest, length_m=length))
     if np.mean(model.characteristic.ordinates) <= 0.0:
-        raise ValueError("the stiffness that the result holds is not positive, as that of no cable")
+        raise ValueError(Message("fault.negative"))
 
 
 def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:

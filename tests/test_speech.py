@@ -73,6 +73,12 @@ def test_the_catalogue_says_what_every_option_does_and_no_other():
         (("init",), "einen Ordner FOLDER mit Fotos angeben", "give a FOLDER of photos"),
         (("explain", "stifness_varying"), "ist stiffness_varying gemeint?", "did you mean stiffness_varying?"),
         (("predict", "x", "--displacement-mm", "5;6"), "ist keine Liste von Zahlen", "is no list of numbers"),
+        (("simulate", "x", "--hide", "bearing_friction=x"), "mit endlichen Zahlen", "with finite numbers"),
+        (("simulate", "x", "--hide", "rigid_ends=-1"), "was rigid_ends nicht sein kann", "which rigid_ends cannot be"),
+        (("simulate", "x", "--hide", "plastic"), "die nächste ist plastic_set", "the nearest is plastic_set"),
+        (("simulate", "x", "--k0", "40"), "rollt 181 mm Kabel", "rolls 181 mm of cable"),
+        (("simulate", "x", "--length-mm", "4"), "die Länge größer als", "the length above"),
+        (("design", "--step-mm", "100"), "der geplante Versuch ist nicht möglich", "the planned test cannot be made"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

@@ -74,14 +74,16 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
 
     try:
         specimen = read_specimen(folder, settings.intake)
-        told = (*specimen.findings, *look_at_photos(specimen, settings.vision))
+        seen = look_at_photos(specimen, settings.vision)
     except Exception as error:  # one folder never costs the others
         return _failed(folder, refusal(error))
+    told = dict.fromkeys((*specimen.findings, *seen))
     levels = {finding.level for finding in told}
     status = "error" if "error" in levels else "warning" if "warning" in levels else "ok"
-    findings = [finding.document for finding in dict.fromkeys(told)]
+    runs = all(finding.level != "error" for finding in seen)  # with no photo left nothing is measured
     counts = {"steps": len(specimen.steps), "photos": len(specimen.images)}
-    return {"folder": str(folder), "id": specimen.id, "status": status, "runs": True, **counts, "findings": findings}
+    row = {"folder": str(folder), "id": specimen.id, "status": status, "runs": runs, **counts}
+    return row | {"findings": [finding.document for finding in told]}
 
 
 def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
-from pipeline.cli.speech import columns, entry, language, say, table, told
+from pipeline.cli.speech import columns, complaint, entry, language, say, table, told
 from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
 
@@ -62,7 +62,7 @@ def design(
         )
         found = outlook(planned, settings.diagnosis)
     except ValueError as error:
-        raise click.UsageError(f"{error}.") from error
+        raise click.UsageError(complaint(error)) from error
     if as_json:
         document = dataclasses.asdict(found) | {"extent": found.extent.model_dump()}
         click.echo(json.dumps(document, indent=1, default=lambda number: number.item()))  # numpy's own bool and float

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pipeline.cli.options import language_option
-from pipeline.cli.speech import note
+from pipeline.cli.speech import complaint, note
 from pipeline.cli.spoken import Spoken
 
 MISSING = 3
@@ -30,7 +30,7 @@ def export(ctx: click.Context, result: Path, form: str, bounds: tuple[float, flo
     try:
         text = exported(read_result(result), form, bounds=bounds)
     except ValueError as error:
-        note(f"{error}.")
+        note(complaint(error))
         ctx.exit(MISSING)
     if out is None:
         click.echo(text, nl=False)

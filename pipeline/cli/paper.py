@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from pipeline.cli.options import language_option
+from pipeline.cli.speech import entry, language
 from pipeline.cli.spoken import Spoken
 
 
@@ -16,7 +17,10 @@ from pipeline.cli.spoken import Spoken
 def paper(out: Path) -> None:
     """Compute everything of the paper that needs no real cable: paper.json, paper.html and figures."""
     from pipeline.report.paper import statements, write_paper
+    from pipeline.report.words import Words
 
-    for statement in statements(write_paper(out)):
-        click.echo(f"{statement.where}\n  paper: {statement.paper}\n  here:  {statement.here}")
+    words = Words(language())
+    labels = [f"  {words(key)}: " for key in ("paper_says", "paper_here")]
+    for where, *texts in statements(write_paper(out, words), words):
+        click.echo("\n".join((where, *map(entry, labels, texts))))
     click.echo(out / "paper.html")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
-from pipeline.cli.speech import entry, note, say, told
+from pipeline.cli.speech import complaint, entry, note, say, told
 from pipeline.cli.spoken import Spoken, wrong_use
 from pipeline.messages import Message
 
@@ -63,8 +63,6 @@ def predict(
         unusable = Message("comparison.unusable", name=name, reason=answer.said)
         note(Message("sentences", sentences=[unusable]))
         ctx.exit(MISSING)
-    if length_mm is None and measured.specimen.length_m is None:
-        raise wrong_use("cli.no-length")
     try:
         prediction = predicted(
             measured,
@@ -75,7 +73,7 @@ def predict(
             settings=settings.predict,
         )
     except ValueError as error:
-        raise click.UsageError(f"{error}.") from error
+        raise click.UsageError(complaint(error)) from error
     except ArithmeticError as error:
         raise wrong_use("cli.no-cable", path=result, why=str(error)) from error
     if prediction is None:

@@ -8,8 +8,9 @@ from typing import Any
 import click
 
 from pipeline.cli.options import POSITIVE, language_option
-from pipeline.cli.speech import say
+from pipeline.cli.speech import complaint, say
 from pipeline.cli.spoken import Spoken
+from pipeline.messages import Message
 
 
 def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Any]:
@@ -21,10 +22,10 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
         names = [name for name, _ in effects]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
-            raise ValueError(f"{twice} is given {names.count(twice)} times: give one --hide with the size of all")
+            raise ValueError(Message("misuse.twice", name=twice))
         return dict(effects)
     except ValueError as error:
-        raise click.BadParameter(f"{error}.") from error
+        raise click.BadParameter(complaint(error)) from error
 
 
 @click.command(cls=Spoken)
@@ -75,5 +76,5 @@ def simulate(
         )
         written = simulate_specimen(folder, experiment)
     except ValueError as error:
-        raise click.UsageError(f"{error}.") from error
+        raise click.UsageError(complaint(error)) from error
     say("cli.simulated", folder=written.folder, truth=written.truth_file)

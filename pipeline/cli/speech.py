@@ -39,6 +39,12 @@ def note(said: Message | str) -> None:
     click.echo(f"cablebend: {told(said)}", err=True)
 
 
+def complaint(error: ValueError) -> str:
+    """A caller's mistake as a sentence: in the language of the command where it holds a message."""
+    said = error.args[0] if error.args and isinstance(error.args[0], Message) else str(error)
+    return f"{told(said).rstrip('.')}."
+
+
 def refuse(error: InputError) -> None:
     """Print what is wrong with a file of the user."""
     note(error.placed)

@@ -81,21 +81,6 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
         raise InputError(Message("file/too-large", bytes=status.st_size, limit=limit, setting=setting), path=path)
 
 
-def read_begin(path: Path, count: int) -> bytes:
-    """First bytes of a file, at most so many.
-
-    Raises
-    ------
-    InputError
-        ``file/unreadable``.
-    """
-    try:
-        with path.open("rb") as stream:
-            return stream.read(count)
-    except OSError as error:
-        raise unreadable(path, error) from error
-
-
 def sha256(path: Path) -> str:
     """SHA-256 of a file, read in pieces so that memory stays bounded.
 

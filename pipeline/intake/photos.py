@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from pipeline.errors import InputError
-from pipeline.intake.access import check_file, inside, read_begin, sha256
+from pipeline.intake.access import check_file, inside, sha256
 from pipeline.intake.tomltable import shown
 from pipeline.messages import Message
 from pipeline.records import Finding, LoadStep, doubtful, inferred
@@ -24,8 +24,6 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 FOLDERS = ("images", "bilder", "fotos", "photos", "pictures", "aufnahmen")
 # Pictures of telephones and cameras that have to be converted first.
 OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".webp", ".gif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf")
-# First bytes of png, jpg, bmp and tif in either order of bytes.
-SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"II*\0", b"MM\0*")
 NO_PHOTO = re.compile(r"^\.|^~|^@|thumb|vorschau|preview|^__macosx$", re.IGNORECASE)
 
 
@@ -149,8 +147,7 @@ def match_photos(
         photos does not fit the steps.
     """
     present = list_photos(folder, without=calibration, settings=settings)
-    other = _of_other_kinds(folder, calibration, settings)
-    findings = [doubtful("photo/other-kind", names=_some(other))] if other and present else []
+    findings: list[Finding] = []
     if not any(step.image for step in steps):
         steps, noted = _by_order(folder, steps, present, log_name, settings)
         findings += noted
@@ -176,6 +173,9 @@ def match_photos(
     if not paths:
         key = "folder/no-photos.unusable" if findings else "folder/no-photos.unusable-all"
         raise no_photos(folder, settings, why=Message(key, last=findings[-1].said if findings else ""))
+    other = [name for name in _of_other_kinds(folder, calibration, settings) if name not in used]
+    if other:
+        findings.append(doubtful("photo/other-kind", names=_some(other)))
     unused = [name for name in present if name not in used]
     if unused:
         findings.append(inferred("photo/unused", count=len(unused), names=_some(unused)))
@@ -254,7 +254,7 @@ def _exists(path: Path) -> bool:
 def _loose(name: str, *, whole: bool = True) -> str:
     """A name without capitals, folder and (with ``whole=False``) suffix, however its accents are put together."""
     path = PurePosixPath(unicodedata.normalize("NFC", name.casefold()))
-    return path.name if whole or path.suffix not in SUFFIXES else path.stem
+    return path.name if whole or path.suffix not in (*SUFFIXES, *OTHER_SUFFIXES) else path.stem
 
 
 def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Path | None, str, list[Finding]]:
@@ -264,18 +264,10 @@ def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Pa
         return None, "", [doubtful("photo/outside", image=name)]
     try:
         check_file(path, limit=settings.photo_max_bytes, setting="photo_max_bytes")
-        begin = read_begin(path, 8)
-        # The stage that decodes it says so, too; here it is said before anything is measured.
-        told = [] if begin.startswith(SIGNATURES) else [_no_picture(name, begin)]
-        return path, sha256(path), told
+        return path, sha256(path), []
     except InputError as error:
         said = Message("photos.one", image=name, said=error.said)
         return None, "", [Finding(f"photo/{error.code.partition('/')[2]}", "warning", said)]
-
-
-def _no_picture(name: str, begin: bytes) -> Finding:
-    kind = ".empty" if not begin else ".convert" if begin[4:8] == b"ftyp" else ""
-    return doubtful(f"photo/no-picture{kind}", image=name)
 
 
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:

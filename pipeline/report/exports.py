@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message
 from pipeline.report.curves import Equivalent, equivalent
 from pipeline.result import Result, Visited
 from pipeline.rounding import plain, rounded
@@ -126,7 +127,7 @@ def export(result: Result, form: str, *, bounds: tuple[float, float] | None = No
         not visited.
     """
     if form not in FORMATS:
-        raise ValueError(f"no format is called {form!r}: one of {', '.join(FORMATS)}")
+        raise ValueError(Message("misuse.no-format", name=repr(form), known=FORMATS))
     return FORMATS[form](_cable(result, bounds))
 
 
@@ -135,12 +136,12 @@ def _cable(result: Result, bounds: tuple[float, float] | None) -> Cable:
     answer, name = result.answer, result.specimen.id
     length, diameter = result.specimen.length_m, result.specimen.diameter_m
     if answer.curve is None or not answer.usable:
-        raise ValueError(f"{name} is not usable: {answer.reason.rstrip('.')}")
+        raise ValueError(Message("comparison.unusable", name=name, reason=answer.said))
     if length is None or diameter is None:
-        raise ValueError(f"{name} has no length or no diameter")
+        raise ValueError(Message("misuse.no-sizes", name=name))
     curve, constant = answer.curve, equivalent(answer.curve, bounds)
     if constant is None:
-        raise ValueError(f"{name} was bent from {plain(curve.kappa[0])} to {plain(curve.kappa[-1])} 1/m only")
+        raise ValueError(Message("misuse.not-visited", name=name, low=curve.kappa[0], high=curve.kappa[-1]))
     between = f"{plain(constant.low)} to {plain(constant.high)} 1/m"
     head = (
         f"cable {name}, measured by cablebend ({answer.method}: {answer.reason}); SI units",

@@ -20,12 +20,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.diagnosis.rediscovery import Discovery, papers_test, rediscover
-from pipeline.messages import word
+from pipeline.messages import Message
 from pipeline.report.canvas import Area, Drawing, drawing, page_colours
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, environment, palette_css
 from pipeline.report.paper_figures import draw_difference, draw_evolution, draw_responses, draw_shapes, draw_straight
-from pipeline.rounding import fixed, plain
+from pipeline.report.words import Words
 from rod.bending_test import TABLE_1, TABLE_1_ORDINATES
 from rod.characteristic import Reading
 from rod.paper import (
@@ -43,10 +43,6 @@ from rod.paper import (
 from rod.paper_fit import PaperFit
 
 REACHED = 1e-3  # relative error at which the paper's fit counts as converged: three digits of Table 1
-CONDITIONS = (
-    f"K0(s) varying by {Conditions.varying} 1/m over one wave, centerlines scattered by "
-    f"{1e3 * Conditions.position_noise} mm and differentiated over {1e3 * Conditions.window:.0f} mm"
-)
 
 
 @dataclass(frozen=True)
@@ -65,15 +61,6 @@ class Paper:
     discoveries: tuple[Discovery, ...]
 
 
-@dataclass(frozen=True)
-class Statement:
-    """A statement of the paper beside what was computed."""
-
-    where: str
-    paper: str
-    here: str
-
-
 def compute() -> Paper:
     """Run every virtual experiment; a few seconds."""
     experiments = {(r, zero): table_one(r, from_length=zero) for r in READINGS for zero in (False, True)}
@@ -88,8 +75,8 @@ def compute() -> Paper:
     )
 
 
-def write_paper(folder: Path) -> Paper:
-    """Write ``paper.json``, ``paper.html`` and one SVG a figure into a folder, which is made.
+def write_paper(folder: Path, words: Words | None = None) -> Paper:
+    """Write ``paper.json``, ``paper.html`` and one SVG a figure, in English by default, into a folder, which is made.
 
     Returns
     -------
@@ -97,15 +84,14 @@ def write_paper(folder: Path) -> Paper:
         What was computed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    paper = compute()
-    figures = draw(paper)
+    paper, words = compute(), words or Words()
+    figures = draw(paper, words)
     for _, figure in figures:
         write_atomic(folder / f"{figure.name}.svg", standalone(figure))
     write_atomic(folder / "paper.json", json.dumps(numbers(paper), indent=1) + "\n")
+    look = {"palette": palette_css(page_colours()), "css": asset("page.css")}
     page = environment().get_template("paper.html")
-    text = page.render(
-        palette=palette_css(page_colours()), css=asset("page.css"), statements=statements(paper), figures=figures
-    )
+    text = page.render(**look, words=words, statements=statements(paper, words), figures=figures)
     write_atomic(folder / "paper.html", text)
     return paper
 
@@ -159,69 +145,40 @@ def iterations_to(fit: PaperFit, relative: float) -> int | None:
     return first if first < len(errors) else None
 
 
-def statements(paper: Paper) -> list[Statement]:
-    """What the paper says, and what came out here."""
-    inverse, low = paper.inverse, 1e3 * paper.straight.characteristic.ordinates[0]
-    errors = force_errors(paper)
+def statements(paper: Paper, words: Words) -> list[tuple[str, ...]]:
+    """Statements of the paper: where it stands, what the paper says, what came out here."""
+    inverse, low, (*causes, together) = paper.inverse, paper.straight.characteristic.ordinates[0], paper.causes
+    errors, given = force_errors(paper), Conditions()
     off = ", ".join(f"{1e3 * error:+.0f}" for error in errors).replace("-", "−")
-    largest = 100.0 * float(np.max(np.abs(errors / [step.force for step in inverse.steps])))
-    causes = ", ".join(f"{d.cause} {100 * d.share:.0f} % ({100 * d.rms:.0f} % rms alone)" for d in paper.causes[:-1])
-    forces = {r: ", ".join(f"{f:.4f}" for f in paper.experiments[r, False].forces) for r in READINGS}
-    counts = "; ".join(
-        f"step {step}: {cost.minimisations} minimisations with {cost.newton_steps} Newton steps (error factor "
-        f"{cost.error_factor:.2f}) against {cost.direct_newton_steps} Newton steps"
-        for step, cost in enumerate(paper.iteration, start=1)
+    largest = float(np.max(np.abs(errors / [step.force for step in inverse.steps])))
+    forces = {r: "; ".join(words.fixed(f, 4) for f in paper.experiments[r, False].forces) for r in READINGS}
+    counts = [Message("paper.count", step=step, **asdict(cost)) for step, cost in enumerate(paper.iteration, start=1)]
+    shares = [Message("paper.share", cause=_named(cause), share=cause.share, rms=cause.rms) for cause in causes]
+    conditions = {"varying_per_m": given.varying, "noise_m": given.position_noise, "window_m": given.window}
+    reached = iterations_to(inverse, REACHED)
+    said = (
+        Message("paper.table", **forces),
+        Message("paper.needs", found=[_found(discovery) for discovery in paper.discoveries]),
+        Message("paper.converged", reached=reached, rest=inverse.iterations),
+        Message("paper.straight", stiffness=low, nodes=paper.straight.steps[0].kappa.size),
+        Message("paper.forces", off=off, largest=largest),
+        Message("paper.ways", shares=shares, together=together.rms, **conditions),
+        Message("paper.iteration", counts=counts),
     )
-    found = "; then ".join(_found(discovery) for discovery in paper.discoveries)
-    return [
-        Statement(
-            "Sec. 3.2, Table 1",
-            "f_EI through (0, 5), (5, 3), (10, 2) [1/m, mN m²], K0 = 2 1/m, three steps of 5 mm",
-            f"forces {forces['secant']} N if the fixed point of Sec. 2.3 (a secant) is meant, {forces['tangent']} N if "
-            "Eq. (5) (a tangent) is meant: the reading must be said",
-        ),
-        Statement(
-            "Sec. 2, Eqs. (6) and (7)",
-            "a stiffness that depends on curvature, and a pre-curvature, are what a cable needs",
-            f"a straight cable of one stiffness, with the diagnosis' own scores and refits on Table 1's test: {found}",
-        ),
-        Statement(
-            "Sec. 4, Figs. 4 and 5",
-            "converged after about 10 iterations from EI = 0.01 N m² and K0 = 1 1/m",
-            f"within 0.1 % of Table 1 after {iterations_to(inverse, REACHED)} iterations, at rest after "
-            f"{inverse.iterations}",
-        ),
-        Statement(
-            "Sec. 4, Fig. 6",
-            "with K0 = 0 the fitted characteristic becomes negative at low curvature",
-            f"f_EI(0) = {fixed(low, 2)} mN m² with {paper.straight.steps[0].kappa.size} nodes (it depends on their "
-            "number): a wrong model is paid for where nothing holds the curve",
-        ),
-        Statement(
-            "Sec. 4, Fig. 6",
-            "the forces of that fit show small deviations",
-            f"they are off by {off} mN: up to {largest:.0f} % of a force, far beyond any load cell's error",
-        ),
-        Statement(
-            "Sec. 5, Fig. 7",
-            "inverse problem and balance equations differ qualitatively: topic of current research",
-            f"{causes}; all together {100 * paper.causes[-1].rms:.0f} % rms, for {CONDITIONS}",
-        ),
-        Statement(
-            "Sec. 2.3",
-            "minimising the nonlinear energy directly is expensive; the iterative method is preferred",
-            f"{counts} on the nonlinear energy itself",
-        ),
-    ]
+    return [message.parts(words.language) for message in said]
 
 
-def _found(step: Discovery) -> str:
+def _named(cause: Difference) -> Message:
+    return Message(f"paper.{cause.cause.replace(' ', '-')}")
+
+
+def _found(step: Discovery) -> Message:
     """One step from a poorer model to a richer one, in words."""
-    before, after = (plain(value, 2) for value in step.chi2)
-    words = f"{word(step.name)} by the {step.data}, chi-square {before} to {after}"
+    data = Message(f"paper.by-{step.data.replace(' ', '-')}")
+    found = Message("paper.found", name=step.name, data=data, before=step.chi2[0], after=step.chi2[1])
     if step.gain is None:
-        return words
-    return f"{words}, {100.0 * min(step.gain.heldout_excess_removed, 1.0):.0f} % of the misfit at steps left out gone"
+        return found
+    return Message("paper.found-gain", found=found, removed=min(step.gain.heldout_excess_removed, 1.0))
 
 
 def _discovery(step: Discovery) -> dict[str, Any]:
@@ -235,46 +192,33 @@ def _discovery(step: Discovery) -> dict[str, Any]:
     }
 
 
-def draw(paper: Paper) -> list[tuple[str, Drawing]]:
+def draw(paper: Paper, words: Words) -> list[tuple[str, Drawing]]:
     """Title and figure, in the paper's order."""
-    fills: list[tuple[str, str, Callable[[Area], Axes]]] = [
-        (
-            "fig3",
-            "Fig. 3: shapes of Table 1's cable, secant reading",
-            partial(draw_shapes, paper.experiments["secant", False]),
-        ),
-        (
-            "fig4",
-            "Fig. 4: control points and characteristic over the iterations",
-            partial(draw_evolution, paper.inverse),
-        ),
-        (
-            "fig5",
-            "Fig. 5: forces and curvatures over the iterations",
-            partial(draw_responses, paper.inverse),
-        ),
-        (
-            "fig6",
-            "Fig. 6: K0 forced to zero",
-            partial(draw_straight, paper.straight_by_forces, paper.straight, paper.inverse),
-        ),
-    ]
-    fills += [
-        (f"fig7{letter}", f"Fig. 7: {cause.cause}", partial(draw_difference, cause))
-        for letter, cause in zip("abcd", paper.causes, strict=True)
-    ]
+    fills: dict[str, Callable[[Area], Axes]] = {
+        "fig3": partial(draw_shapes, paper.experiments["secant", False], words),
+        "fig4": partial(draw_evolution, paper.inverse, words),
+        "fig5": partial(draw_responses, paper.inverse, words),
+        "fig6": partial(draw_straight, paper.straight_by_forces, paper.straight, paper.inverse, words),
+    }
+    titles = {name: words(f"paper_{name}") for name in fills}
+    for letter, cause in zip("abcd", paper.causes, strict=True):
+        fills[f"fig7{letter}"] = partial(draw_difference, cause, words)
+        titles[f"fig7{letter}"] = words("paper_fig7", cause=_named(cause).said(words.language))
+    # two halves stand one above the other, and a cable is longer than it is high
+    heights = {"fig3": 150.0, "fig4": 560.0, "fig5": 560.0, "fig6": 560.0}
     return [
         (
             title,
-            drawing(name, fill, size=_size(name), title=title, description=f"{title}; the numbers are in paper.json"),
+            drawing(
+                name,
+                fills[name],
+                size=(400.0, heights.get(name, 300.0)),
+                title=title,
+                description=words("paper_numbers", title=title),
+            ),
         )
-        for name, title, fill in fills
+        for name, title in titles.items()
     ]
-
-
-def _size(name: str) -> tuple[float, float]:
-    """Width and height of a figure, px: two halves stand one above the other, and a cable is longer than it is high."""
-    return (400.0, {"fig3": 150.0, "fig4": 560.0, "fig5": 560.0, "fig6": 560.0}.get(name, 300.0))
 
 
 def standalone(figure: Drawing) -> str:

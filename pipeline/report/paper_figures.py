@@ -10,28 +10,30 @@ from matplotlib.axes import Axes
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, TWO_ROWS, Area, finish, plot_area, step_colours
 from pipeline.report.ruling import Ruling
+from pipeline.report.words import Words
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
 from rod.characteristic import Characteristic
 from rod.paper import Difference, TableOne
 from rod.paper_fit import PaperFit
 
 KAPPA = np.linspace(0.0, 10.0, 101)  # 1/m, the range of Table 1
-ITERATION = Ruling("iteration", whole=True)
-CURVATURE, STIFFNESS = "curvature κ [1/m]", "f_EI [mN m²]"
+STIFFNESS = "f_EI [mN m²]"
 
 
-def draw_shapes(experiment: TableOne, figure: Area) -> Axes:
+def draw_shapes(experiment: TableOne, words: Words, figure: Area) -> Axes:
     """Fig. 3: the initial rod and the cable at the three steps, in the chord frame, same scale on both axes."""
     axes = plot_area(figure, top=TWO_ROWS)
     initial = experiment.initial
-    axes.plot(1e3 * initial.x, 1e3 * initial.y, color=LIGHT["muted"], ls=":", label="initial rod: no force")
+    axes.plot(1e3 * initial.x, 1e3 * initial.y, color=LIGHT["muted"], ls=":", label=words("paper_initial"))
     for number, (step, colour) in enumerate(zip(experiment.steps, step_colours(3), strict=True), start=1):
-        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=f"step {number}: {step.force:.4f} N")
+        axes.plot(
+            1e3 * step.x, 1e3 * step.y, color=colour, label=f"{words('step')} {number}: {words.fixed(step.force, 4)} N"
+        )
     axes.set_aspect("equal", adjustable="datalim")
-    return finish(axes, x="x [mm]", y="y [mm]", decimal=".", legend=2)
+    return finish(axes, x="x [mm]", y="y [mm]", decimal=words.decimal, legend=2)
 
 
-def draw_evolution(fit: PaperFit, figure: Area) -> Axes:
+def draw_evolution(fit: PaperFit, words: Words, figure: Area) -> Axes:
     """Fig. 4: above, control points and K0 relative to Table 1; below, the characteristic, from dark to bright."""
     above, below = _halves(figure)
     axes = plot_area(above)
@@ -41,64 +43,70 @@ def draw_evolution(fit: PaperFit, figure: Area) -> Axes:
     names = [*(f"f_EI({knot:g} 1/m)" for knot in TABLE_1_KNOTS), "K0"]
     for column, (name, colour, mark) in enumerate(zip(names, step_colours(4), "osD^", strict=True)):
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
-    finish(axes, x=ITERATION, y="relative to Table 1", decimal=".", legend=2)
+    finish(axes, x=Ruling(words("paper_count"), whole=True), y=words("paper_relative"), decimal=words.decimal, legend=2)
     laws = plot_area(below, top=ONE_ROW)
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         law = Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates)
-        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4, label=_named(fit, number))
-    _truth(laws)
-    return finish(laws, x=CURVATURE, y=STIFFNESS, decimal=".", legend=3)
+        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4, label=_named(fit, number, words))
+    _truth(laws, words)
+    return finish(laws, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=3)
 
 
-def draw_responses(fit: PaperFit, figure: Area) -> Axes:
+def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     """Fig. 5: above, the forces over the iterations and their data; below, the curvatures of step 3."""
     above, below = _halves(figure)
     axes = plot_area(above, top=ONE_ROW)
     count = np.arange(len(fit.history))
     forces = np.array([[step.force for step in state.steps] for state in fit.history])
     for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
-        axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"step {number}")
-    axes.hlines(forces[-1], 0, count[-1], color=LIGHT["measured"], lw=1.2, ls=":", label="Table 1")
-    finish(axes, x=ITERATION, y="force P [N]", decimal=".", legend=4)
+        axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"{words('step')} {number}")
+    axes.hlines(forces[-1], 0, count[-1], color=LIGHT["measured"], lw=1.2, ls=":", label=words("paper_table"))
+    finish(
+        axes,
+        x=Ruling(words("paper_count"), whole=True),
+        y=words("axis_force", unit="N"),
+        decimal=words.decimal,
+        legend=4,
+    )
     bends = plot_area(below, top=ONE_ROW)
     s = 1e3 * fit.steps[-1].s
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
-        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number))
-    return finish(bends, x="arc length s [mm]", y="κ of step 3 [1/m]", decimal=".", legend=2)
+        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number, words))
+    return finish(bends, x=words("axis_s"), y=words("paper_bend"), decimal=words.decimal, legend=2)
 
 
-def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, figure: Area) -> Axes:
+def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: Words, figure: Area) -> Axes:
     """Fig. 6: fits with K0 = 0 by the forces alone (above) and with the curvatures (below), beside that of free K0."""
     for part, forced, name in zip(
         _halves(figure),
         (forces_alone, fit),
-        ("K0 = 0, forces alone, Eq. (6)", "K0 = 0, with curvatures, Eq. (7)"),
+        (words("paper_by_forces"), words("paper_by_both")),
         strict=True,
     ):
         axes = plot_area(part)
         axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
         axes.plot(KAPPA, 1e3 * forced.characteristic.f(KAPPA), color=LIGHT["alarm"], label=name)
-        axes.plot(KAPPA, 1e3 * free.characteristic.f(KAPPA), color=LIGHT["inverse"], ls="--", label="K0 free")
-        _truth(axes)
-        finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=2)
+        axes.plot(KAPPA, 1e3 * free.characteristic.f(KAPPA), color=LIGHT["inverse"], ls="--", label=words("paper_free"))
+        _truth(axes, words)
+        finish(axes, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=2)
     return axes
 
 
-def draw_difference(cause: Difference, figure: Area) -> Axes:
+def draw_difference(cause: Difference, words: Words, figure: Area) -> Axes:
     """Fig. 7: both ways with one cause of disagreement: the graph of each of the three photos, and their median."""
     axes = plot_area(figure, top=TWO_ROWS)
     for number, ((kappa, ratio), colour) in enumerate(zip(cause.graphs, step_colours(3), strict=True), start=1):
-        axes.plot(kappa, 1e3 * ratio, ".", color=colour, ms=2.5, label=f"photo {number}")
-    axes.plot(cause.kappa, 1e3 * cause.inverse, color=LIGHT["inverse"], label="inverse problem")
-    label = f"median ({100 * cause.rms:.0f} % rms)"
+        axes.plot(kappa, 1e3 * ratio, ".", color=colour, ms=2.5, label=f"{words('paper_photo')} {number}")
+    axes.plot(cause.kappa, 1e3 * cause.inverse, color=LIGHT["inverse"], label=words("paper_inverse"))
+    label = words("paper_median", rms=f"{100 * cause.rms:.0f}")
     axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)
     axes.set_ylim(0.0, 2e3 * float(max(cause.inverse.max(), cause.balance.max())))
-    return finish(axes, x=CURVATURE, y=STIFFNESS, decimal=".", legend=3)
+    return finish(axes, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=3)
 
 
-def _named(fit: PaperFit, iteration: int) -> str | None:
+def _named(fit: PaperFit, iteration: int, words: Words) -> str | None:
     """Name of an iteration in a legend: of the first and the last; between them colours go from dark to bright."""
-    return {0: "start", fit.iterations: "end"}.get(iteration)
+    return {0: words("paper_start"), fit.iterations: words("paper_end")}.get(iteration)
 
 
 def _halves(figure: Area) -> list[Area]:
@@ -106,6 +114,6 @@ def _halves(figure: Area) -> list[Area]:
     return list(np.atleast_1d(np.asarray(figure.subfigures(2, 1))))
 
 
-def _truth(axes: Axes) -> None:
+def _truth(axes: Axes, words: Words) -> None:
     law = Characteristic.from_ordinates(TABLE_1_KNOTS, TABLE_1_ORDINATES)
-    axes.plot(KAPPA, 1e3 * law.f(KAPPA), color=LIGHT["measured"], ls=":", label="Table 1")
+    axes.plot(KAPPA, 1e3 * law.f(KAPPA), color=LIGHT["measured"], ls=":", label=words("paper_table"))

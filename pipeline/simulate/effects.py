@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
@@ -36,14 +37,14 @@ ONE_SIDED = frozenset(
     }
 )  # their sizes cannot be negative, as in the catalogue of causes
 POSSIBLE = {
-    "stiffness_varying": (-1.0, 1.0, "a stiffness cannot be negative"),
-    "relaxation": (-1.0, 1.0, "no more than all of a force is lost"),
-    "force_gain": (-1.0, 10.0, "a load cell does not turn forces round"),
-    "length_error": (-0.5, 1.0, "no length is mistaken for its half or double"),
-    "scale_error": (-0.5, 1.0, "no scale is mistaken for its half or double"),
-    "stiffness_drift": (-0.1, 0.1, "a stiffness that changes by a tenth from step to step is another cable"),
+    "stiffness_varying": (-1.0, 1.0),  # a stiffness is positive
+    "relaxation": (-1.0, 1.0),  # no more than all of a force is lost
+    "force_gain": (-1.0, 10.0),  # a load cell does not turn forces round
+    "length_error": (-0.5, 1.0),  # no length is mistaken for its half or double
+    "scale_error": (-0.5, 1.0),
+    "stiffness_drift": (-0.1, 0.1),  # what changes by a tenth from step to step is another cable
 }
-"""Between which their sizes lie (neither end included), and why."""
+"""Between which their sizes lie, neither end included."""
 
 WIDTH = 0.08  # standard deviation of a local kink or soft spot, in lengths: the 15 mm of a splice on a cable of 181 mm
 
@@ -89,8 +90,6 @@ class Effect:
     Attributes
     ----------
     name : str
-    values : str
-        What its values are, with units.
     counts : tuple of int
         How many values are allowed.
     apply : callable
@@ -98,9 +97,13 @@ class Effect:
     """
 
     name: str
-    values: str
     counts: tuple[int, ...]
     apply: Callable[[Setup, Values], Setup]
+
+    @property
+    def takes(self) -> Message:
+        """What its values are, with units."""
+        return Message(f"effect.{self.name}")
 
 
 def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
@@ -115,9 +118,8 @@ def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
         effect = _effect(name)
         values = tuple(float(v) for v in np.atleast_1d(given))
         if effect.counts and len(values) not in effect.counts:
-            count = " or ".join(map(str, effect.counts))
-            noun = "value" if effect.counts == (1,) else "values, separated by commas"
-            raise ValueError(f"{name} takes {count} {noun} ({effect.values}); {len(values)} given")
+            counts = {"given": len(values), "counts": effect.counts}
+            raise ValueError(Message("misuse.values", name=name, takes=effect.takes, **counts))
         setup = effect.apply(setup, values)
     return setup
 
@@ -130,21 +132,20 @@ def parse_effect(text: str) -> tuple[str, Values]:
     ValueError
         If it cannot be read, or no such value can be; the message names the nearest known name.
     """
-    name, equals, rest = text.partition("=")
+    name, _, rest = text.partition("=")
     effect = _effect(name.strip())
+    told = {"text": repr(text), "name": effect.name, "takes": effect.takes}
     try:
         values = tuple(float(part) for part in rest.split(","))
     except ValueError as error:
-        raise ValueError(f"{text!r} is not NAME=VALUE: {effect.name} takes {effect.values}") from error
-    if not equals:
-        raise ValueError(f"{text!r} has no value: {effect.name} takes {effect.values}")
+        raise ValueError(Message("misuse.no-number", **told)) from error
     if not np.all(np.isfinite(values)):
-        raise ValueError(f"{text!r} is no finite number: {effect.name} takes {effect.values}")
+        raise ValueError(Message("misuse.no-number", **told))
+    low, high = POSSIBLE.get(effect.name, (-np.inf, np.inf))
     if effect.name in ONE_SIDED and min(values) < 0.0:
-        raise ValueError(f"{text!r} is negative, which {effect.name} cannot be: it takes {effect.values}")
-    low, high, reason = POSSIBLE.get(effect.name, (-np.inf, np.inf, ""))
+        raise ValueError(Message("misuse.negative", **told))
     if not low < values[0] < high:
-        raise ValueError(f"{text!r} cannot be, {reason}: {effect.name} takes {effect.values}")
+        raise ValueError(Message("misuse.impossible", **told, low=low, high=high))
     return effect.name, values
 
 
@@ -159,24 +160,19 @@ def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, fl
     """
     K0 = float(np.atleast_1d(effects.get("pre_curvature", pre_curvature))[0])
     if not abs(K0) * length < np.pi:
-        raise ValueError(
-            f"a pre-curvature of {K0:g} 1/m rolls {1e3 * length:g} mm of cable up to more than a half circle: at most "
-            f"{np.pi / length:.3g} 1/m"
-        )
+        raise ValueError(Message("misuse.rolled-up", K0=K0, length_m=length, most=np.pi / length))
     stiff = float(np.atleast_1d(effects.get("rigid_ends", 0.0))[0])
     if not 4.0 * stiff < length:
-        raise ValueError(
-            f"rigid_ends of {stiff:g} m leave {1e3 * (length - 2.0 * stiff):.3g} of {1e3 * length:g} mm of cable to "
-            f"bend: at most {length / 4.0:.3g} m each"
-        )
+        left_m = length - 2.0 * stiff
+        raise ValueError(Message("misuse.rigid-ends", stiff_m=stiff, left_m=left_m, length_m=length, most_m=length / 4))
 
 
 def _effect(name: str) -> Effect:
     if name in EFFECTS:
         return EFFECTS[name]
     near = get_close_matches(name, EFFECTS, n=1)
-    hint = f"the nearest is {near[0]}" if near else f"known are {', '.join(EFFECTS)}"
-    raise ValueError(f"no cause is called {name!r}; {hint}")
+    key = "misuse.no-cause-near" if near else "misuse.no-cause"
+    raise ValueError(Message(key, name=repr(name), known=near or EFFECTS))
 
 
 def _along(values: Values) -> Callable[[Array], Array]:
@@ -250,31 +246,30 @@ def _bow(setup: Setup, values: Values) -> Setup:
     return replace(setup, bow=values[0])
 
 
-_LOCAL = "and, for a local one, its place in lengths"
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
-        Effect("nonlinear_stiffness", "ordinates of f_EI over K - K0 = 0 .. 10 1/m, N m^2", (), _stiffness),
-        Effect("pre_curvature", "K0, 1/m", (1,), _on_test("pre_curvature")),
-        Effect("pre_curvature_varying", f"deviation of K0, 1/m, {_LOCAL}", (1, 2), _varying_pre_curvature),
-        Effect("stiffness_varying", f"relative deviation of EI, {_LOCAL}", (1, 2), _varying_stiffness),
-        Effect("hysteresis", "moment half-width, N m, and curvature change to full slip, 1/m", (1, 2), _hysteresis),
-        Effect("plastic_set", "growth of K0 with the largest curvature reached", (1,), _on_test("plastic_rate")),
-        Effect("relaxation", "share of the force lost in a long hold, and its time, s", (1, 2), _relaxation),
-        Effect("bearing_friction", "Coulomb moment of each bearing, N m", (1,), _on_supports("friction_moment")),
-        Effect("bearing_stiffness", "spring of each bearing, N m/rad", (1,), _on_supports("stiffness")),
-        Effect("rigid_ends", "length of the stiff piece at each axis, m", (1,), _on_supports("rigid_length")),
-        Effect("rig_compliance", "yield of the frame, m/N", (1,), _on_test("compliance")),
-        Effect("displacement_offset", "added to every displacement, m", (1,), _on_test("displacement_offset")),
-        Effect("length_error", "stated over true length, minus 1", (1,), _on_readings("length")),
-        Effect("force_offset", "shown too much, N", (1,), _on_readings("offset")),
-        Effect("force_drift", "shown too much per second, N/s", (1,), _on_readings("drift")),
-        Effect("force_gain", "shown too much, relative", (1,), _on_readings("gain")),
-        Effect("in_plane_load", "along the chord and toward the bow, N/m", (2,), _load),
-        Effect("scale_error", "stated over true px/mm, minus 1", (1,), _on_readings("scale")),
-        Effect("lens_distortion", "k1 at half the picture's diagonal", (1,), _lens),
-        Effect("camera_tilt", "perspective terms along u and v, 1/m", (1, 2), _tilt),
-        Effect("out_of_plane_bow", "height of the largest bow over the plane, m", (1,), _bow),
-        Effect("stiffness_drift", "stiffer by this share from step to step", (1,), _on_readings("stiffer")),
+        Effect("nonlinear_stiffness", (), _stiffness),
+        Effect("pre_curvature", (1,), _on_test("pre_curvature")),
+        Effect("pre_curvature_varying", (1, 2), _varying_pre_curvature),
+        Effect("stiffness_varying", (1, 2), _varying_stiffness),
+        Effect("hysteresis", (1, 2), _hysteresis),
+        Effect("plastic_set", (1,), _on_test("plastic_rate")),
+        Effect("relaxation", (1, 2), _relaxation),
+        Effect("bearing_friction", (1,), _on_supports("friction_moment")),
+        Effect("bearing_stiffness", (1,), _on_supports("stiffness")),
+        Effect("rigid_ends", (1,), _on_supports("rigid_length")),
+        Effect("rig_compliance", (1,), _on_test("compliance")),
+        Effect("displacement_offset", (1,), _on_test("displacement_offset")),
+        Effect("length_error", (1,), _on_readings("length")),
+        Effect("force_offset", (1,), _on_readings("offset")),
+        Effect("force_drift", (1,), _on_readings("drift")),
+        Effect("force_gain", (1,), _on_readings("gain")),
+        Effect("in_plane_load", (2,), _load),
+        Effect("scale_error", (1,), _on_readings("scale")),
+        Effect("lens_distortion", (1,), _lens),
+        Effect("camera_tilt", (1, 2), _tilt),
+        Effect("out_of_plane_bow", (1,), _bow),
+        Effect("stiffness_drift", (1,), _on_readings("stiffer")),
     )
 }

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.messages import Message, ended
 from pipeline.records import Branch
 from pipeline.simulate.effects import Readings, Setup, Values, check_geometry, hide
 from pipeline.vision.render import Camera
@@ -71,10 +72,9 @@ class Experiment:
 
     def __post_init__(self) -> None:
         if not (self.length_m > self.diameter_m > 0 and self.EI0 > 0 and self.EI1 > 0 and self.kc > 0):
-            raise ValueError("length, diameter, stiffnesses and kc must be positive, the length above the diameter")
+            raise ValueError(Message("misuse.no-cable"))
         if not self.displacements_m or self.samples < 1 or not self.period_s >= self.hold_s > 0:
-            raise ValueError("an experiment needs a step, a sample a hold, and holds that end before the next begins")
-
+            raise ValueError(Message("misuse.no-experiment"))
         check_geometry(self.length_m, self.K0, self.effects)
 
     @property
@@ -145,6 +145,6 @@ def bend(experiment: Experiment) -> tuple[State, ...]:
     states = []
     for number, e in enumerate(simulate(test, experiment.displacements_m)):
         if not e.good:
-            raise ValueError(f"step {number} of {experiment.id} has no equilibrium: {e.outcome.advice}")
+            raise ValueError(Message("misuse.no-equilibrium", step=number, said=ended(e.outcome)))
         states.append(State(float(e.force), float(e.chord), e.s, e.x, e.y, e.theta, e.kappa, e.moment))
     return tuple(states)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pipeline.messages import Message
 from pipeline.simulate.effects import Readings, Setup
 from pipeline.simulate.experiment import Experiment, State, bend
 from pipeline.simulate.photography import Photography
@@ -110,9 +111,7 @@ def _lean(setup: Setup, states: tuple[State, ...]) -> float:
     """
     bow = max(float(np.max(np.abs(state.y))) for state in states)
     if not setup.bow < bow:
-        raise ValueError(
-            f"out_of_plane_bow of {setup.bow:g} m is higher than the largest bow of the cable, {bow:.3g} m: give less"
-        )
+        raise ValueError(Message("misuse.bow", given_m=setup.bow, largest_m=bow))
     return setup.bow / bow
 
 

@@ -104,8 +104,8 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
     if not data:
         return Rejected(name, Message("photo/empty"))
     header = read_header(data)
-    if header is None:
-        return Rejected(name, Message("photo/unreadable"))
+    if header is None:  # HEIC and its like are boxes, the first of which tells the type of the file
+        return Rejected(name, Message("photo/unreadable.convert" if data[4:8] == b"ftyp" else "photo/unreadable"))
     megapixels = header.width * header.height / 1e6
     if megapixels > settings.max_megapixels:
         said = Message("photo/too-large.pixels", megapixels=megapixels, limit=settings.max_megapixels)

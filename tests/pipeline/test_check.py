@@ -81,8 +81,20 @@ def test_no_photo_that_can_be_used_is_an_error(folder):
     for path in (folder / "images").iterdir():
         black(path, None)
     code, row = checked(folder)
-    assert (code, row["status"], row["runs"]) == (1, "error", True)
+    assert (code, row["status"], row["runs"]) == (3, "error", False)
     assert {f["code"] for f in row["findings"] if f["level"] == "error"} == {"photo/blank"}
+
+
+def test_a_picture_of_a_telephone_is_told_once(folder):
+    heic = b"\0\0\0\x18ftypheic"
+    (folder / "images" / OTHER).write_bytes(heic)
+    ((code, message),) = [(f["code"], f["message"]) for f in checked(folder)[1]["findings"] if f["level"] != "info"]
+    assert code == "photo/unreadable" and "convert it to png or jpg" in message
+    (folder / "images" / OTHER).rename(folder / "images" / "step_01.HEIC")
+    log = folder / "force.csv"
+    log.write_text(log.read_text().replace(OTHER, "step_01.HEIC"))
+    ((code, message),) = [(f["code"], f["message"]) for f in checked(folder)[1]["findings"] if f["level"] != "info"]
+    assert code == "photo/unreadable" and "convert it to png or jpg" in message
 
 
 def test_one_photo_that_a_run_would_refuse_is_a_warning(folder):

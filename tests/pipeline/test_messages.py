@@ -33,6 +33,8 @@ MADE = (
     "help.",
     "click.",
     "plan.",
+    "effect.",
+    "paper.",
 )
 
 

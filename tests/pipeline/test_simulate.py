@@ -295,10 +295,10 @@ def test_effects_are_read_from_text() -> None:
         parse_effect("bearing_fricton=1")
     with pytest.raises(ValueError, match="N m"):
         parse_effect("bearing_friction=much")
-    for impossible, told in (("hysteresis=-0.002", "is negative"), ("bearing_stiffness=nan", "no finite number")):
+    for impossible, told in (("hysteresis=-0.002", "is negative"), ("bearing_stiffness=nan", "finite numbers")):
         with pytest.raises(ValueError, match=told):
             parse_effect(impossible)
-    with pytest.raises(ValueError, match=r"takes 2 values, separated by commas .*; 1 given"):
+    with pytest.raises(ValueError, match=r"takes 2 numbers \(along .*\), not 1"):
         bend(replace(BASE, effects={"in_plane_load": 1.0}))
 
 

@@ -27,7 +27,7 @@ from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import detectable_amount
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
-from pipeline.messages import Message, entry
+from pipeline.messages import Message, ended, entry
 from pipeline.result import Curve
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.characteristic import MomentCurve
@@ -140,7 +140,7 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
     """
     settings = settings or DiagnosisSettings()
     if not plan.displacements or min(plan.displacements) <= 0.0:
-        raise ValueError("plan at least one loading step with a positive displacement")
+        raise ValueError(Message("misuse.no-step"))
     bench = planned_bench(plan, settings)
     table = between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
     others = [
@@ -209,7 +209,8 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
     vector[: form.size] = coefficients
     made = run(base.model(vector), facts)
     if made.prediction is None:
-        raise ValueError(f"the planned test cannot be made: {made.failed and made.failed.advice}")
+        assert made.failed is not None
+        raise ValueError(Message("misuse.unmakeable", said=ended(made.failed)))
     pixel = 1e-3 / plan.px_per_mm
     precision = Precision(
         force_std=plan.force_noise * float(np.max(np.abs(made.prediction.force))),

@@ -43,17 +43,6 @@ def test_missing_photo_is_a_finding(specimen_folder):
     )
 
 
-def test_file_that_is_no_picture_is_told_before_it_is_measured(specimen_folder):
-    folder = specimen_folder()
-    folder.write("images/step_1.png", "this is a letter")
-    assert folder.message("photo/no-picture") == (
-        "images/step_1.png: the file is no png, jpg, bmp or tif; copy it again from the camera"
-    )
-    assert "images/step_1.png" in folder.read().images  # it is shown as refused among the photos
-    folder.write("images/step_1.png", b"")
-    assert folder.message("photo/no-picture") == "images/step_1.png: the file is empty; copy it again from the camera"
-
-
 def test_pictures_of_a_telephone_are_to_be_converted(specimen_folder):
     log = "force_N,displacement_mm\n0.001,0\n2.3,4\n"
     folder = specimen_folder(log=log, photos=("images/IMG_0001.HEIC", "images/IMG_0002.HEIC"))
@@ -75,8 +64,10 @@ def test_a_picture_of_a_telephone_among_others_is_named(specimen_folder):
         "convert them to png or jpg at full size"
     )
     assert len(folder.read().images) == 2
-    folder.write("images/step_1.png", b"\0\0\0\x18ftypheic")
-    assert "convert it to png or jpg" in folder.message("photo/no-picture")
+    (folder.path / "images/step_1.HEIC").rename(folder.path / "images/step_1.jpg")  # converted, but not in the log
+    log = folder.path / "force.csv"
+    log.write_text(log.read_text().replace("step_1.png", "step_1.HEIC"))
+    assert "photo 'step_1.HEIC' was taken to be images/step_1.jpg" in folder.message("photo/name")
 
 
 def test_doubled_photos_are_told(specimen_folder):

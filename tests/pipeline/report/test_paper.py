@@ -1,18 +1,24 @@
 """``paper.json`` as the contract names it, and a page that needs nothing else."""
 
 import json
+import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
 
-from pipeline.report.paper import write_paper
+from pipeline.report.paper import draw, statements, write_paper
+from pipeline.report.words import Words
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
-    write_paper(out)
-    return out
+    return out, write_paper(out)
+
+
+@pytest.fixture(scope="module")
+def folder(made):
+    return made[0]
 
 
 def test_numbers_have_the_contracts_names(folder):
@@ -51,3 +57,17 @@ def test_figures_stand_alone_and_on_the_page(folder):
     for name in figures:
         assert ElementTree.fromstring((folder / f"{name}.svg").read_text(encoding="utf-8")).tag.endswith("svg")
         assert f'id="{name}"' in page
+
+
+def test_statements_and_figures_are_german_where_asked_for(made):
+    words = Words("de")
+    said = " ".join(part for row in statements(made[1], words) for part in row)
+    assert re.search(r"bis zu \d+ % einer Kraft", said)
+    assert "veränderliche Vorkrümmung" in said and "Newton-Schritten" in said
+    assert "EI = 0,01 N m²" in said and "step" not in said
+    figures = draw(made[1], words)
+    assert [title for title, _ in figures][-1] == "Bild 7: alles zusammen"
+    drawn = "".join(figure.svg for _, figure in figures)
+    for text in ("Anfangslage: ohne Kraft", "bezogen auf Tabelle 1", "K0 frei", "inverses Problem", "Krümmung κ [1/m]"):
+        assert text in drawn
+    assert "iteration<" not in drawn and "Table 1" not in drawn
