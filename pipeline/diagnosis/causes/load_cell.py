@@ -130,18 +130,43 @@ class Relaxation:
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Relaxation times from a tenth of a hold to three holds."""
+        """Relaxation times from a tenth of a hold to three holds; each hold by itself, or all with a memory of others.
+
+        What a cable has lost in one hold it does not win back in the next: a bow that grows by little loses little.
+        """
         span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
         if not facts.timed or span <= 0.0:
             return ()
         reach = (0.02 * span, 10.0 * span)
+        forms = (Variant("decaying in every hold"), Variant("decaying since every change of the bow", width=1.0))
         return tuple(
-            Variant("decaying in every hold", at=share * span, tuned=("at",), at_range=reach)
+            replace(form, at=share * span, tuned=("at",), at_range=reach)
+            for form in forms
             for share in (0.1, 0.3, 1.0, 3.0)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time."""
-        return model.observed(
-            shown(lambda force, time, begin: force * (1.0 - amount * (1.0 - np.exp(-time / variant.at))))
-        )
+        """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time, t since the hold began.
+
+        With a memory (``width`` 1) it is the changes of the force from hold to hold that decay so, each since its own
+        hold began: a standard linear solid (Findley, Lai and Onaran, 1976, section 5.3).
+        """
+
+        def left(since: Array) -> Array:
+            return np.asarray(1.0 - amount * (1.0 - np.exp(-since / variant.at)))
+
+        if not variant.width:
+            return model.observed(shown(lambda force, time, begin: force * left(time)))
+
+        def observer(prediction: Prediction, facts: Facts) -> Prediction:
+            change = np.diff(prediction.force, prepend=0.0, axis=-1)
+
+            def lost(k: int, times: Array) -> Array:
+                since = facts.clock[k] + times - facts.clock[: k + 1, None]
+                return np.asarray(change[..., : k + 1] @ (1.0 - left(since)))
+
+            samples = [held - lost(k, facts.hold_times[k]) for k, held in enumerate(prediction.samples)]
+            photo = [lost(k, facts.photo_time[k : k + 1]) for k in range(len(samples))]
+            return replace(prediction, force=prediction.force - np.concatenate(photo, axis=-1), samples=tuple(samples))
+
+        return model.observed(observer)
