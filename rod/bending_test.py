@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from rod.characteristic import Array, Characteristic, MomentCurve, Reading
 from rod.discretisation import Along, Rod, joint_values
-from rod.equilibrium import Branch, Equilibrium, Start, solve
+from rod.equilibrium import Branch, Equilibrium, solve
 from rod.laws import Function, as_law
 from rod.reduction import Hold
 from rod.section import InternalFriction, Section
@@ -169,7 +169,7 @@ def bend(
     force: float | None = None,
     tip: tuple[float, float] | None = None,
     branch: Branch = "natural",
-    start: Equilibrium | Start | None = None,
+    start: Equilibrium | None = None,
     **cable: Any,
 ) -> Equilibrium:
     """Equilibrium of one cable under one load, in one call.
@@ -182,7 +182,7 @@ def bend(
     displacement, chord, force, tip : m, m, N, (2,) N
         Exactly one: by how much the bearings approach, their distance, P between them, or the force on a free end.
     branch : {"natural", "opposite", "up", "down", "jump"}
-    start : Equilibrium, Start or None
+    start : Equilibrium or None
     **cable
         Everything else of `BendingTest`: ``pre_curvature``, ``left``, ``right``, ``load``, ``elements`` ...
 
@@ -211,7 +211,7 @@ def simulate(
     chords: ArrayLike | None = None,
     forces: ArrayLike | None = None,
     branch: Branch = "natural",
-    starts: Sequence[Equilibrium | Start | None] | None = None,
+    starts: Sequence[Equilibrium | None] | None = None,
     patient: bool = True,
 ) -> tuple[Equilibrium, ...]:
     """Equilibria of all steps, in order; friction and set remember the steps before.
@@ -223,7 +223,7 @@ def simulate(
         Exactly one of them; see the module.
     branch : {"natural", "opposite", "up", "down"}
         Side of the bow, see `rod.equilibrium`.
-    starts : (steps,) of Equilibrium, Start or None
+    starts : (steps,) of Equilibrium or None
         Warm starts, for example the equilibria of a nearby test. By default each step starts from the one before.
     patient : bool
         See `rod.equilibrium.solve`.

@@ -27,7 +27,7 @@ from rod.path import PATH_STEPS, followed
 from rod.reduction import Balance, Hold, System
 from rod.section import Memory, Section
 
-__all__ = ["Branch", "Equilibrium", "Outcome", "Start", "solve"]
+__all__ = ["Branch", "Equilibrium", "Outcome", "solve"]
 
 #: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
 NEAR = 0.8
@@ -111,7 +111,7 @@ def solve(
     hold: Hold,
     *,
     memory: Memory | None = None,
-    start: Start | Equilibrium | None = None,
+    start: Equilibrium | None = None,
     branch: Branch = "natural",
     patient: bool = True,
 ) -> Equilibrium:
@@ -124,7 +124,7 @@ def solve(
         Chord, force along the chord, or free end with tip force.
     memory : Memory or None
         At the start of the step; None for the mounted cable.
-    start : Start or Equilibrium or None
+    start : Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape.
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see `rod.branch`.
@@ -138,7 +138,7 @@ def solve(
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
-    first = Start(start.angles, start.right_reaction) if isinstance(start, Equilibrium) else start
+    first = None if start is None else Start(start.angles, start.right_reaction)
     verdicts: list[Trial] = []
     for attempt in _attempts(system, first, branch, patient=patient):
         verdicts.append(attempt)
@@ -150,21 +150,25 @@ def solve(
 
 
 def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
-    """Ways to the equilibrium: the warm start, the path from the force-free shape, that from the start, others."""
+    """Ways to the equilibrium: the path from the force-free shape and the warm start, the path from that, others.
+
+    The start comes first, and saves the path, on the side to which a cable leans. On the other side, and in a coil,
+    there are stable shapes of far more energy than the one its force-free shape leads to, and the start may be such.
+    """
     rod, most = system.rod, PATH_STEPS if patient else HASTY
     side = bow_side(rod, branch)
     # Where only the path can tell the side, a warm start keeps the one it has.
     kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
-    warm = None
-    # A coil has stable shapes of far more energy than the one its force-free shape leads to; a start may be such.
-    turn = float(rod.mounted.angles[0] - rod.mounted.angles[-1])
-    if first is not None and (branch != "natural" or abs(turn) < np.pi):
-        warm = newton(system, first)
-        if np.abs(warm.angles - first.angles).max() > NEAR:
-            warm = warm._replace(outcome=Outcome.STALLED)
+    leaning, certain = rod.leaning
+    coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
+    trusted = not (coiled or (certain and side == -leaning))
+    warm = None if first is None else _near(system, first)
+    if warm and trusted:
         yield judged(system, warm, kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
+    if warm and not trusted:
+        yield judged(system, warm, kept)
     if lost.outcome is Outcome.LIMIT_POINT:
         # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
         if patient and warm and warm.found and system.excess_negatives(warm.balance):
@@ -181,6 +185,12 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         yield judged(system, _from_straight(system, side), side)
     for beside in tilted(system, lost):
         yield judged(system, descended(system, beside), side)
+
+
+def _near(system: System, first: Start) -> Trial:
+    """Newton's method from a start, if it ends near."""
+    warm = newton(system, first)
+    return warm if np.abs(warm.angles - first.angles).max() <= NEAR else warm._replace(outcome=Outcome.STALLED)
 
 
 def _from_straight(system: System, side: int) -> Trial:

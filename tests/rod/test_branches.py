@@ -1,5 +1,6 @@
 """Where a cable bows to, and what is said when it cannot: never a silent wrong branch."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from rod.characteristic import Characteristic
 from rod.elastica import natural_chord, uniform_equilibrium
 from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
+from rod.newton import Start, newton
+from rod.reduction import System
 from rod.support import CLAMP, Support
 from tests.rod.minimum import is_minimum
 from tests.rod.potential_energy import Potential
@@ -91,6 +94,26 @@ def test_a_far_warm_start_ends_on_no_loop() -> None:
     assert start.good and cold.good and warm.good
     assert warm.force == pytest.approx(cold.force, rel=1e-9)
     assert cold.force == pytest.approx(2.59, abs=0.01)
+
+
+def test_a_warm_start_on_another_stable_shape_is_not_kept_where_the_force_free_one_leads_to_less_energy() -> None:
+    """Bowed down and pressed to a third of its chord a cable holds 1.7 N at twice the energy of its path's end."""
+    test = BendingTest(0.2, StickSlip(1e-2, 2.5e-3, 3.0), 10.0, left=CLAMP, elements=60)
+    chords = test.zero_chord * np.array([0.1, 0.3, 0.5, 0.95])
+    cold = [simulate(test, chords=[chord], branch="down")[0] for chord in chords]
+    assert all(step.good for step in cold)
+    for start, (chord, least) in itertools.product(cold, zip(chords, cold, strict=True)):
+        warm = solve(test.rod, test.hold("chords", chord), start=start, branch="down")
+        assert warm.good
+        assert warm.force == pytest.approx(least.force, rel=1e-9)
+    # and forged: the stable shape itself, which a start alone would keep
+    hold = test.hold("chords", chords[1])
+    stays = newton(System(test.rod, hold, test.rod.virgin), Start(cold[2].angles, cold[2].right_reaction))
+    assert stays.found
+    assert System(test.rod, hold, test.rod.virgin).excess_negatives(stays.balance) == 0
+    held = replace(cold[1], angles=stays.angles, right_reaction=stays.R)
+    assert -stays.R[0] == pytest.approx(1.747, abs=1e-3)
+    assert solve(test.rod, hold, start=held, branch="down").force == pytest.approx(cold[1].force, rel=1e-9)
 
 
 def arch(load: float) -> BendingTest:

@@ -16,8 +16,8 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
-from rod.equilibrium import Equilibrium, Outcome, Start, solve
-from rod.newton import newton
+from rod.equilibrium import Equilibrium, Outcome, solve
+from rod.newton import Start, newton
 from rod.reduction import Hold, System
 from rod.support import Support
 from tests.rod.minimum import is_minimum
@@ -304,7 +304,7 @@ def test_a_coil_is_not_left_on_a_start_of_far_more_energy():
     assert wrong.found
     assert system.excess_negatives(wrong.balance) == 0
     assert abs(wrong.R[0]) > 20.0 * truth.force
-    step = solve(coil.rod, hold, start=Start(wrong.angles, wrong.R))
+    step = solve(coil.rod, hold, start=replace(truth, angles=wrong.angles, right_reaction=wrong.R))
     assert step.good
     assert step.force == pytest.approx(truth.force, rel=1e-6)
     assert energy(step) == pytest.approx(energy(truth), rel=1e-9)

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from rod.bending_test import BendingTest, simulate
-from rod.equilibrium import Outcome, Start, solve
+from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
 from rod.reduction import Hold
 from rod.support import Support
@@ -180,13 +180,6 @@ def test_coulomb_moment_turns_its_sign_on_the_way_back() -> None:
 def test_reactions_balance_the_load() -> None:
     step = simulate(BEARINGS["load along"], chords=[STEP])[0]
     assert np.allclose(step.left_reaction + step.right_reaction, [-0.5 * LENGTH, 0.0], atol=1e-12)
-
-
-def test_warm_start_from_a_state() -> None:
-    first = simulate(BASE, chords=[STEP])[0]
-    again = solve(BASE.rod, Hold(chord=STEP), start=Start(first.angles, first.right_reaction))
-    assert again.iterations <= 2
-    assert again.force == pytest.approx(first.force, rel=1e-10)
 
 
 @pytest.mark.parametrize(
