@@ -21,9 +21,6 @@ from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
 
-HOPELESS = 0.02
-"""Share of the base model's chi-square that a refit may lie above the best one and still be worked on; time."""
-
 NEARLY_AS_LOUD = 0.75
 """Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
 
@@ -42,7 +39,7 @@ def refit_one(
     from other starts and with further forms.
     """
     kind = suspicion.causes[cause]
-    hopeless = rival + LEAST + HOPELESS * base.chi2
+    hopeless = rival + LEAST
     found = _in_any_form(observation, base, suspicion, cause, hopeless) if is_profile(kind) else None
     if found is None:
         best = _by_setting(observation, base, suspicion, cause, hopeless=hopeless)
@@ -69,33 +66,25 @@ def _in_any_form(
     cause: int,
     hopeless: float,
 ) -> Fit | None:
-    """A strong profile along the cable, by waves where its loudest form leaves more than noise and these do not.
+    """A profile along the cable, by waves where its loudest form leaves more than noise and these do not.
 
     Waves are a nearly linear problem, spots that are moved and widened one by one are not: of a sharp step three of
     them left ten times the noise after five times the work. Where fewer forms do as well, they are the explanation.
     """
     kind, direction = suspicion.causes[cause], suspicion.best(cause)
     to_the_noise = FITS * (len(base.residual) - base.extension.size)
-    if direction is None or base.chi2 < STRONG * to_the_noise:
+    if direction is None or base.chi2 < to_the_noise:
         return None
     first = fit_terms(observation, base, suspicion, (direction,))
     if first is None or first.chi2 < to_the_noise:
         return None
     free = with_free_profile(observation, first, kind)
     if free.chi2 > to_the_noise:
-        # what no profile does no few forms will do, nor will they do better where waves have taken most away
-        return free if free.chi2 > hopeless or free.chi2 < MOSTLY * first.chi2 else None
+        return free if free.chi2 > hopeless else None  # what no profile does no few forms will do
     worse = price(free, first)
     spot = as_one_form(observation, free, worse=worse)
     few = with_more_forms(observation, first, kind, "", hopeless=free.chi2 + worse)
     return min((free, spot, few), key=_cost)
-
-
-STRONG = 4.0
-"""Times the noise that a base model must leave for a profile to be sought by waves first: below, few forms do."""
-
-MOSTLY = 0.5
-"""Share of the misfit of the loudest form below which waves have shown that the profile has no such form."""
 
 
 def _by_setting(
@@ -122,8 +111,6 @@ def _by_setting(
             enough.add(label)
         setting = suspicion.terms[direction].variant.setting
         best[setting] = min(best.get(setting, found), found, key=_cost)
-        if found.chi2 >= hopeless and _are_starts_only(suspicion, cause):
-            break
     return best
 
 
@@ -160,12 +147,6 @@ def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
     other = [k for k in ranked if suspicion.terms[k].variant.tuned != first.tuned]
     elsewhere = [k for k in ranked if suspicion.terms[k].variant.setting != first.setting]
     return list(dict.fromkeys([*loud, *other[:1], *elsewhere[:1]]))
-
-
-def _are_starts_only(suspicion: Suspicion, cause: int) -> bool:
-    """Whether the forms of a cause differ by nothing but a number that a refit tunes, and of them one acts alone."""
-    variants = [suspicion.terms[k].variant for k in suspicion.of(cause)]
-    return not suspicion.causes[cause].combines and all(v.tuned and v.setting == variants[0].setting for v in variants)
 
 
 def _cost(fitted: Fit) -> float:
