@@ -72,27 +72,11 @@ def design(
 
 def echo_outlook(found: Design) -> None:
     """Print what will be known, then each cause, the most visible first: in a terminal with its twin below it."""
-    from pipeline.rounding import plain
-    from pipeline.units import amount_unit
-
-    low, high = found.extent.kappa_per_m[0], found.extent.kappa_per_m[-1]
-    stds = {"stiffness": found.stiffness_std, "K0_per_m": found.pre_curvature_std, "threshold": found.threshold}
-    click.echo(entry("", told(Message("plan.known", low_per_m=low, high_per_m=high, **stds))))
+    click.echo(entry("", told(found.known)))
     heads = [told(Message(f"plan.{name}")) for name in ("cause", "from", "plausible", "visible", "off")]
-    never, yes, no = (told(Message(f"word.{word}")) for word in ("never", "yes", "no"))
-    decimal = "," if language() == "de" else "."
-    rows, twins = [], []
-    for cause in found.causes:
-        least, likely = cause.minimal_detectable, cause.plausible
-        off = plain(100.0 * cause.stiffness_bias_at_plausible_size, 2, decimal=decimal)
-        seen = never if least is None else amount_unit(cause.unit, least, decimal=decimal).plain(least, 2)
-        size = amount_unit(cause.unit, likely, decimal=decimal).plain(likely, 2)
-        rows.append((cause.name, seen, size, yes if cause.visible else no, f"{off} %"))
-        key = "plan.apart" if cause.separated_by else "plan.like" if cause.nearest_twin else "plan.alone"
-        like = {"twin": cause.nearest_twin, "cosine": cause.twin_cosine, "by": cause.separated_by or ""}
-        twins.append(told(Message(key, survives=cause.surviving_fraction, **like)))
+    lines = table([heads, *(cause.told(language()) for cause in found.causes)])
     wide = columns() is None
-    for line, twin in zip(table([heads, *rows]), ("", "", *twins), strict=True):
+    for line, twin in zip(lines, ("", "", *(told(cause.twin) for cause in found.causes)), strict=True):
         click.echo(f"{line:<78}  {twin}".rstrip() if wide else line)
         if twin and not wide:
             click.echo(entry("    ", twin))

@@ -5,6 +5,5 @@ all specimens, ``frames`` a result as pandas frames for notebooks, ``paper`` the
 
 Each has `pipeline.result.Result` as its only source and measures nothing. A number is shown with its standard deviation
 or said to be exact, in the unit and with the digits a reader wants (`pipeline.units`, `pipeline.rounding`). Texts of
-report and index come from ``templates/words.toml``, sentences of other rooms from `pipeline.messages`; the page of the
-source paper is English alone.
+report and index come from ``templates/words.toml``, sentences of other rooms from `pipeline.messages`.
 """

@@ -127,6 +127,10 @@ def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]
     return sources
 
 
+WIDE = 0.5
+"""Relative standard deviation of the difference of both ways at which its band reaches from nothing to double."""
+
+
 def _agreement(result: Result, words: Words) -> str:
     """Difference of the two ways against what their bands allow."""
     part, found = result.agreement, trusted(result)
@@ -139,9 +143,9 @@ def _agreement(result: Result, words: Words) -> str:
     noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
     key = {True: "agree_yes", False: "agree_no", None: "agree_open"}[part.compatible]
+    if part.compatible and expected > WIDE:
+        key = "agree_wide"
     text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
-    if part.p_value is not None:
-        text = f"{text} {words.probability(part.p_value, name='p')}."
     return f"{words('before_extension')} {text}" if "extended" in found else text
 
 

@@ -171,8 +171,11 @@ def _row(row: CauseRow, words: Words) -> list[str]:
 def _range(least: float, most: float | None, unit: str, words: Words) -> str:
     """Amounts from which a cause shows: in its clearest form, and whatever form it has if that is known."""
     scale = words.unit(unit, least)
-    low, high = scale.plain(least, SHARE_DIGITS), scale.plain(max(most or least, least), SHARE_DIGITS)
-    return words("from_on", low=low) if most is None else low if low == high else f"{low} – {high}"
+    low = scale.plain(least, SHARE_DIGITS)
+    if most is None:
+        return words("from_on", low=low)
+    high = scale.plain(max(most, least), SHARE_DIGITS)
+    return high if low == high else f"{words.number(scale.factor * least, SHARE_DIGITS)} – {high}"
 
 
 def _leftover(part: DiagnosisPart, words: Words) -> list[str]:

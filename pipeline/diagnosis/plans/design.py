@@ -27,9 +27,12 @@ from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import detectable_amount
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
-from pipeline.messages import Message, ended, entry
+from pipeline.messages import DECIMAL, Message, ended, entry, word
 from pipeline.result import Curve
+from pipeline.result.visited import html_table
+from pipeline.rounding import plain
 from pipeline.settings.diagnosis import DiagnosisSettings
+from pipeline.units import amount_unit
 from rod.characteristic import MomentCurve
 from rod.laws import StickSlip
 
@@ -105,6 +108,24 @@ class CausePlan:
     visible: bool
     separated_by: Message | None
 
+    def told(self, language: str = "en") -> tuple[str, ...]:
+        """Name, amount from which it shows, plausible amount, whether that shows, how far f_EI is off then."""
+        decimal = DECIMAL[language]
+        never, seen = (word(name).said(language) for name in ("never", "yes" if self.visible else "no"))
+        least, likely = (
+            never if size is None else amount_unit(self.unit, size, decimal=decimal).plain(size, 2)
+            for size in (self.minimal_detectable, self.plausible)
+        )
+        off = plain(100.0 * self.stiffness_bias_at_plausible_size, 2, decimal=decimal)
+        return self.name, least, likely, seen, f"{off} %"
+
+    @property
+    def twin(self) -> Message:
+        """How much of its trace survives, what it is most like, and what takes that off."""
+        key = "plan.apart" if self.separated_by else "plan.like" if self.nearest_twin else "plan.alone"
+        like = {"twin": self.nearest_twin, "cosine": self.twin_cosine, "by": self.separated_by or ""}
+        return Message(key, survives=self.surviving_fraction, **like)
+
 
 @dataclass(frozen=True)
 class Design:
@@ -128,6 +149,22 @@ class Design:
     pre_curvature_std: float
     threshold: float
     causes: list[CausePlan]
+
+    @property
+    def known(self) -> Message:
+        """What the test will know of f_EI and K0, and from where on a cause shows."""
+        low, high = self.extent.kappa_per_m[0], self.extent.kappa_per_m[-1]
+        stds = {"stiffness": self.stiffness_std, "K0_per_m": self.pre_curvature_std, "threshold": self.threshold}
+        return Message("plan.known", low_per_m=low, high_per_m=high, **stds)
+
+    def _repr_html_(self) -> str:
+        """Show the outlook in a notebook."""
+        heads = ("shows from", "plausible", "visible", "f_EI off")
+        rows = [
+            (name, "; ".join(f"{head} {text}" for head, text in zip(heads, texts, strict=True)))
+            for name, *texts in (cause.told() for cause in self.causes)
+        ]
+        return html_table("planned test", [("f_EI", str(self.known)), *rows])
 
 
 def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:

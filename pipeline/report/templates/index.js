@@ -124,7 +124,7 @@
     node(drawn, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, data.axes[0]);
     node(drawn, "text", { transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, "text-anchor": "middle" }, data.axes[1]);
     for (const { k, v, std, colour, opacity } of bands) {
-      const edge = (sign) => path(k, v.map((value, j) => value + sign * data.half * std[j]));
+      const edge = (sign) => path(k, v.map((value, j) => Math.max(y0, value + sign * data.half * std[j])));
       node(drawn, "path", { d: `M${edge(1).join("L")}L${edge(-1).reverse().join("L")}Z`, fill: colour, "fill-opacity": opacity });
     }
     for (const { k, v, colour, dash, width, name, opacity } of lines) node(drawn, "path", { class: name, "stroke-opacity": name === "single" ? opacity : 1, d: "M" + path(k, v).join("L"), fill: "none", stroke: colour, "stroke-width": width, "stroke-dasharray": dash });

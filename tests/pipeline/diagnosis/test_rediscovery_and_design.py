@@ -82,6 +82,11 @@ def test_coarser_photos_tell_less(plans):
     )
 
 
+def test_an_outlook_shows_itself_in_a_notebook(plans):
+    shown = plans["loading"]._repr_html_()
+    assert "K0 within" in shown and "<th>rigid_ends</th><td>shows from " in shown and "; plausible " in shown
+
+
 def test_a_plan_without_steps_is_refused():
     with pytest.raises(ValueError, match="loading step"):
         design(Plan(displacements=()))

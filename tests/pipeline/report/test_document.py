@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 import pytest
 
 from pipeline.messages import Message, word
+from pipeline.report.answer import first_screen
 from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, unbroken, write_report
 from pipeline.report.pdf import pdf_bytes
@@ -232,6 +233,16 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
     )
     assert "Sie danach neu aufnehmen" in page
     assert "simuliert</text>" not in page
+
+
+def test_ways_whose_bands_say_nothing_are_not_said_to_agree(full_result):
+    curve = full_result.inverse.curve.model_copy(update={"tangent_std_Nm2": full_result.inverse.curve.tangent_Nm2})
+    inverse = full_result.inverse.model_copy(update={"curve": curve})
+    wide = full_result.model_copy(update={"inverse": inverse, "diagnosis": None})
+    assert wide.agreement.compatible
+    told = [first_screen(one, Words(), ReportSettings()).agreement for one in (wide, full_result)]
+    assert told[0].startswith("Whether the two ways agree cannot be told: ") and "would allow 100 %" in told[0]
+    assert "The two ways agree: " in told[1] and "p = " not in told[1]
 
 
 def test_disagreement_and_misfit_are_said(full_result, brief):
