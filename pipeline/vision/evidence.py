@@ -107,7 +107,9 @@ class Course:
     across: Array
 
 
-def weigh(course: Course, widths: Array, *, std: float, share: float = 1.0, branching: bool = False) -> Evidence:
+def weigh(
+    course: Course, widths: Array, *, std: float, share: float = 1.0, branching: bool = False, grid: float = 1.0
+) -> Evidence:
     """The evidence for a strip.
 
     Parameters
@@ -121,6 +123,8 @@ def weigh(course: Course, widths: Array, *, std: float, share: float = 1.0, bran
         Of the length asked for, on which widths were found.
     branching : bool
         Something seems to leave the strip: one side that looks like it is then enough for a crossing.
+    grid : px
+        Distance of values of the picture that tell something new.
     """
     middle, width = course.middle, median(widths)
     gap = median(np.hypot(*np.diff(middle, axis=0).T))
@@ -138,7 +142,7 @@ def weigh(course: Course, widths: Array, *, std: float, share: float = 1.0, bran
         length=length,
         seen=float(np.mean(weaker > _SURE)) * share,
         edges=median(weaker),
-        unsteady=_unsteady(widths, width, std),
+        unsteady=_unsteady(widths, width, std, grid),
         crossed=_crossed(picture, offset / width, middle, max(1, each // 4), sides=1 if branching else 2),
     )
 
@@ -168,10 +172,10 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
     return np.asarray((right - left) * np.sign(places))
 
 
-def _unsteady(widths: Array, width: float, std: float) -> float:
+def _unsteady(widths: Array, width: float, std: float, grid: float) -> float:
     calm = np.convolve(widths, np.ones(_ALONG) / _ALONG, mode="valid") if len(widths) > _ALONG else widths
     scatter = 1.4826 * median(np.abs(calm - median(calm)))
-    return scatter / max(_CALM_PX, _CALM * width, 1.5 * std)
+    return scatter / max(_CALM_PX * grid, _CALM * width, 1.5 * std)
 
 
 def _crossed(

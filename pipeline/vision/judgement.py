@@ -153,7 +153,8 @@ def _judge(
     path = found.path_px[first : last + 1]
     course = Course(found.grey, found.origin_px, found.dark, path, path_normals(path)[1])
     # a cell's edge is found to a fifth of it
-    evidence = weigh(course, widths, std=0.3 * standout.reduction, share=share, branching=branching)
+    std, grid = 0.3 * standout.reduction, photo.grid_px
+    evidence = weigh(course, widths, std=std, share=share, branching=branching, grid=grid)
     return replace(found, branching=branching, goes_on=more is not None, evidence=evidence, findings=told)
 
 
@@ -175,7 +176,7 @@ def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None
 
 def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
     """Refuse a photo taken in motion: covers are doubled, and shading is smeared over the edges."""
-    if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION):
+    if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION * photo.grid_px):
         return None
     return refused(photo, "photo/blur.moved", motion_px=closeup.motion_px, width_px=width)
 
@@ -279,6 +280,7 @@ def _assemble(
         noise=closeup.noise,
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
+        grid_px=photo.grid_px,
         quality={"contrast_to_noise": ratio, "width_scatter": scatter},
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )

@@ -43,11 +43,14 @@ class Photo:
         Grey, or blue, green, red.
     bit_depth : int
         Bits that are used: 8, 10, 12, 14 or 16.
+    grid_px : float
+        Distance of values that tell something new: cameras and JPEG keep colour at half the resolution of brightness.
     """
 
     name: str
     pixels: Pixels
     bit_depth: int
+    grid_px: float = 1.0
 
     @property
     def full_scale(self) -> float:

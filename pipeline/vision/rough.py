@@ -77,6 +77,8 @@ class RoughCable:
         Standard deviation of the edge spread, estimated on the window's edges along the cable.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
+    grid_px : float
+        Of the photo that ``grey`` is of; see `pipeline.vision.photo.Photo`.
     quality : dict
         Figures for the report: contrast_to_noise, width_scatter, ...
     findings : tuple of Finding
@@ -101,6 +103,7 @@ class RoughCable:
     noise: float
     blur_px: float
     weights: tuple[float, ...] = (1.0,)
+    grid_px: float = 1.0
     quality: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     branching: bool = False

@@ -28,6 +28,7 @@ from pipeline.vision.photo import Photo, levels
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
+from pipeline.vision.search.one_colour import in_colour_of, in_one_colour
 
 Window = tuple[int, int, int, int]
 
@@ -153,8 +154,23 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
             return alone
     standout = stand_out(photo, reduction, stage, window=window)
     wanted = _wanted(standout, cable)
+    alike = in_one_colour(photo, standout)
+    if alike is not None:
+        found = _read(alike, stand_out(alike, reduction, stage, window=window), wanted, cable, settings)
+        if isinstance(found, RoughCable):
+            alike = in_colour_of(photo, standout, found)
+            again = _read(alike, stand_out(alike, reduction, stage, window=window), wanted, cable, settings)
+            better = isinstance(again, RoughCable) and again.evidence.value > found.evidence.value
+            return again if better else found
+    return _read(photo, standout, wanted, cable, settings)
+
+
+def _read(
+    photo: Photo, standout: Standout, wanted: Wanted, cable: Cable, settings: VisionSettings
+) -> RoughCable | Rejected:
+    """The strip with the most evidence of the readings up to one that leaves nothing to be looked for."""
     judged: list[_Judged] = []
-    for readings in read_photo(standout, wanted, stage):
+    for readings in read_photo(standout, wanted, settings.segmentation):
         if readings[0].longest < wanted.least_length:
             if judged:
                 break
@@ -178,6 +194,8 @@ def _find_alone(
         return None
     if enough < coarser:
         standout = stand_out(photo, enough * reduction, stage, window=window)
+    if in_one_colour(photo, standout) is not None:
+        return None
     wanted = _wanted(standout, cable)
     reading = read_alone(standout, wanted, stage)
     if reading is None:
@@ -232,8 +250,9 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
             return refusal
     if not best.evidence.enough:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
-    hidden = any(finding.code == "photo/hidden-end" for finding in best.findings)
-    if best.evidence.crossed is not None or (best.branching and hidden):
+    # in one colour the arms of a crossing look alike, whatever cables they are of
+    unsure = best.grid_px > 1.0 or any(finding.code == "photo/hidden-end" for finding in best.findings)
+    if best.evidence.crossed is not None or (best.branching and unsure):
         return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
     beside = next(reading.outcomes for reading in judged if any(best is found for found in reading.outcomes))
     other = next((o for o in beside if isinstance(o, RoughCable) and _is_rival(o, best)), None)

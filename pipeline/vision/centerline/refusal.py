@@ -36,7 +36,8 @@ def evidence_of(rough: RoughCable, sections: Sections) -> Evidence:
     across = sections.second - sections.first
     across = across / (np.hypot(*across.T)[:, None] + 1e-12)
     course = Course(rough.grey, rough.origin_px, rough.dark, 0.5 * (sections.first + sections.second), across)
-    return weigh(course, sections.width, std=2.0 * median(sections.std), share=sections.share)
+    std = 2.0 * median(sections.std)
+    return weigh(course, sections.width, std=std, share=sections.share, grid=rough.grid_px)
 
 
 def refusal(
@@ -71,7 +72,7 @@ def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
     width = median(sections.width)
     scatter = median(fit.point_std[fit.weight > 0.0]) * width / middle
     limit = max(_UNEVEN_PX, _UNEVEN * width)
-    return None if scatter <= limit else Message("photo/outline.scatter", scatter_px=scatter, limit_px=limit)
+    return None if scatter <= limit else Message("photo/outline.scatter", scatter_px=min(scatter, 99.0), limit_px=limit)
 
 
 def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:

@@ -23,6 +23,7 @@ from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
 _MAD_TO_STD = 1.4826  # standard deviation of a normal distribution by its median absolute deviation
+_HIGHER_LEVELS = 2  # levels above Otsu's, each splits what stands above the last: shadow, then cable
 _REDUCED_SIDE_CELLS = 1000
 """Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
 
@@ -143,3 +144,20 @@ def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     enough = calm.shape[1] > len(calm) + 1
     covariance = np.atleast_2d(np.cov(calm, dtype=np.float64)) if enough else 0.0
     return covariance + settings.min_ground_std**2 * np.eye(len(sample))
+
+
+def otsu_levels(picture: Image) -> list[float]:
+    """Otsu's level, and those that split what stands above it once more: ground, shadow and cable are three classes.
+
+    Levels are sought on the square root: noise and strong things get a like share of the range.
+    """
+    top = float(picture.max()) + 1e-9
+    coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
+    levels: list[float] = []
+    for _ in range(1 + _HIGHER_LEVELS):
+        code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
+        levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
+        coded = coded[coded > code]
+        if coded.size < 2:
+            break
+    return levels

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -19,7 +18,7 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median, quantile
-from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
 from pipeline.vision.search.bands import strips_in_bands
 from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
 
@@ -31,7 +30,6 @@ _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the 
 _JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
 _TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
 _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
-_HIGHER_LEVELS = 2  # levels tried above Otsu's, each splits what stands above the last: shadow, then cable
 _LEAST_LEVEL = 5.0  # sigmas of the ground; a strip above it is no play of noise and texture
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
@@ -157,7 +155,7 @@ def approaches_itself(path: Array, width: float) -> bool:
 def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
     """Pictures in ground sigmas and levels, the likeliest first."""
     distance = standout.distance()
-    otsu, *higher = _levels(distance)
+    otsu, *higher = otsu_levels(distance)
     yield distance, otsu
     for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
         if level > _LOWEST_LEVEL:
@@ -165,29 +163,12 @@ def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
     brightness = standout.brightness()
     for sign in (-1.0, 1.0):
         picture = np.maximum(np.float32(sign) * brightness, 0.0)
-        level, *higher = _levels(picture)
+        level, *higher = otsu_levels(picture)
         if level > _LEAST_LEVEL:
             for tried in (level, *higher, 0.5 * level):
                 yield picture, tried
     for level in (_LEAST_LEVEL, _LOWEST_LEVEL):
         yield distance, level
-
-
-def _levels(picture: Image) -> list[float]:
-    """Otsu's level, and those that split what stands above it once more: ground, shadow and cable are three classes.
-
-    Levels are sought on the square root: noise and strong things get a like share of the range.
-    """
-    top = float(picture.max()) + 1e-9
-    coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
-    levels: list[float] = []
-    for _ in range(1 + _HIGHER_LEVELS):
-        code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
-        levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
-        coded = coded[coded > code]
-        if coded.size < 2:
-            break
-    return levels
 
 
 def _readings(picture: Image, level: float, wanted: Wanted, settings: SegmentationSettings) -> Iterator[Reading]:

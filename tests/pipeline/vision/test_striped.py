@@ -1,13 +1,14 @@
-"""A striped wire of known diameter is one cable, two wires of that diameter side by side are not."""
+"""A striped wire is one cable, and two wires side by side or across each other are not."""
 
 import cv2
 import numpy as np
 import pytest
 
-from pipeline.records import Centerline
+from pipeline.records import Centerline, Rejected
 from pipeline.vision import trace_photo
 
 TABLE, WHITE, BLUE = (150, 165, 175), (225, 225, 225), (160, 80, 40)
+PAPER, GREEN, YELLOW = (235, 238, 238), (60, 120, 50), (90, 215, 225)
 WIDTH, FINER, SIZE = 14.0, 4, (810, 405)
 
 
@@ -17,7 +18,12 @@ def drawn(folder, middles):
     t = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u))
     inside = np.any([np.abs(t - middle) < 0.5 * WIDTH for middle in middles], axis=0) & (u > 93.0) & (u < 716.0)
     sheath = np.where((t > middles[0] + WIDTH / 6.0)[..., None], BLUE, WHITE)
-    picture = np.where(inside[..., None], sheath, TABLE).astype(np.float32)
+    return taken(folder, np.where(inside[..., None], sheath, TABLE))
+
+
+def taken(folder, picture):
+    """A file of a picture with ``FINER`` cells a px."""
+    picture = picture.astype(np.float32)
     pixels = cv2.GaussianBlur(cv2.resize(picture, SIZE, interpolation=cv2.INTER_AREA), (0, 0), 0.8)
     noise = np.random.default_rng(3).normal(0.0, 2.0, pixels.shape)
     path = folder / "wire.jpg"
@@ -48,3 +54,24 @@ def test_two_wires_are_not_one(tmp_path):
     if isinstance(line, Centerline):  # one of them, and not what lies between
         off = np.abs(np.median(beside(line)) - np.array([0.0, 1.3 * WIDTH]))
         assert off.min() < 0.1 * WIDTH
+
+
+def test_a_stripe_that_winds_about_a_wire_of_unknown_width_is_part_of_it(tmp_path):
+    u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
+    t = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u))
+    ends = (u > 93.0) & (u < 716.0)
+    shadow = 1.0 - 0.3 * np.exp(-0.5 * ((t - 0.6 * WIDTH) / (0.3 * WIDTH)) ** 2) * ends
+    sheath = np.where((t > 0.3 * WIDTH * np.sin(2.0 * np.pi * u / 500.0))[..., None], GREEN, YELLOW)
+    inside = (np.abs(t) < 0.5 * WIDTH) & ends
+    line = trace_photo(taken(tmp_path, np.where(inside[..., None], sheath, PAPER * shadow[..., None])))
+    assert isinstance(line, Centerline)
+    assert np.sqrt(np.mean(beside(line) ** 2)) < 0.05 * WIDTH  # half of it by the green alone
+    assert line.width_m == pytest.approx(WIDTH, rel=0.1)
+
+
+def test_wires_of_two_colours_that_cross_are_not_one(tmp_path):
+    u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
+    first, second = (np.abs(v[:, None] - middle) < 0.5 * WIDTH for middle in (0.35 * u + 50.0, 330.0 - 0.3 * u))
+    ends = (u > 93.0) & (u < 716.0)
+    picture = np.where((first & ends)[..., None], GREEN, np.where((second & ends)[..., None], YELLOW, PAPER))
+    assert isinstance(trace_photo(taken(tmp_path, picture)), Rejected)

@@ -1,0 +1,69 @@
+"""A photo in the colour in which a cable of several colours is one thing.
+
+A striped wire is two strips, and the one that stands out more passes for a cable. Fisher's discriminant between ground
+and cable, with the scatter of the cable's own colours in it, is the direction of colour along which its stripes are
+alike; a shadow beside it, which is the ground's colour but darker, mostly fades in it.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from pipeline.records import Array
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.backdrop import Standout, otsu_levels
+from pipeline.vision.search.crosscut import path_normals
+
+_UNEVEN = 0.3  # of the step to the ground; cables of one colour with gloss, print and shade scatter by less
+_STIFF = 0.01  # of the squared step, added to every colour's variance: colours that hardly differ are not chased
+_CORE = 0.45  # of the depth around; cells of a mask nearer to its rim than that are mixed with the ground
+_AROUND = np.ones((9, 9), np.uint8)  # cells
+_INSIDE, _BESIDE = np.linspace(-0.3, 0.3, 7), np.linspace(0.9, 1.3, 4)  # widths from a cable's middle
+_ROWS = 256  # px; worked on at a time: large photos shall not be held as single precision
+_COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
+
+
+def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
+    """The photo as grey values along that direction; None where what stands out is of one brightness as it is."""
+    distance = standout.distance()
+    mask = (distance > otsu_levels(distance)[0]).astype(np.uint8)
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
+    core = standout.residual[(depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)].astype(np.float64)
+    channels = core.shape[1]
+    if channels == 1 or len(core) < 4 * channels:
+        return None
+    weights = np.linalg.solve(standout.covariance, np.median(core, axis=0))
+    seen = core @ weights
+    return None if np.std(seen) < _UNEVEN * np.median(seen) else _along(photo, core, standout.covariance)
+
+
+def in_colour_of(photo: Photo, standout: Standout, cable: RoughCable) -> Photo:
+    """The same by a cable that was found: its colours, and those of the ground and shadow beside it."""
+    first, last = cable.visible
+    path = standout.to_cells(cable.path_px[first : last + 1])
+    across = 2.0 * cable.half_width_px / standout.reduction * path_normals(path)[1][:, None]
+
+    def colours(widths: Array) -> Array:
+        u, v = np.moveaxis((path[:, None] + widths[:, None] * across).astype(np.float32), -1, 0)
+        found = cv2.remap(standout.residual, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return found.reshape(-1, found.shape[-1]).astype(np.float64)
+
+    beside = colours(np.concatenate([-_BESIDE, _BESIDE]))
+    ground = standout.covariance + np.cov(beside.T)
+    return _along(photo, colours(_INSIDE) - np.median(beside, axis=0), ground)
+
+
+def _along(photo: Photo, core: Array, ground: Array) -> Photo:
+    """Grey values by the discriminant of colours ``(n, c)`` less the ground's, of a covariance ``(c, c)``."""
+    step = np.median(core, axis=0)
+    scatter = ground + np.cov(core.T) + _STIFF * (step @ step) * np.eye(len(step))
+    weights = np.linalg.solve(scatter, step)
+    weights *= np.sign(weights.sum()) / np.abs(weights).sum()
+    darkest = float(np.minimum(weights, 0.0).sum())
+    scaled = (65535.0 / photo.full_scale * weights).astype(np.float32)[None]
+    grey = np.empty(photo.pixels.shape[:2], np.uint16)
+    for rows in (slice(first, first + _ROWS) for first in range(0, len(grey), _ROWS)):
+        grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
+    return Photo(photo.name, grey, 16, _COLOUR_GRID_PX)
