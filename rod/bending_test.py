@@ -81,7 +81,7 @@ class BendingTest:
     displacement_offset : m
         Error of the zero: added to every displacement.
     elements : int or (n,)
-        Number of equal elements, or relative element lengths of sum one (see `rod.discretisation.graded`).
+        Number of equal elements, or relative element lengths.
     axial_stiffness, shear_stiffness : N or None
         EA and GA; None for stiff without influence (`rod.discretisation.RIGIDITY`).
     """

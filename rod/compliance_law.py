@@ -273,7 +273,7 @@ class ComplianceLaw(LawOfBend):
     @cached_property
     def curve(self) -> MomentCurve:
         """The moment over the bend K - K0."""
-        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates, self.basis.rest)
+        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates)
 
     @property
     def stiffness_scale(self) -> float:

@@ -34,21 +34,6 @@ from rod.support import BEARING, Support
 RIGIDITY = 1e9
 
 
-def graded(elements: int, ratio: float) -> Array:
-    """Relative element lengths, (elements,) of sum one: at mid-span ``ratio`` times as long as at the ends.
-
-    Raises
-    ------
-    ValueError
-        For fewer than two elements or a ratio that is not positive.
-    """
-    if elements < 2 or not ratio > 0.0:
-        raise ValueError(f"need at least two elements and a positive ratio, got {elements} and {ratio}")
-    centre = (np.arange(elements) + 0.5) / elements
-    size = ratio ** (1.0 - np.abs(2.0 * centre - 1.0))
-    return np.asarray(size / size.sum())
-
-
 class Mounted(NamedTuple):
     """The force-free rod in its chord frame: angles (n + 2,) rad and chord, m."""
 

@@ -1,6 +1,6 @@
 """Moment curves in closed form: cables whose truth is no spline, for tests, demonstrations and designs of experiments.
 
-A law answers as `rod.characteristic.MomentCurve`: K and K0 in 1/m to moment in N m, tangent in N m^2, energy in N.
+A law answers as `rod.characteristic.MomentCurve`: K and K0 in 1/m to moment in N m, tangent in N m^2.
 
 `as_law` makes one of whatever describes a cable: a number, a function or a table. `StickSlip` is the usual picture of a
 cable whose wires stick to each other while hardly bent (stiffness EI0) and slip when bent more (EI1 < EI0):
@@ -60,12 +60,6 @@ class StickSlip:
         D = np.asarray(K, float) - np.asarray(K0, float)
         return np.asarray(self.EI1 + (self.EI0 - self.EI1) * (1.0 - np.tanh(D / self.kc) ** 2))
 
-    def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Secant m / (K - K0), N m^2, with its limit EI0 at rest."""
-        D = np.asarray(K, float) - np.asarray(K0, float)
-        rest = np.abs(D) < 1e-8 * self.kc  # tanh(x)/x = 1 - x^2/3: the limit is exact to the last digit there
-        return np.where(rest, self.EI0, self.moment(K, K0) / np.where(rest, 1.0, D))
-
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """Function of K alone that returns moment and tangent."""
         slip = self.EI0 - self.EI1
@@ -80,13 +74,6 @@ class StickSlip:
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0 = -dm/dK, N m^2."""
         return -self.tangent(K, K0)
-
-    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Energy per length, N."""
-        D = np.asarray(K, float) - np.asarray(K0, float)
-        u = np.abs(D) / self.kc
-        log_cosh = u + np.log1p(np.exp(-2.0 * u)) - np.log(2.0)
-        return np.asarray(0.5 * self.EI1 * D**2 + (self.EI0 - self.EI1) * self.kc**2 * log_cosh)
 
 
 def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) -> MomentCurve:

@@ -24,9 +24,8 @@ class MomentCurve:
     Attributes
     ----------
     bends : (g,) 1/m
-    table : (5, g + 1)
-        Rising powers of the moment on each segment and, last, its primitive at the origin. Segment 0 lies below the
-        first point, the last one above the last.
+    table : (4, g + 1)
+        Rising powers of the moment on each segment. Segment 0 lies below the first point, the last one above the last.
     origin : (g + 1,) 1/m
     """
 
@@ -38,31 +37,19 @@ class MomentCurve:
         """Moment and tangent at bends (n,)."""
         segment = self.bends.searchsorted(bend)
         t = bend - self.origin.take(segment)
-        a, b, c, d = self.table[:4].take(segment, axis=1)
+        a, b, c, d = self.table.take(segment, axis=1)
         return ((d * t + c) * t + b) * t + a, (3.0 * d * t + 2.0 * c) * t + b
 
-    def energy(self, bend: Array) -> Array:
-        """Integral of the moment from rest to bends (n,), N."""
-        segment = self.bends.searchsorted(bend)
-        t = bend - self.origin.take(segment)
-        a, b, c, d, energy = self.table.take(segment, axis=1)
-        return np.asarray((((0.25 * d * t + c / 3.0) * t + 0.5 * b) * t + a) * t + energy)
 
-
-def moment_curve(K: Array, m: Array, f: Array, rest: int) -> MomentCurve:
-    """The curve through bends K (g,) and moments m (g,) with tangents f (g,); ``rest`` is the place of the origin."""
+def moment_curve(K: Array, m: Array, f: Array) -> MomentCurve:
+    """The curve through bends K (g,) and moments m (g,) with tangents f (g,)."""
     h = np.diff(K)
     mean = np.diff(m) / h
-    table = np.zeros((5, K.size + 1))
+    table = np.zeros((4, K.size + 1))
     table[0, 1:-1], table[1, 1:-1] = m[:-1], f[:-1]
     table[2, 1:-1] = (3.0 * mean - 2.0 * f[:-1] - f[1:]) / h
     table[3, 1:-1] = (f[:-1] + f[1:] - 2.0 * mean) / h**2
     table[0, 0], table[1, 0], table[0, -1], table[1, -1] = m[0], f[0], m[-1], f[-1]
-    a, b, c, d = table[:4, 1:-1]
-    rise = (((0.25 * d * h + c / 3.0) * h + 0.5 * b) * h + a) * h
-    energy = np.concatenate([[0.0], np.cumsum(rise)])
-    energy -= energy[rest]
-    table[4] = np.concatenate([energy[:1], energy])
     return MomentCurve(K, table, np.concatenate([K[:1], K]))
 
 
@@ -85,10 +72,6 @@ class LawOfBend:
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
         return lambda K: self.curve.at(K - K0)
-
-    def energy(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Energy per length int_{K0}^{K} m dk, N."""
-        return self.curve.energy(np.asarray(K, float) - np.asarray(K0, float))
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2: the law moves with K0."""

@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,6 @@ from scipy.signal import savgol_filter
 
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, BendingTest, simulate, table_1
 from rod.characteristic import Reading
-from rod.elastica import UniformEquilibrium, pure_bending
 from rod.equilibrium import Equilibrium, solve
 from rod.iteration import iterate
 from rod.paper_fit import PaperFit, Virtual, paper_fit
@@ -42,6 +42,13 @@ Array = NDArray[np.float64]
 
 STEPS: Array = TABLE_1["step"] * np.arange(1.0, 4.0)
 READINGS: tuple[Reading, Reading] = ("secant", "tangent")
+
+
+class Arc(NamedTuple):
+    """Position (n,) m of a rod in its chord frame."""
+
+    x: Array
+    y: Array
 
 
 @dataclass(frozen=True)
@@ -61,10 +68,11 @@ class TableOne:
         return np.array([np.max(step.kappa) for step in self.steps])
 
     @property
-    def initial(self) -> UniformEquilibrium:
-        """The rod before the first step, free of force."""
-        rod = self.steps[0].rod
-        return pure_bending(float(rod.section.pre_curvature[0]), length=rod.length)
+    def initial(self) -> Arc:
+        """The rod before the first step, free of force: an arc of curvature K0."""
+        K0, half = TABLE_1["pre_curvature"], 0.5 * TABLE_1["pre_curvature"] * TABLE_1["length"]
+        theta = half - K0 * self.steps[0].s
+        return Arc((np.sin(half) - np.sin(theta)) / K0, (np.cos(theta) - np.cos(half)) / K0)
 
 
 @dataclass(frozen=True)

@@ -218,42 +218,6 @@ class Section:
         stick = self.friction.stick
         return np.clip(memory.relaxed, K - stick, K + stick), reached
 
-    def _law_energy(self, K: Array, p: Array) -> Array:
-        """Energy per length of the law alone from its rest K0 + p to curvature K, (n,) N."""
-        law, K0 = self.law, self.pre_curvature
-        if not self.law_stays:
-            return law.energy(K - p, K0)
-        rest = K0 + p
-        return np.asarray(law.energy(K, K0) - law.energy(rest, K0) - law.moment(rest, K0) * (K - rest))
-
-    def stored_energy(self, K: Array, memory: Memory) -> Array:
-        """Recoverable energy per length at the end of a step, (n,) N: law and sticking friction elements."""
-        energy = self._law_energy(K, self.set_at(K, memory))
-        energy = energy if self.profile is None else self.profile * energy
-        if self.friction is None:
-            return energy
-        u = np.clip((K - memory.relaxed) / self.friction.stick, -1.0, 1.0)
-        return np.asarray(energy + 0.5 * (self.friction.slip * self.friction.stick * u**2).sum(axis=0))
-
-    def potential(self, K: Array, memory: Memory) -> Array:
-        """Incremental potential per length, (n,) N: stored energy plus what the step dissipates; dpotential/dK = m."""
-        # Up to the curvature reached before, the set stays; beyond, it grows: Gauss points on the part beyond.
-        turn = np.minimum(K, self.pre_curvature + memory.reached) if self.plastic_rate else K
-        before = self.plastic_rate * (memory.reached - self.set_threshold) + self.given(memory)
-        energy = self._law_energy(turn, np.broadcast_to(before, K.shape))
-        if self.plastic_rate:
-            nodes, weights = np.polynomial.legendre.leggauss(12)
-            k = turn + 0.5 * (K - turn) * (nodes[:, None] + 1.0)
-            reads = self.read(k, self.set_at(k, memory))
-            growing = sum(read.share * self.law.moment(read.at, self.pre_curvature) for read in reads)
-            energy = energy + 0.5 * (K - turn) * (weights @ growing)
-        energy = energy if self.profile is None else self.profile * energy
-        if self.friction is None:
-            return np.asarray(energy)
-        u = np.abs((K - memory.relaxed) / self.friction.stick)
-        element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * self.friction.stick
-        return np.asarray(energy + (self.friction.slip * element).sum(axis=0))
-
 
 @lru_cache(maxsize=16)
 def _elastic(section: Section) -> Response:

@@ -42,7 +42,7 @@ class StiffnessLaw(LawOfBend):
     @cached_property
     def curve(self) -> MomentCurve:
         """The moment over the bend K - K0."""
-        return moment_curve(self.basis.moments, self.rise.bends, self.rise.rates, self.basis.rest)
+        return moment_curve(self.basis.moments, self.rise.bends, self.rise.rates)
 
     @property
     def stiffness_scale(self) -> float:

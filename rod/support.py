@@ -66,17 +66,6 @@ class Support:
         moment = self.stiffness * (angle - rest) + self.friction_moment * min(1.0, max(-1.0, u))
         return moment, self.stiffness + (self.friction_moment / self.stick_angle if sticking else 0.0)
 
-    def stored_energy(self, angle: float, rest: float, slip: float) -> float:
-        """Energy of the spring and of the sticking friction, J."""
-        u = min(1.0, max(-1.0, (angle - slip) / self.stick_angle))
-        return 0.5 * self.stiffness * (angle - rest) ** 2 + 0.5 * self.friction_moment * self.stick_angle * u**2
-
-    def potential(self, angle: float, rest: float, slip: float) -> float:
-        """Incremental potential, J: its derivative by the angle is `moment_at`."""
-        u = abs(angle - slip) / self.stick_angle
-        friction = self.friction_moment * self.stick_angle * (0.5 * u**2 if u < 1.0 else u - 0.5)
-        return 0.5 * self.stiffness * (angle - rest) ** 2 + friction
-
     def advanced(self, angle: float, slip: float) -> float:
         """Memory of the friction after a step that ended at ``angle``."""
         return min(max(slip, angle - self.stick_angle), angle + self.stick_angle)

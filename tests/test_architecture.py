@@ -16,7 +16,7 @@ ROD = [
     ("characteristic", "compliance_law"),
     ("stiffness_law",),
     ("law_prior",),
-    ("laws", "elastica", "section", "support"),
+    ("laws", "section", "support"),
     ("discretisation",),
     ("reduction",),
     ("branch",),

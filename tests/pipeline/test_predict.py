@@ -19,9 +19,9 @@ from pipeline.report.frames import prediction_frame
 from pipeline.result import DiagnosisPart, to_json
 from pipeline.settings import PredictSettings
 from pipeline.units import quantity
-from rod.elastica import uniform_equilibrium
 from rod.inverse import estimate
 from tests.pipeline.virtual_experiment import QUICK, identified, without
+from tests.rod.elastica import uniform_equilibrium
 from tests.rod.virtual_cable import StickSlip, equilibrium, force_free
 from tests.rod.virtual_photo import bending_test, random_cable
 

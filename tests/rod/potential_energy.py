@@ -29,6 +29,7 @@ from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.section import Memory
 from rod.support import Support
+from tests.rod.energies import section_potential, section_stored, support_potential, support_stored
 
 HALF_BANDWIDTH = 5
 
@@ -94,9 +95,9 @@ class Potential:
         axial, flexible = rod.flexibility
         angles = q[self.angle_index]
         energy = 0.5 * float(h @ (stretch**2 / axial + shear**2 / flexible))
-        energy += float(rod.weights @ rod.section.potential(rod.curvature(angles), self.memory))
+        energy += float(rod.weights @ section_potential(rod.section, rod.curvature(angles), self.memory))
         for angle, support, rest, slip, sign in self._ends(angles):
-            energy += support.potential(angle, rest, slip) + sign * support.moment * angle
+            energy += support_potential(support, angle, rest, slip) + sign * support.moment * angle
         return energy - float(np.sum(self._loads() * q[self._positions()]))
 
     def gradient(self, q: Array) -> Array:
@@ -162,10 +163,10 @@ class Potential:
         """Energy lost in the step that ended at q, J: slip of friction elements and bearings, growth of the set."""
         rod, angles = self.rod, q[self.angle_index]
         K = rod.curvature(angles)
-        lost = rod.section.potential(K, self.memory) - rod.section.stored_energy(K, self.memory)
+        lost = section_potential(rod.section, K, self.memory) - section_stored(rod.section, K, self.memory)
         energy = float(rod.weights @ lost)
         for angle, support, rest, slip, _ in self._ends(angles):
-            energy += support.potential(angle, rest, slip) - support.stored_energy(angle, rest, slip)
+            energy += support_potential(support, angle, rest, slip) - support_stored(support, angle, rest, slip)
         return energy
 
     def _strains(self, q: Array) -> tuple[Array, Array, Array, Array]:

@@ -8,12 +8,12 @@ import pytest
 
 from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
-from rod.elastica import natural_chord, uniform_equilibrium
 from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
 from rod.newton import Start, newton
 from rod.reduction import System
 from rod.support import CLAMP, Support
+from tests.rod.elastica import natural_chord, uniform_equilibrium
 from tests.rod.minimum import is_minimum
 from tests.rod.potential_energy import Potential
 

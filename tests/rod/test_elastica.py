@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from rod.characteristic import Characteristic
-from rod.elastica import natural_chord, pure_bending, uniform_equilibrium
 from rod.laws import StickSlip
+from tests.rod.elastica import natural_chord, pure_bending, uniform_equilibrium
 from tests.rod.virtual_cable import pinned_linear
 
 TABLE_1 = ([0.0, 5.0, 10.0], [5e-3, 3e-3, 2e-3])

@@ -38,7 +38,6 @@ def test_functions_and_tables_are_the_law_they_describe(given):
     # a table of steps of 0.05 1/m: cubic pieces are of third order in it, their slopes of second
     assert law.moment(K, 2.0) == pytest.approx(LAW.moment(K, 2.0), rel=1e-6, abs=1e-8)
     assert law.tangent(K, 2.0) == pytest.approx(LAW.tangent(K, 2.0), rel=2e-4)
-    assert law.energy(K, 2.0) == pytest.approx(LAW.energy(K, 2.0), rel=1e-6, abs=1e-9)
     assert law.moment_by_pre_curvature(K, 2.0) == pytest.approx(-LAW.tangent(K, 2.0), rel=2e-4)
     step, exact = (bend(0.2, one, chord=0.18, pre_curvature=2.0, **SOFT) for one in (law, LAW))
     assert step.good
@@ -58,9 +57,6 @@ def test_a_table_goes_on_straight_beyond_its_rows_and_need_not_be_odd():
     assert law.tangent([20.0, 100.0], 0.0) == pytest.approx(2.0 / 3.0, rel=1e-3)
     assert law.moment(5.0, 0.0) == pytest.approx(5.0 + 2.0 * out[1], rel=1e-4)
     assert law.moment([0.0, 2.0, -1.0], 0.0) == pytest.approx([0.0, 4.0, -1.0], rel=1e-4, abs=1e-12)
-    steps = np.linspace(3.0, 6.0, 3001)
-    gained = law.energy(6.0, 0.0) - law.energy(3.0, 0.0)
-    assert gained == pytest.approx(np.trapezoid(law.moment(steps, 0.0), steps), rel=1e-8)
 
 
 def test_a_number_is_a_stiffness_and_a_curve_stays_itself():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES, simulate, table_1
-from rod.elastica import uniform_equilibrium
 from rod.paper_fit import Virtual, paper_fit
+from tests.rod.elastica import uniform_equilibrium
 
 STEPS = 5e-3 * np.arange(1, 4)
 TRUTH = np.r_[TABLE_1_ORDINATES, TABLE_1["pre_curvature"]]

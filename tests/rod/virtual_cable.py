@@ -9,10 +9,11 @@ Signs as in `rod.measurement`: the bow lies at y > 0 and K > 0 toward it, hence 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.integrate import solve_bvp
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from scipy.optimize import brentq, root
 from scipy.special import ellipe, ellipk
 
@@ -72,8 +73,11 @@ class SplineLaw:
     def moment(self, K):
         return self.characteristic.moment(K, self.K0)
 
-    def energy(self, K):
-        return self.characteristic.energy(K, self.K0)
+    @cached_property
+    def energy(self):
+        """Of any K up to 100 1/m beyond K0, to 1e-12."""
+        K = self.K0 + np.linspace(0, 100, 20001)
+        return CubicHermiteSpline(K, self.moment(K), self.tangent(K)).antiderivative()
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 from rod.characteristic import Characteristic
-from rod.elastica import natural_chord, uniform_equilibrium
+from tests.rod.elastica import natural_chord, uniform_equilibrium
 
 LENGTH, DIAMETER, COVER = 0.181, 0.0046, 0.006
 Array = NDArray[np.float64]

@@ -16,8 +16,8 @@ from pipeline.vision.render import Curve
 from pipeline.vision.scale.chord import ChordFrame
 from pipeline.vision.scale.plane import PlaneMap
 from rod.characteristic import Characteristic
-from rod.elastica import natural_chord, uniform_equilibrium
 from tests.pipeline.vision.bow_scene import DIAMETER, LENGTH, bow
+from tests.rod.elastica import natural_chord, uniform_equilibrium
 
 LEAST_SCORE = 0.45
 """Standard deviations, rms: a band twice as wide as its errors leaves room for cables that go on otherwise."""

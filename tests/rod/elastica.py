@@ -114,7 +114,7 @@ def uniform_equilibrium(
     Parameters
     ----------
     law : MomentCurve
-        Any invertible moment curve with ``moment``, ``tangent`` and ``energy``.
+        Any invertible moment curve with ``moment`` and ``tangent``.
     length, chord : m
         Chord between 0 and the length; longer than the natural chord means tension.
     pre_curvature : 1/m
@@ -160,8 +160,11 @@ def _half(law: MomentCurve, phi: Array, *, end_slope: float, K_mid: float, K0: f
     """Integrand ds/dphi and cos(theta) at ``phi`` for given end slope and mid-span curvature."""
     rise = K_mid - K0
     K = K0 + rise * np.sin(phi)
-    W = K * law.moment(K, K0) - law.energy(K, K0)
-    W_mid = float(K_mid * law.moment(K_mid, K0) - law.energy(K_mid, K0))
+    grid = np.linspace(0.0, 1.0, 1601)
+    at = K0 + rise * grid
+    energy = CubicHermiteSpline(grid, rise * law.moment(at, K0), rise**2 * law.tangent(at, K0)).antiderivative()
+    W = K * law.moment(K, K0) - energy(np.sin(phi))
+    W_mid = float(K_mid * law.moment(K_mid, K0) - energy(1.0))
     depth = 1.0 - np.cos(end_slope)
     versine = depth * np.maximum(1.0 - W / W_mid, 0.0)  # 1 - cos theta
     sine = np.sqrt(np.maximum(versine * (2.0 - versine), np.finfo(float).tiny))
