@@ -66,15 +66,15 @@ class Fixed:
 
 
 def fixed_cover(found: Sequence[RoughCable], limit_px: float) -> Fixed | None:
-    """The cover that stands still on most photos; None where none does (to ``limit_px``), or the axes are no covers."""
-    if len(found) < _LEAST_STEADY or any(axis.kind != "cover" for c in found for axis in (c.left, c.right)):
+    """The cover that stands still on most photos; None where none does (to ``limit_px``)."""
+    if len(found) < _LEAST_STEADY:
         return None
-    off = np.stack([_off_middle(found, side) for side in _SIDES])
-    steady = off <= limit_px
+    steady = np.stack([_off_middle(found, side) <= limit_px for side in _SIDES])
     side = int(np.argmax(steady.sum(axis=1)))
-    if steady[side].sum() < max(_LEAST_STEADY - 1, _STEADY_SHARE * len(found)):
+    still = [_axis(cable, _SIDES[side]) for cable, there in zip(found, steady[side], strict=True) if there]
+    group = [axis for axis in still if axis.kind == "cover"]
+    if len(group) < max(_LEAST_STEADY - 1, _STEADY_SHARE * len(found)):
         return None
-    group = [_axis(cable, _SIDES[side]) for cable, still in zip(found, steady[side], strict=True) if still]
     middle = np.median([axis.center_px for axis in group], axis=0)
     surest = min(group, key=lambda axis: axis.std_px)
     cover = replace(surest, center_px=(float(middle[0]), float(middle[1])))
