@@ -119,14 +119,15 @@ class PlasticSet:
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Where the cable bends, the law moving along with the new rest or not; or all along with the largest bend.
 
-        From the first bend on, or beyond ``width``. On loading alone a set where the cable bends is part of the law.
+        From the first bend on, or beyond ``width``, sought from a low one and from a high one: with every step that a
+        threshold passes the misfit has another valley. On loading alone a set where the cable bends is part of the law.
         """
-        threshold = 0.3 * facts.curvature_scale
-        late = Variant(width=threshold, tuned=("width",), width_range=(0.0, 3.0 * threshold))
+        reach = 0.9 * facts.curvature_scale
+        late = [Variant(width=share * reach, tuned=("width",), width_range=(0.0, reach)) for share in (0.2, 0.5)]
         return tuple(
             replace(form, label=FORMS[at], at=float(at), of_law=at < 2 and not facts.returns)
             for at in range(len(FORMS) if len(facts.bends) else 2)
-            for form in (Variant(), late)
+            for form in (Variant(), *late)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:

@@ -113,6 +113,12 @@ class ForceDrift:
         return model.observed(shown(lambda force, time, begin: force + amount * (begin + time)))
 
 
+def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
+    """Share of a force that relaxation takes in one interval of the log: so long a hold may have lasted unseen."""
+    intervals = np.concatenate([np.diff(times) for times in facts.hold_times])
+    return float(fitted_amount * (1.0 - np.exp(-np.median(intervals) / variant.at)))
+
+
 @dataclass(frozen=True)
 class Relaxation:
     """``relaxation``: the force decays while a step is held."""

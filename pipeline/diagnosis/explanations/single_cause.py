@@ -98,18 +98,19 @@ def _by_setting(
     """The best fit of a single form of a cause for each setting; empty where no form can be simulated."""
     to_the_noise = FITS * (len(base.residual) - base.extension.size)
     best: dict[str, Fit] = {}
-    enough: set[str] = set()
+    enough: dict[str, int] = {}
     for direction in _first_forms(suspicion, cause):
-        # a law of any form beside the wrong kind of a cause may leave no more than noise, so each kind is tried
-        label = suspicion.terms[direction].variant.label
-        if label in enough:
+        # a law of any form beside the wrong kind of a cause may leave no more than noise, so each kind is tried, and
+        # what needs fewer numbers than one that leaves no more
+        term = suspicion.terms[direction]
+        if term.size >= enough.get(term.variant.label, np.inf):
             continue
         found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
         if found.converged and found.chi2 < to_the_noise:
-            enough.add(label)
-        setting = suspicion.terms[direction].variant.setting
+            enough[term.variant.label] = term.size
+        setting = term.variant.setting
         best[setting] = min(best.get(setting, found), found, key=_cost)
     return best
 
@@ -134,19 +135,20 @@ def _fit_form(
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
-    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of the other kinds.
+    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of each other kind.
 
     A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
-    Which setting is right may show only when further forms act beside.
+    Which setting is right may show only when further forms act beside. A kind is a label, a setting, a set of numbers.
     """
     own = suspicion.of(cause)
     ranked = [int(k) for k in own[descending(suspicion.statistic[own])]]
     least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]
     loud = [k for k in ranked[:4] if suspicion.statistic[k] >= least]
-    first = suspicion.terms[ranked[0]].variant
-    other = [k for k in ranked if suspicion.terms[k].variant.tuned != first.tuned]
-    elsewhere = [k for k in ranked if suspicion.terms[k].variant.setting != first.setting]
-    return list(dict.fromkeys([*loud, *other[:1], *elsewhere[:1]]))
+    kinds: dict[tuple[object, ...], int] = {}
+    for k in ranked:
+        form = suspicion.terms[k].variant
+        kinds.setdefault((form.label, form.setting, form.tuned), k)
+    return list(dict.fromkeys([*loud, *kinds.values()]))
 
 
 def _cost(fitted: Fit) -> float:

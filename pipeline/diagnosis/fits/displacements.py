@@ -31,11 +31,11 @@ def displacement_columns(observation: Observation, fitted: Fit) -> Array:
     None (k = 0) where the model has such errors among its unknowns already.
     """
     base, facts = fitted.extension.base, fitted.extension.facts
-    at = [i for i, branch in enumerate(facts.branch) if branch != "mounted"]
     none, count = np.zeros((len(fitted.residual), 0)), len(base.names) - 2
     if base.moved:
         return none
-    loose = replace(base, moved=tuple(at), moved_std=np.ones(len(at)), moved_first=np.zeros(len(at)))
+    at = facts.pushed
+    loose = replace(base, moved=at, moved_std=np.ones(len(at)), moved_first=np.zeros(len(at)))
     vector = np.r_[fitted.vector[:count], np.zeros(len(at)), fitted.vector[count:]]
     made = evaluated(observation, replace(fitted.extension, base=loose), vector, fitted.run)
     if made.run.prediction is None:

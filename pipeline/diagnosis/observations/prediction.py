@@ -82,6 +82,11 @@ class Facts:
         return float(np.ptp(np.append(self.displacement, 0.0)))
 
     @property
+    def pushed(self) -> tuple[int, ...]:
+        """Indices of the steps under load."""
+        return tuple(i for i, branch in enumerate(self.branch) if branch != "mounted")
+
+    @property
     def returns(self) -> bool:
         """Whether there is an unloading branch."""
         return "unloading" in self.branch

@@ -7,9 +7,12 @@ the sentence on top -> the part of the result.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
@@ -46,6 +49,7 @@ def present(
             np.array([error.get(step.step, 0.0) for step in bench.test.steps])
             for error in bench.test.common_force_errors
         ]
+        errors += _begun_unseen(accepted.fitted)
         again = identified_again(bench.observation, accepted.fitted, force_errors=errors)
     extended = None if again is None else extended_curve(again, settings)
     causes = named_causes(bench, conclusion, again, extended)
@@ -95,6 +99,17 @@ def present(
         left_out_photos=photos,
         left_out_forces=forces,
     )
+
+
+def _begun_unseen(fitted: Fit) -> list[NDArray[np.float64]]:
+    """What forces (n,) N may have lost before the first sample of their holds, where the cable relaxes."""
+    extension, forces = fitted.extension, np.array([step.force for step in fitted.run.steps])
+    terms = [extension.formed(fitted.vector, k) for k in range(len(extension.terms))]
+    return [
+        lost_unseen(fitted.amount(k)[0], term.variant, extension.facts) * forces
+        for k, term in enumerate(terms)
+        if isinstance(term.cause, Relaxation)
+    ]
 
 
 def left_out(bench: Workbench) -> tuple[list[int], list[int]]:
