@@ -82,7 +82,6 @@ INSIDE = {
         ("forms",),
         ("free_profile",),
         ("single_cause", "pair_fits"),
-        ("exchange",),
         ("search",),
         ("conclusion",),
     ],

@@ -109,18 +109,17 @@ def in_any_form(
     bench: Workbench,
     found: Sequence[Explanation],
     *,
-    rivals: Sequence[Explanation] = (),
     effort: Effort = TO_THE_END,
 ) -> list[Explanation]:
     """What the best pairs become with further forms of their own place, and with profiles of any form.
 
-    One that cannot come near the best one so far, ``rivals`` included, as far as its scores tell, is left out.
+    One that cannot come near the best one so far, as far as its scores tell, is left out.
     """
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
         if effort.spent:
             break
-        rival = min(e.fitted.chi2 for e in (*found, *new, *rivals))
+        rival = min(e.fitted.chi2 for e in (*found, *new))
         fitted, hopeless = pair.fitted, rival + LEAST
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             if effort.spent:

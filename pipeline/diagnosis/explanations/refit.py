@@ -1,8 +1,8 @@
 """Terms put beside what a fitted model has already, and everything fitted again in full.
 
 Scores are local: their amounts are right only as far as the model is linear. A refit starts from that linear estimate,
-the other parameters moved out of the new terms' place, or from the share of it that fits best; and from both sides of
-K0 where nothing but the fit tells where K0 is.
+the other parameters moved out of the new terms' place, or from the share of it that fits best; and from the law and
+K0 that photos show, where the base model went elsewhere.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SANE = 5.0
 """Plausible sizes: no refit starts from a larger amount, however far the linear model goes."""
 
 OTHER_VALLEY = 0.1
-"""Of the curvature scale: how far to both sides of the first guess K0 is put for further starts."""
+"""Of the curvature scale: a base model whose K0 is so far from what photos show has gone elsewhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ def fit_terms(
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
     added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
     best: Fit | None = None
-    for start in (linear_start(observation, added), *_other_valleys(added)):
+    for start in (linear_start(observation, added), *_as_seen(added)):
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
@@ -144,18 +144,12 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
     return np.inf if value is None else float(value @ value)
 
 
-def _other_valleys(added: Addition) -> list[Array]:
-    """Starts on both sides of K0 beside a bare base model whose K0 no photo of the force-free cable shows.
+def _as_seen(added: Addition) -> list[Array]:
+    """A start with the law and K0 that photos show, where the base model went elsewhere.
 
-    K0 then has a second, false valley, as deep as the true one but for some sigma. With such a photo there is a start
-    with the law and K0 that all photos show, where the base model went elsewhere: a load in the plane may turn the
-    mounted cable over, and without it no K0 of the true sign does.
+    A load in the plane may turn the mounted cable over, and no base model without it has a K0 of the true sign.
     """
     base, facts = added.base.extension.base, added.base.extension.facts
-    shift = OTHER_VALLEY * facts.curvature_scale
-    if "mounted" in facts.branch:
-        seen = base.as_seen()
-        apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > shift
-        return [added.start(seen)] if apart and len(seen) == len(added.base.vector) else []
-    guesses = [base.neutral(bend=bend) for bend in (shift, -shift)]
-    return [added.start(guess) for guess in guesses if len(guess) == len(added.base.vector)]
+    seen = base.as_seen()
+    apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > OTHER_VALLEY * facts.curvature_scale
+    return [added.start(seen)] if apart and len(seen) == len(added.base.vector) else []

@@ -1,8 +1,8 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what scores beside the best of them, and pairs of the exhaustive linear search, refitted -> members of pairs
-exchanged, and pairs pruned of what they do not need -> probabilities of all.
+-> what scores beside the best of them, and pairs of the exhaustive linear search, refitted -> pairs pruned of what they
+do not need -> probabilities of all.
 
 A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
 2.5 standard deviations of nothing is fitted again without it.
@@ -17,7 +17,6 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
-from pipeline.diagnosis.explanations.exchange import exchanged
 from pipeline.diagnosis.explanations.pair_fits import (
     beside_best,
     in_any_form,
@@ -123,8 +122,6 @@ class Search:
         forms = with_all_forms(bench, found)
         new = [one for one in forms if one not in found]
         new += in_any_form(bench, forms, effort=self.effort)
-        new += (swapped := exchanged(bench, [*forms, *new], self.effort))
-        new += in_any_form(bench, swapped, rivals=[*forms, *new], effort=self.effort)
         new = self.add(new)
         self.add(list(self._pruned(new)))
         self.curtailed |= self.effort.spent
