@@ -229,12 +229,9 @@ def _decisive(cell: str) -> Decimal | None:
 
 def _fits(pattern: re.Pattern[str], token: str) -> bool:
     """True if the whole token is a number of that notation; a leading 0 group such as 0,500 is no thousand."""
-    return bool(pattern.fullmatch(token)) and any(map(str.isdigit, token)) and not _zero_group(pattern, token)
-
-
-def _zero_group(pattern: re.Pattern[str], token: str) -> bool:
     mark = "," if pattern is POINT else "."
-    return mark in token and token.lstrip("+-").startswith("0")
+    zero_group = mark in token and token.lstrip("+-").startswith("0")
+    return bool(pattern.fullmatch(token)) and any(map(str.isdigit, token)) and not zero_group
 
 
 def looks_like_number(cell: str) -> bool:

@@ -70,7 +70,9 @@ def load_steps(
         samples = samples.without(wild)
         displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
     places = hold_places(
-        [displacements[run.rows] for run in runs], [_at_photo(samples, run) for run in runs], settings=settings
+        [displacements[run.rows] for run in runs],
+        [np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run)) for run in runs],
+        settings=settings,
     )
     positions = places.place
     same = max(tolerance, SAME * max((std for std in places.std if std is not None), default=0.0))
@@ -92,8 +94,7 @@ def load_steps(
         *grouped,
         *signed,
         *directed,
-        *_fit_findings(fitted, name, settings),
-        *_place_findings(places, tolerance, name),
+        *_fit_findings(fitted, places, tolerance, name, settings),
         *within,
         *order,
     )
@@ -110,7 +111,8 @@ def _grouped(
     displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
     displacements, turned = signed_displacements(displacements, name)
     runs, found = _runs(samples, displacements, tolerance, name=name, settings=settings)
-    _check_count(runs, path, settings)
+    if len(runs) > settings.steps_max:  # a ramp without holds, or a step column that counts the rows
+        raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
     _check_swapped(samples, runs, path)
     return displacements, tolerance, runs, (*moved, *turned, *found)
 
@@ -231,11 +233,6 @@ def _rows_with_photo(samples: Samples, run: Run) -> list[int]:
     return [row for row in named if samples.images[row] == samples.images[named[0]]]
 
 
-def _at_photo(samples: Samples, run: Run) -> NDArray[np.bool_]:
-    """Which rows of a hold name its (first) photo, (n,)."""
-    return np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run))
-
-
 def _photo_time(samples: Samples, run: Run) -> float | None:
     rows = _rows_with_photo(samples, run)
     return float(np.mean(samples.times[rows])) if rows and samples.times is not None else None
@@ -249,12 +246,6 @@ def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
     else:
         times, photo = samples.times[run.rows], samples.times[rows]
     return Hold(times, forces[run.rows], photo_time=float(np.mean(photo)) if rows else None)
-
-
-def _check_count(runs: Sequence[Run], path: Path, settings: IntakeSettings) -> None:
-    """Refuse a log of too many steps: a ramp without holds, or a step column that counts the rows."""
-    if len(runs) > settings.steps_max:
-        raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
 
 
 def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
@@ -282,18 +273,16 @@ def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[
     return found
 
 
-def _fit_findings(fitted: HoldForces, name: str, settings: IntakeSettings) -> Iterator[Finding]:
-    """How the forces and their standard deviations were found, where that is not the plain mean of a hold."""
+def _fit_findings(
+    fitted: HoldForces, places: HoldPlaces, tolerance: float, name: str, settings: IntakeSettings
+) -> Iterator[Finding]:
+    """What is no plain mean of a hold: how forces and their errors were found, displacements that scatter."""
     if fitted.degree:
         yield inferred("log/trend", file=name, degree=fitted.degree)
     if fitted.source != FROM_SAMPLES:
         share = settings.force_std_relative
         yield inferred("log/force-std", file=name, share=share, std_N=float(fitted.std[0]))
-
-
-def _place_findings(places: HoldPlaces, tolerance: float, name: str) -> Iterator[Finding]:
-    """A displacement that scatters by more than the difference that makes a new hold."""
-    if places.sigma > tolerance:
+    if places.sigma > tolerance:  # by more than the difference that makes a new hold
         largest = max(std for std in places.std if std is not None)
         yield inferred("log/displacement-noise", file=name, scatter_m=places.sigma, std_m=largest)
 

@@ -235,10 +235,11 @@ def _present_name(
     beside = [other for other in present if PurePosixPath(other).name == name]
     if not _exists(path) and len(beside) == 1:
         return beside[0], []  # the name alone, as people write it: there is nothing else that it could mean
-    if _exists(path) or name in present:  # what is there but no ordinary file is refused with its reason later
-        return name, []
     alike = [other for other in present if _loose(other) == _loose(name)]
     alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]
+    converted = len(alike) == 1 and PurePosixPath(name).suffix.casefold() in OTHER_SUFFIXES
+    if not converted and (_exists(path) or name in present):  # no ordinary file is refused with its reason later
+        return name, []
     if len(alike) == 1:
         return alike[0], [inferred("photo/name", taken=alike[0], **place)]
     return None, [doubtful("photo/missing", step=step.step, **place)]

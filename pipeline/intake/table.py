@@ -69,7 +69,8 @@ def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
     end = _end_of_samples(table, columns)
     if surplus < end:
         line, cells = rows[table.places[surplus]]
-        raise _too_wide(line, len(cells), columns, path)
+        key = "log/row-length.comma" if columns.separator == "," else "log/row-length"
+        raise InputError(Message(key, cells=len(cells), width=columns.width), path=path, line=line)
     summary = tuple(rows.lines[place] for place in table.places[end:])
     if not summary:
         return table
@@ -116,8 +117,3 @@ def _end_of_samples(table: Table, columns: Columns) -> int:
 def _is_summary(cells: list[str], columns: Columns) -> bool:
     """Whether a row is called a mean, a sum or the like; a photo may have any name."""
     return any(SUMMARY.fullmatch(cell) for place, cell in enumerate(cells) if place != columns.index.get("image"))
-
-
-def _too_wide(line: int, count: int, columns: Columns, path: Path) -> InputError:
-    key = "log/row-length.comma" if columns.separator == "," else "log/row-length"
-    return InputError(Message(key, cells=count, width=columns.width), path=path, line=line)

@@ -80,9 +80,15 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
     axes.set_xlim(left, high + margin)
     bottom, top = _limits(counted, band_width(settings))
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
-    finish(axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2)
+    _over_kappa(axes, "axis_stiffness", unit, words)
     _mark_legend(axes)
     return axes
+
+
+def _over_kappa(axes: Axes, quantity: str, unit: Unit, words: Words) -> Axes:
+    """Rule and name the axes of a figure over the curvature, its legend above."""
+    name = words(quantity, unit=unit.symbol)
+    return finish(axes, x=words("axis_kappa"), y=name, decimal=words.decimal, legend=2)
 
 
 def _mark_legend(axes: Axes) -> None:
@@ -144,9 +150,7 @@ def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSett
     for method, curve in parts.items():
         _banded(axes, curve.kappa, curve.moment, curve.moment_std, method, unit, words, settings)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    return finish(
-        axes, x=words("axis_kappa"), y=words("axis_moment", unit=unit.symbol), decimal=words.decimal, legend=2
-    )
+    return _over_kappa(axes, "axis_moment", unit, words)
 
 
 def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
@@ -162,9 +166,7 @@ def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportS
         _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, "balance", unit, words, settings)
         lowest, highest = (unit.factor * float(value) for value in (curve.tangent.min(), curve.tangent.max()))
         axes.set_ylim(min(0.0, lowest), POINTWISE_HEADROOM * highest)
-    return finish(
-        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
-    )
+    return _over_kappa(axes, "axis_stiffness", unit, words)
 
 
 def fitted_branches(result: Result) -> dict[str, Visited]:
@@ -182,9 +184,7 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
         _banded(axes, *told, colour, unit, words, settings, label=words.branch(name))
     bottom, top = _limits(parts.values(), half)
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
-    return finish(
-        axes, x=words("axis_kappa"), y=words("axis_stiffness", unit=unit.symbol), decimal=words.decimal, legend=2
-    )
+    return _over_kappa(axes, "axis_stiffness", unit, words)
 
 
 def steps_of_answer(result: Result) -> list[StepPart]:

@@ -214,28 +214,28 @@ def _along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -
     wide = 1.0 + common[:, None, None] ** 2 + sizes[None, :, None] ** 2 * spread.size
     turned = spread.turn @ rows
     change = (1.0 / wide - 1.0).reshape(len(common) * len(sizes), len(spread.size))
-    found = np.array([_sums(turned, own, weight) for weight in change])
+    mine, added = turned[:, :own], turned[:, own:]
+    pairs = (np.einsum("ni,nj->nij", mine, other).reshape(len(turned), own * other.shape[1]) for other in (mine, added))
+    found = change @ np.hstack([*pairs, added**2])
     return found.reshape(*wide.shape[:-1], -1), np.log(wide).sum(axis=-1)
 
 
-def _sums(rows: Array, own: int, weight: Array | None = None) -> Array:
-    """Weighted sums (T,) over rows (n, c): own by own columns, own by added ones, added ones squared; flat."""
-    heavy = rows if weight is None else weight[:, None] * rows
-    both = rows[:, :own].T @ heavy
-    return np.concatenate(
-        [both[:, :own].ravel(), both[:, own:].ravel(), np.einsum("nk,nk->k", rows[:, own:], heavy[:, own:])]
-    )
+def _sums(rows: Array, own: int) -> Array:
+    """Sums (T,) over rows (n, c): own by own columns, own by added ones, added ones squared; flat."""
+    both = rows[:, :own].T @ rows
+    return np.concatenate([both[:, :own].ravel(), both[:, own:].ravel(), np.sum(rows[:, own:] ** 2, axis=0)])
 
 
 def _with_displacements(fixed: Products, extra: int) -> Products:
     """The products with displacements that scatter by each of `MOVED`, in units of it."""
     count = fixed.own.shape[1] - extra
     known = np.diag(np.r_[np.zeros(count), np.ones(extra)])
-    scales = [np.r_[np.ones(count), np.full(extra, std)] for std in MOVED]
-    times = len(MOVED)
+    scales, times = np.ones((len(MOVED), count + extra)), len(MOVED)
+    scales[:, count:] = np.array([*MOVED])[:, None]
+    by, models = scales[:, None, :, None], times * len(fixed.log_det)
     return Products(
-        own=np.concatenate([fixed.own * scale * scale[:, None] + known for scale in scales]),
-        cross=np.concatenate([fixed.cross * scale[:, None] for scale in scales]),
+        own=(fixed.own * (by * scales[:, None, None]) + known).reshape(models, *fixed.own.shape[1:]),
+        cross=(fixed.cross * by).reshape(models, *fixed.cross.shape[1:]),
         square=np.tile(fixed.square, (times, 1)),
         log_det=np.tile(fixed.log_det, times),
         log_prior=np.concatenate([fixed.log_prior + np.log(chance) for chance in MOVED.values()]),

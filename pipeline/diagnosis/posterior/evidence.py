@@ -66,21 +66,21 @@ class WithColumn(NamedTuple):
 class _Solved:
     """What the fit's own unknowns are for every error model.
 
-    ``flat`` (G,): log p flat in the amounts. ``H`` (G, p, p) in units ``scale`` (G, p) of its unknowns. ``amounts``:
-    those of the vector that no prior row states. ``move`` (G, a) of these and ``covariance`` (G, a, a).
+    ``flat`` (G,): log p flat in the amounts. ``half`` (G, p, p): W with W' W = H^-1; ``pull`` (G, p): W b.
+    ``amounts``: those of the vector that no prior row states. ``move`` (G, a) of these and ``covariance`` (G, a, a).
     """
 
     products: Products
     flat: Array
-    H: Array
-    scale: Array
+    half: Array
+    pull: Array
     amounts: list[int]
     move: Array
     covariance: Array
 
     def moves(self, by: Array) -> Array:
         """H^-1 of columns (G, p, k) of products."""
-        return np.asarray(np.linalg.solve(self.H, by / self.scale[..., None]) / self.scale[..., None])
+        return np.asarray(self.half.swapaxes(1, 2) @ (self.half @ by))
 
 
 def evidence(
@@ -144,7 +144,7 @@ def moments(grid: ErrorGrid, fitted: Fit) -> Moments:
     """Mean and covariance of a fit's unknowns under every error model."""
     solved, size = _solved(grid, fitted, np.zeros((len(fitted.residual), 0))), fitted.extension.size
     weight = solved.flat + _amounts(fitted, solved) + solved.products.log_prior
-    b, unit = solved.products.own[:, 1:, :1], np.eye(solved.H.shape[1])[:, :size]
+    b, unit = solved.products.own[:, 1:, :1], np.eye(solved.half.shape[1])[:, :size]
     found = solved.moves(np.concatenate([b, np.broadcast_to(unit, (len(b), *unit.shape))], axis=2))[:, :size]
     return Moments(weight, found[..., 0], found[..., 1:], solved.products.rest)
 
@@ -178,25 +178,25 @@ def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
     H = H * unit[:, :, None] * unit[:, None, :]
     np.einsum("gii->gi", H)[:] += ROUNDING
     amounts = _unknown(fitted)
-    rows = np.zeros((*b.shape, 1 + len(amounts)))
-    rows[..., 0] = b * unit
-    rows[:, amounts, np.arange(1, 1 + len(amounts))] = unit[:, amounts]
     root = np.asarray(np.linalg.cholesky(H), dtype=np.float64)
-    half = _forward(root, rows)
-    below = np.swapaxes(half, 1, 2) @ half
+    half = _inverse(root) * unit[:, None]
+    pull = (half @ b[..., None])[..., 0]
+    own = half[:, :, amounts]
     log_det = 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
     normal = 0.5 * len(amounts) * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
-    flat = normal - 0.5 * (products.own[:, 0, 0] - below[:, 0, 0] + products.log_det + log_det)
-    return _Solved(products, flat, H, scale, amounts, below[:, 1:, 0], below[:, 1:, 1:])
+    flat = normal - 0.5 * (products.own[:, 0, 0] - np.sum(pull**2, axis=1) + products.log_det + log_det)
+    move, covariance = np.einsum("gpa,gp->ga", own, pull), own.swapaxes(1, 2) @ own
+    return _Solved(products, flat, half, pull, amounts, move, covariance)
 
 
-def _forward(root: Array, rows: Array) -> Array:
-    """Lower triangular factors (g, n, n) solved for rows (g, n, k), row by row for all at once."""
-    solved = np.empty_like(rows)
-    for j in range(rows.shape[1]):
-        known = np.einsum("gi,gik->gk", root[:, j, :j], solved[:, :j])
-        solved[:, j] = (rows[:, j] - known) / root[:, j, j, None]
+def _inverse(root: Array) -> Array:
+    """Inverses of lower triangular factors (g, n, n), row by row for all at once."""
+    solved = np.zeros_like(root)
+    for j in range(root.shape[1]):
+        solved[:, j, :j] = -(root[:, j, None, :j] @ solved[:, :j, :j])[:, 0]
+        solved[:, j, j] = 1.0
+        solved[:, j] /= root[:, j, j, None]
     return solved
 
 
@@ -258,10 +258,9 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
 
 def _column_gain(fitted: Fit, terms: Sequence[Term], solved: _Solved) -> Array:
     """Log of the factor (G, k) by which each further column changes p."""
-    u, b = solved.products.cross[:, 1:], solved.products.own[:, 1:, 0]
-    square, moves = solved.products.square, solved.moves(u)
-    precision = np.maximum(square - np.sum(u * moves, axis=1), INVISIBLE * square + 1e-300)
-    score = solved.products.cross[:, 0] - np.einsum("gik,gi->gk", moves, b)
+    square, half = solved.products.square, solved.half @ solved.products.cross[:, 1:]
+    precision = np.maximum(square - np.einsum("gik,gik->gk", half, half), INVISIBLE * square + 1e-300)
+    score = solved.products.cross[:, 0] - (solved.pull[:, None] @ half)[:, 0]
     amount, facts = score / precision, fitted.extension.facts
     gains = [
         log_gain(amount[:, k], 1.0 / precision[:, k], term.cause.plausible(facts), term.cause.sign)

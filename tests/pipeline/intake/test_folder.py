@@ -68,6 +68,9 @@ def test_a_picture_of_a_telephone_among_others_is_named(specimen_folder):
     log = folder.path / "force.csv"
     log.write_text(log.read_text().replace("step_1.png", "step_1.HEIC"))
     assert "photo 'step_1.HEIC' was taken to be images/step_1.jpg" in folder.message("photo/name")
+    folder.write("images/step_1.HEIC", b"\0\0\0\x18ftypheic")
+    log.write_text(log.read_text().replace("step_1.HEIC", "images/step_1.HEIC"))
+    assert "images/step_1.jpg" in folder.read().images and "photo/other-kind" not in folder.codes()
 
 
 def test_doubled_photos_are_told(specimen_folder):
