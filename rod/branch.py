@@ -11,19 +11,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
-from rod.characteristic import Array
 from rod.discretisation import Rod
 
 Branch = Literal["natural", "opposite", "up", "down", "jump"]
-
-
-def bow(rod: Rod, angles: Array) -> float:
-    """Mean height of a shape over its chord, relative to the length: positive if it bows toward +y."""
-    h = rod.edges
-    y = np.cumsum(h * np.sin(angles))
-    return float(h @ y / rod.length**2)
 
 
 def bow_side(rod: Rod, branch: Branch) -> int:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rod.branch import Branch, bow, bow_side
+from rod.branch import Branch, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
@@ -158,7 +158,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     rod, most = system.rod, PATH_STEPS if patient else HASTY
     side = bow_side(rod, branch)
     # Where only the path can tell the side, a warm start keeps the one it has.
-    kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
+    kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
     leaning, certain = rod.leaning
     coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
     trusted = not (coiled or (certain and side == -leaning))
@@ -237,6 +237,6 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
         angles=angles,
         system=system,
         balance=balance,
-        after=rod.advanced(angles, system.memory),
+        after=rod.advanced(angles, balance.K, system.memory),
         iterations=steps,
     )
