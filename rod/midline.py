@@ -36,8 +36,6 @@ class Midline:
         Centres of the blocks: arc length on the smooth curve, measured position, direction of the tangent.
     offset : (b,) m
         Of the measured position from the smooth curve, along its normal.
-    sections : (b,)
-        Number of sections in each block.
     covariance : (b, b) m^2
         Of the position along the normal.
     factor : (b, b) m
@@ -51,7 +49,6 @@ class Midline:
     y: Array
     theta: Array
     offset: Array
-    sections: NDArray[np.intp]
     covariance: Array
     factor: Array
     whitener: Array
@@ -99,7 +96,7 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
     x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
     factor = np.asarray(np.linalg.cholesky(covariance), float)
-    return Midline(mean, x, y, theta, offset, sections, covariance, factor, np.tril(np.linalg.inv(factor)))
+    return Midline(mean, x, y, theta, offset, covariance, factor, np.tril(np.linalg.inv(factor)))
 
 
 def block_covariance(

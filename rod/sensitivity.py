@@ -133,13 +133,6 @@ def derivatives(
 # which is twice as fast. The record shows (n, q).
 
 
-def _cumulated(values: Array) -> Array:
-    """Running sum from the left with a leading zero, (..., n) to (..., n + 1)."""
-    total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
-    np.cumsum(values, axis=-1, out=total[..., 1:])
-    return total
-
-
 def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     """Derivative of the force-free shape in its chord frame; as if it were without load."""
     rod, h = test.rod, test.rod.edges
@@ -147,7 +140,7 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     turn = rod.weights * moves.pre_curvature
     if moves.geometric:
         turn += moves.weights * rod.section.pre_curvature
-    relative = -_cumulated(turn)
+    relative = -np.concatenate((np.zeros((len(turn), 1)), np.cumsum(turn, axis=1)), axis=1)
     along, across = -relative @ (h * sin), relative @ (h * cos)
     if moves.geometric:
         along, across = along + moves.edges @ cos, across + moves.edges @ sin

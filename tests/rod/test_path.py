@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rod.bending_test import BendingTest, simulate
-from rod.branch import bow_side
-from rod.equilibrium import Outcome, solve
+from rod.equilibrium import Outcome, bow_side, solve
 from rod.laws import StickSlip
 from rod.newton import Start, descended, softest
 from rod.path import Ramp, followed
