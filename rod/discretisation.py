@@ -165,10 +165,10 @@ class Rod:
 
         That is uncertain where it is bent both ways, or straight and driven by loads, end moments or turned ends.
         """
-        K0, h = self.section.pre_curvature, self.edges
+        K0 = self.section.pre_curvature
         driven = self.load[1] != 0.0 or any(end.moment or end.angle for end in (self.left, self.right))
         low, high = float(K0.min()), float(K0.max())
-        side = 1 if float(h @ np.cumsum(h * np.sin(self.mounted.angles))) >= 0.0 else -1
+        side = 1 if self.bow(self.mounted.angles) >= 0.0 else -1
         return side, not (low < 0.0 < high or (driven and low == high == 0.0))
 
     @cached_property
@@ -185,6 +185,10 @@ class Rod:
         relaxed, reached = self.section.virgin()
         angles = self.mounted.angles
         return Memory(relaxed, reached, float(angles[0]), float(angles[-1]))
+
+    def bow(self, angles: Array) -> float:
+        """Mean height of a shape over its chord, relative to the length: positive if it bows toward +y."""
+        return float((self.edges * (self.length - self.arc_lengths[:-1])) @ np.sin(angles)) / self.length**2
 
     def curvature(self, angles: Array) -> Array:
         """Curvature at the joints, (n + 1,) 1/m."""
@@ -209,9 +213,9 @@ class Rod:
         moment[..., 0], moment[..., -1] = m[..., 0], m[..., -1]
         return values[..., self.shown]
 
-    def advanced(self, angles: Array, memory: Memory) -> Memory:
-        """Memory after a step that ended with these angles."""
-        relaxed, reached = self.section.advanced(self.curvature(angles), memory)
+    def advanced(self, angles: Array, K: Array, memory: Memory) -> Memory:
+        """Memory after a step that ended with these angles and the curvatures of them."""
+        relaxed, reached = self.section.advanced(K, memory)
         return Memory(
             relaxed,
             reached,

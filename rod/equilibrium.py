@@ -2,7 +2,10 @@
 
 Newton's method on the reduced system of `rod.reduction` from a warm start, with proof of the minimum by inertia;
 otherwise along the path of equilibria from the force-free shape (`rod.path`). Which side the cable bows to is chosen by
-``branch`` (`rod.branch`). A fit whose K0 may change sign wants ``up``, the side the photo shows.
+``branch``: ``natural`` is the side on which it comes from the force-free shape (a straight cable that buckles: up),
+``opposite`` the other one, ``up`` (toward +y) and ``down`` are absolute. ``jump`` is natural too, and goes on where the
+equilibria from the force-free shape on end: to where the cable comes to rest. A fit whose K0 may change sign wants
+``up``, the side the photo shows.
 
 The result says in `Outcome` how far to trust it. Nothing raises for a shape that does not exist: that is nature's
 refusal and a value.
@@ -16,10 +19,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from rod.branch import Branch, bow, bow_side
 from rod.characteristic import Array
 from rod.discretisation import Rod
 from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
@@ -28,6 +31,8 @@ from rod.reduction import Balance, Hold, System
 from rod.section import Memory, Section
 
 __all__ = ["Branch", "Equilibrium", "Outcome", "solve"]
+
+Branch = Literal["natural", "opposite", "up", "down", "jump"]
 
 #: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
 NEAR = 0.8
@@ -127,7 +132,7 @@ def solve(
     start : Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape.
     branch : {"natural", "opposite", "up", "down", "jump"}
-        Side of the bow, see `rod.branch`.
+        Side of the bow, see the module.
     patient : bool
         Else no path is followed to its end where a cable lacks an equilibrium, which costs fifty equilibria.
 
@@ -137,7 +142,8 @@ def solve(
     """
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
-        return _record(system, _force_free(system)._replace(outcome=Outcome.UNREACHABLE), 0)
+        angles, R = rod.mounted.angles, hold.reaction(np.zeros(2))
+        return _record(system, Trial(angles, R, system.balance(angles, R), 0, Outcome.UNREACHABLE), 0)
     first = None if start is None else Start(start.angles, start.right_reaction)
     verdicts: list[Trial] = []
     for attempt in _attempts(system, first, branch, patient=patient):
@@ -158,7 +164,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     rod, most = system.rod, PATH_STEPS if patient else HASTY
     side = bow_side(rod, branch)
     # Where only the path can tell the side, a warm start keeps the one it has.
-    kept = side if side or first is None else int(np.sign(bow(rod, first.angles)))
+    kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
     leaning, certain = rod.leaning
     coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
     trusted = not (coiled or (certain and side == -leaning))
@@ -187,6 +193,16 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         yield judged(system, descended(system, beside), side)
 
 
+def bow_side(rod: Rod, branch: Branch) -> int:
+    """Side asked for: +1 up, -1 down, 0 if only following the path from the force-free shape can tell."""
+    if branch in ("up", "down"):
+        return 1 if branch == "up" else -1
+    side, certain = rod.leaning
+    if branch == "opposite":
+        return -side
+    return side if certain and branch != "jump" else 0
+
+
 def _near(system: System, first: Start) -> Trial:
     """Newton's method from a start, if it ends near."""
     warm = newton(system, first)
@@ -211,11 +227,6 @@ def _admissible(rod: Rod, hold: Hold) -> bool:
     return hold.chord > 0.0 and (hold.chord < rod.length or straight or rod.axial_stiffness is not None)
 
 
-def _force_free(system: System) -> Trial:
-    angles, R = system.rod.mounted.angles, system.hold.reaction(np.zeros(2))
-    return Trial(angles, R, system.balance(angles, R), 0, Outcome.CONVERGED)
-
-
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
     """The equilibrium with its shape at the vertices."""
     rod, angles, R, balance = system.rod, trial.angles, trial.R, trial.balance
@@ -237,6 +248,6 @@ def _record(system: System, trial: Trial, steps: int) -> Equilibrium:
         angles=angles,
         system=system,
         balance=balance,
-        after=rod.advanced(angles, system.memory),
+        after=rod.advanced(angles, balance.K, system.memory),
         iterations=steps,
     )

@@ -95,13 +95,19 @@ class MeasuredShape:
         waves = float(np.hypot(self.wave_std, self.common_std))
         return (self.systematic_std, self.systematic_length), (waves, self.wave_length)
 
-    def section_offsets(self) -> Array:
-        """Distance of the sections from the smooth curve along its normal, (k,) m; cubic Hermite between its points."""
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """x, y (m) and theta (rad) of the smooth curve at arc lengths (b,) m; cubic Hermite between its points."""
         from scipy.interpolate import CubicHermiteSpline  # takes half a second, and most who hold a record ask for none
 
-        x = CubicHermiteSpline(self.s, self.x, np.cos(self.theta))(self.section_s)
-        y = CubicHermiteSpline(self.s, self.y, np.sin(self.theta))(self.section_s)
-        theta = np.interp(self.section_s, self.s, self.theta)
+        x, y = (
+            np.asarray(CubicHermiteSpline(self.s, v, slope)(s))
+            for v, slope in ((self.x, np.cos(self.theta)), (self.y, np.sin(self.theta)))
+        )
+        return x, y, np.interp(s, self.s, self.theta)
+
+    def section_offsets(self) -> Array:
+        """Distance of the sections from the smooth curve along its normal, (k,) m."""
+        x, y, theta = self.at(self.section_s)
         return np.asarray(-np.sin(theta) * (self.section_x - x) + np.cos(theta) * (self.section_y - y))
 
 

@@ -36,8 +36,6 @@ class Midline:
         Centres of the blocks: arc length on the smooth curve, measured position, direction of the tangent.
     offset : (b,) m
         Of the measured position from the smooth curve, along its normal.
-    sections : (b,)
-        Number of sections in each block.
     covariance : (b, b) m^2
         Of the position along the normal.
     factor : (b, b) m
@@ -51,7 +49,6 @@ class Midline:
     y: Array
     theta: Array
     offset: Array
-    sections: NDArray[np.intp]
     covariance: Array
     factor: Array
     whitener: Array
@@ -92,28 +89,14 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     _, first, sections = np.unique(label, return_index=True, return_counts=True)
     mean = np.add.reduceat(s, first) / sections
     offset = np.add.reduceat(distance, first) / sections
-    x, y, theta = (np.interp(mean, shape.s, v) for v in (shape.x, shape.y, shape.theta))
-    x, y = _on_curve(shape, mean, x, y)
+    x, y, theta = shape.at(mean)
     covariance = block_covariance(s, std, first, sections, shape.correlation_length)
     # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
     covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
     covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
     x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
     factor = np.asarray(np.linalg.cholesky(covariance), float)
-    return Midline(mean, x, y, theta, offset, sections, covariance, factor, np.tril(np.linalg.inv(factor)))
-
-
-def _on_curve(shape: MeasuredShape, at: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Position on the smooth curve by cubic Hermite interpolation; `x`, `y` give the shape only."""
-    cell = np.clip(np.searchsorted(shape.s, at) - 1, 0, shape.s.size - 2)
-    h = shape.s[cell + 1] - shape.s[cell]
-    t = (at - shape.s[cell]) / h
-    a, b = (1 + 2 * t) * (1 - t) ** 2, t * (1 - t) ** 2
-    c, d = t**2 * (3 - 2 * t), t**2 * (t - 1)
-    cos, sin = np.cos(shape.theta), np.sin(shape.theta)
-    x = a * shape.x[cell] + b * h * cos[cell] + c * shape.x[cell + 1] + d * h * cos[cell + 1]
-    y = a * shape.y[cell] + b * h * sin[cell] + c * shape.y[cell + 1] + d * h * sin[cell + 1]
-    return x, y
+    return Midline(mean, x, y, theta, offset, covariance, factor, np.tril(np.linalg.inv(factor)))
 
 
 def block_covariance(

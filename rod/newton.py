@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.blas import idamax
 
-from rod.branch import bow
 from rod.characteristic import Array
 from rod.reduction import Balance, System
 
@@ -187,6 +186,6 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
         outcome = Outcome.LIMIT_POINT
     elif system.excess_negatives(trial.balance) != 0:
         outcome = Outcome.UNSTABLE
-    elif side and side * bow(system.rod, trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
+    elif side and side * system.rod.bow(trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH
     return trial._replace(outcome=outcome)

@@ -135,9 +135,7 @@ class Conditions:
     spacing : m
         Of the points.
     window : m
-        Of the local quadratics that differentiate the centerline.
-    curvature_window : m
-        Of those that differentiate the curvature.
+        Of the local quadratics that differentiate the centerline, and its curvature.
     seed : int
     """
 
@@ -145,7 +143,6 @@ class Conditions:
     position_noise: float = 5e-5
     spacing: float = 2e-4
     window: float = 0.03
-    curvature_window: float = 0.03
     seed: int = 7
 
 
@@ -191,9 +188,9 @@ def iteration_costs(reading: Reading = "secant") -> tuple[IterationCost, ...]:
     return tuple(costs)
 
 
-def disagreement(conditions: Conditions | None = None) -> tuple[Difference, ...]:
+def disagreement() -> tuple[Difference, ...]:
     """Causes of Fig. 7's disagreement, each alone with its share, then all together (the last)."""
-    given = conditions or Conditions()
+    given = Conditions()
     rng = np.random.default_rng(given.seed)
 
     def differentiated(step: Equilibrium) -> tuple[Array, Array]:
@@ -253,12 +250,11 @@ def _from_photo(step: Equilibrium, given: Conditions, rng: np.random.Generator) 
         savgol_filter(values, points, 2, deriv=order, delta=given.spacing) for order in (1, 2) for values in (x, y)
     )
     kappa = (ddx * dy - dx * ddy) / np.hypot(dx, dy) ** 3  # positive toward the bow: K = -dtheta/ds
-    again = 2 * round(0.5 * given.curvature_window / given.spacing) + 1
     return _graph(
         s,
-        savgol_filter(kappa, again, 2),
+        savgol_filter(kappa, points, 2),
         step.force * y,
-        turn=savgol_filter(kappa, again, 2, deriv=1, delta=given.spacing),
+        turn=savgol_filter(kappa, points, 2, deriv=1, delta=given.spacing),
         lift=savgol_filter(step.force * y, points, 2, deriv=1, delta=given.spacing),
     )
 

@@ -42,6 +42,8 @@ PAPER_START = (0.01, 1.0)
 FURTHER_TURNS = (0.1, 0.4, 0.8)
 #: Residuals below this, relative to the data, are rounding; gradients (cosines) below the other are at a minimum.
 EXACT, STATIONARY = 1e-8, 1e-4
+#: Relative change of objective and parameters at which the method stops.
+SETTLED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -107,12 +109,9 @@ def paper_fit(
     knots: ArrayLike,
     *,
     reading: Reading = "secant",
-    weight: float = PAPER_WEIGHT,
     start: tuple[float, float] = PAPER_START,
     pre_curvature: float | None = None,
     zero: Literal["natural", "length"] = "natural",
-    elements: int = 100,
-    tolerance: float = 1e-12,
 ) -> PaperFit:
     """Fit control points and K0 by Eq. (7), or Eq. (6).
 
@@ -123,16 +122,11 @@ def paper_fit(
     knots : (k,) 1/m
     reading : {"secant", "tangent"}
         What the control points mean; the paper's iterative method makes them a secant.
-    weight : N^2 m^2
-        w of Eq. (7).
     start : (N m^2, 1/m)
     pre_curvature : 1/m or None
         Fixes K0; None fits it.
     zero : {"natural", "length"}
         From where displacement is counted.
-    elements : int
-    tolerance : float
-        Relative change of objective and parameters at which the method stops.
 
     Raises
     ------
@@ -140,11 +134,11 @@ def paper_fit(
         If the start has no equilibrium, or there are fewer data than parameters.
     """
     at = np.asarray(knots, float)
-    problem = _Problem(data, at, reading, weight, pre_curvature, zero, elements)
+    problem = _Problem(data, at, reading, pre_curvature, zero)
     size = at.size + (pre_curvature is None)
     if (count := data.forces.size * (1 if data.curvatures is None else 1 + data.curvatures.shape[1])) < size:
         raise ValueError(f"{count} data do not determine {size} parameters: give more steps, or fix pre_curvature")
-    first = _from_start(problem, start, tolerance)
+    first = _from_start(problem, start)
     if first is None:
         raise ValueError(
             f"no equilibrium at the start EI = {start[0]} N m^2, K0 = {start[1]} 1/m: give a start nearer to the cable"
@@ -152,12 +146,12 @@ def paper_fit(
     if first.gradient == 0.0:
         return first
     turns = (0.0,) if pre_curvature is not None else FURTHER_TURNS
-    further = (_from_start(problem, problem.scaled_start(turn / data.length), tolerance) for turn in turns)
+    further = (_from_start(problem, problem.scaled_start(turn / data.length)) for turn in turns)
     best, *others = sorted((first, *(end for end in further if end)), key=lambda end: end.objective)
     return replace(best, others=tuple(others))
 
 
-def _from_start(problem: _Problem, start: tuple[float, float], tolerance: float) -> PaperFit | None:
+def _from_start(problem: _Problem, start: tuple[float, float]) -> PaperFit | None:
     """The fit from one start; None if that has no equilibrium."""
     k, fixed = problem.knots.size, problem.fixed is not None
     begin = np.ones(k + (not fixed))
@@ -186,7 +180,7 @@ def _from_start(problem: _Problem, start: tuple[float, float], tolerance: float)
 
     with np.errstate(all="ignore"):  # at a limit point scipy's trust region shrinks until its own ratios overflow
         found = least_squares(
-            residual, begin, jacobian, x_scale="jac", xtol=tolerance, ftol=tolerance, gtol=tolerance, max_nfev=100
+            residual, begin, jacobian, x_scale="jac", xtol=SETTLED, ftol=SETTLED, gtol=SETTLED, max_nfev=100
         )
     end = problem.simulate(found.x * unit, accepted.steps)
     history.append(problem.iteration(found.x * unit, end))
@@ -215,10 +209,8 @@ class _Problem:
     data: Virtual
     knots: Array
     reading: Reading
-    weight: float
     fixed: float | None
     zero: Literal["natural", "length"]
-    elements: int
 
     def split(self, parameters: Array) -> tuple[Characteristic, float]:
         k = self.knots.size
@@ -228,7 +220,7 @@ class _Problem:
     @property
     def data_norm(self) -> float:
         """Size of the data in the objective, N."""
-        bends = 0.0 if self.data.curvatures is None else self.weight * float(np.sum(self.data.curvatures**2))
+        bends = 0.0 if self.data.curvatures is None else PAPER_WEIGHT * float(np.sum(self.data.curvatures**2))
         return float(np.sqrt(np.sum(self.data.forces**2) + bends))
 
     def scaled_start(self, K0: float) -> tuple[float, float]:
@@ -240,35 +232,23 @@ class _Problem:
 
     def simulate(self, parameters: Array, warm: Sequence[Equilibrium] | None) -> _Simulation:
         law, K0 = self.split(parameters)
-        test = BendingTest(self.data.length, law, K0, zero=self.zero, elements=self.elements)
-        steps = simulate(test, chords=test.zero_chord - self.data.displacements, branch="up", starts=warm)
+        test = BendingTest(self.data.length, law, K0, zero=self.zero)
+        steps = simulate(test, self.data.displacements, branch="up", starts=warm)
         reached = all(step.good for step in steps)
         forces = np.array([step.force for step in steps]) - self.data.forces
         rows = [forces]
         if self.data.curvatures is not None:
-            rows.append(np.sqrt(self.weight) * (np.array([s.kappa for s in steps]) - self.data.curvatures).ravel())
+            rows.append(np.sqrt(PAPER_WEIGHT) * (np.array([s.kappa for s in steps]) - self.data.curvatures).ravel())
         value = np.concatenate(rows)
         return _Simulation(test, steps, value if reached else np.full(value.size, np.inf))
 
     def jacobian(self, here: _Simulation) -> Array:
-        slopes = derivatives(here.test, here.steps, ("ordinates", "pre_curvature", "chord"))
-        k = self.knots.size
-        chain = np.eye(k + 2)[:, : k + (self.fixed is None)]
-        if self.fixed is None:
-            chain[k + 1, k] = self._zero_by_pre_curvature(here.test)
+        parameters = ("ordinates",) if self.fixed is not None else ("ordinates", "pre_curvature")
+        slopes = derivatives(here.test, here.steps, parameters)
         rows = [np.stack([slope.force for slope in slopes])]
         if self.data.curvatures is not None:
-            rows.append(np.sqrt(self.weight) * np.vstack([slope.kappa for slope in slopes]))
-        return np.asarray(np.vstack(rows) @ chain)
-
-    def _zero_by_pre_curvature(self, test: BendingTest) -> float:
-        """Derivative of the natural chord of the discrete cable, m^2: edges turn by their distance from mid-span."""
-        if self.zero == "length":
-            return 0.0
-        angles, edges = test.rod.mounted.angles, test.rod.edges
-        middles = np.cumsum(edges) - 0.5 * edges
-        turn = 0.5 * test.length - middles
-        return float(-np.sum(edges * np.sin(angles) * turn))
+            rows.append(np.sqrt(PAPER_WEIGHT) * np.vstack([slope.kappa for slope in slopes]))
+        return np.vstack(rows)
 
     def iteration(self, parameters: Array, here: _Simulation) -> PaperIteration:
         law, K0 = self.split(parameters)

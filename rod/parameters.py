@@ -26,7 +26,6 @@ name                     what changes                                           
 ``stick_curvature``      its curvature change to slip                                            1/m
 ``plastic_set``          growth of K0 with the largest curvature                                 1/m per 1/m
 ``set_threshold``        bend from rest beyond which K0 grows                                    1/m
-``axial_flexibility``    1/EA; ``shear_flexibility`` 1/GA                                        1/N
 =======================  ======================================================================  =============
 
 A basis is (elements + 1,) or (elements + 1, q) values at the joints, a function of the relative position 0..1, or a
@@ -175,8 +174,6 @@ _SCALARS = (
     "stick_curvature",
     "plastic_set",
     "set_threshold",
-    "axial_flexibility",
-    "shear_flexibility",
     *(f"{name}_{side}" for name in _BOTH_ENDS for side in ("left", "right")),
 )
 _GEOMETRY = {"length": (0.0, 0.0, 1.0), "rigid_ends": (1.0, 1.0, 0.0), "rigid_left": (1.0, 0.0, 0.0)}

@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from rod.branch import bow
 from rod.characteristic import Array
 from rod.newton import RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
 from rod.reduction import Balance, System
@@ -235,7 +234,8 @@ def _critical(ramp: Ramp, here: Point, there: Point, way: Array) -> tuple[Point,
 def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Point | None:
     """The first state on the branch that leaves a bifurcation, on the side asked for; None if it is not stable."""
     angles = here.start.angles
-    lift = bow(ramp.system.rod, angles + 1e-3 * mode) - bow(ramp.system.rod, angles - 1e-3 * mode)
+    rod = ramp.system.rod
+    lift = rod.bow(angles + 1e-3 * mode) - rod.bow(angles - 1e-3 * mode)
     own = float(ramp.system.mass @ (way[:-3] * mode))
     sign = -1.0 if (own if abs(own) > 1e-3 else side * lift) < -1e-9 else 1.0
     aside = np.r_[sign * mode, np.zeros(3)]

@@ -5,8 +5,8 @@ one more solve with the matrix of Newton's last step and a right-hand side per p
 are explicit in (alpha, R, p). The memory of friction, plastic set and bearings depends on the parameters through all
 steps before; its derivative is carried along the path. Exact to rounding (away from the kinks of friction).
 
-The default EA and GA scale with the stiffness (`rod.discretisation.RIGIDITY`); their derivative, below 1e-7 of the
-result, is left out.
+EA and GA are held; by default they scale with the stiffness (`rod.discretisation.RIGIDITY`), whose derivative, below
+1e-7 of the result, is left out.
 
 Signs and units as in `rod.equilibrium`; parameters and their units in `rod.parameters`. Derivatives are taken at fixed
 vertices; where vertices move along the cable (``length``, rigid pieces), ``s`` is their speed, and the derivative at
@@ -133,13 +133,6 @@ def derivatives(
 # which is twice as fast. The record shows (n, q).
 
 
-def _cumulated(values: Array) -> Array:
-    """Running sum from the left with a leading zero, (..., n) to (..., n + 1)."""
-    total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
-    np.cumsum(values, axis=-1, out=total[..., 1:])
-    return total
-
-
 def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     """Derivative of the force-free shape in its chord frame; as if it were without load."""
     rod, h = test.rod, test.rod.edges
@@ -147,7 +140,7 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     turn = rod.weights * moves.pre_curvature
     if moves.geometric:
         turn += moves.weights * rod.section.pre_curvature
-    relative = -_cumulated(turn)
+    relative = -np.concatenate((np.zeros((len(turn), 1)), np.cumsum(turn, axis=1)), axis=1)
     along, across = -relative @ (h * sin), relative @ (h * cos)
     if moves.geometric:
         along, across = along + moves.edges @ cos, across + moves.edges @ sin
@@ -284,14 +277,6 @@ def _residuals(
     if given.load is not None:
         gradient += balance.border[0] * given.load[0] + balance.border[1] * given.load[1]
         extent += system.softened(edge, given.load)
-    if moves.has("axial_flexibility", "shear_flexibility"):
-        sin, cos = edge.direction
-        stretch, shear = step.rod.edges * edge.force
-        along, across = (
-            moves.scalar(f"{name}_flexibility")[:, None] * by for name, by in (("axial", stretch), ("shear", shear))
-        )
-        gradient -= edge.force[1] * along - edge.force[0] * across
-        extent += np.array((cos * along - sin * across, sin * along + cos * across))
     gap = -extent.sum(axis=2)
     gap[0] += given.position
     if step.hold.force is not None:

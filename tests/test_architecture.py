@@ -19,7 +19,6 @@ ROD = [
     ("laws", "section", "support"),
     ("discretisation",),
     ("reduction",),
-    ("branch",),
     ("newton",),
     ("path",),
     ("equilibrium",),

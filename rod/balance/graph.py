@@ -42,6 +42,10 @@ CONTRADICTION = 2.0
 """Root mean square of whitened residuals beyond which photos and forces contradict each other."""
 
 
+LEVEL = 0.01
+"""Significance of the test of uniform pre-curvature below which K0(s) is taken from the force-free photo."""
+
+
 class BalanceOutcome(Enum):
     """How the balance way ended; the value is advice to the reader."""
 
@@ -70,16 +74,10 @@ class BalanceOptions:
         Independent data of one photo at most, see `rod.midline`.
     grid : int
         Points of the reported curve.
-    level : float
-        Significance of the test of uniform pre-curvature below which K0(s) is taken from the force-free photo.
-    iterations : int
-        Bound of the Gauss-Newton method; four or five are usual.
     """
 
     blocks: int = 160
     grid: int = 61
-    level: float = 0.01
-    iterations: int = 25
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     rest = next((d for d in data if d.force == 0.0), None)
     start = intercept if rest is None else float(rest.kappa[rest.seen].mean())
     at_rest = 1.0 if rest is None else uniform_at_rest(model, rest)
-    found = _regress_in_spite_of_misfit(replace(model, varying=at_rest < options.level), start, options)
+    found = _regress_in_spite_of_misfit(replace(model, varying=at_rest < LEVEL), start)
     if found is None:
         return BalanceGraph(BalanceOutcome.STALLED, points=data)
     checks = assumption_checks(replace(found.model, blur=1.0), found) | {"noise_factor": found.model.blur}
@@ -149,13 +147,13 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     return _graph(found.model, found, checks, options.grid)
 
 
-def _regress_in_spite_of_misfit(model: MomentModel, start: float, options: BalanceOptions) -> Regression | None:
+def _regress_in_spite_of_misfit(model: MomentModel, start: float) -> Regression | None:
     """Regression; where photos and forces contradict the one curve beyond their noise, the contradiction is noise.
 
     4 per degree of freedom is far above what noise alone does with more than a hundred of them.
     """
     for _ in range(8):
-        found = regress(model, pre_curvature=start, iterations=options.iterations)
+        found = regress(model, pre_curvature=start)
         misfit = CONTRADICTION
         if found is not None:
             chi2 = sum(float(row.value @ row.value) for row in found.rows)

@@ -28,6 +28,9 @@ BOW_TERMS = 4
 LAYINGS = 3
 """Times that the abscissa is laid along the law found so far; each leaves a quarter of what the way there left."""
 
+ITERATIONS = 25
+"""Bound of the Gauss-Newton method; four or five are usual."""
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -43,8 +46,6 @@ class Regression:
     posterior : Posterior
     rows : tuple of Residual
         Whitened, one entry per photo.
-    jacobian : (n, q)
-        Whitened, of all rows.
     """
 
     model: MomentModel
@@ -52,7 +53,6 @@ class Regression:
     unknowns: Array
     posterior: Posterior
     rows: tuple[Residual, ...]
-    jacobian: Array
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,15 @@ class MomentModel:
     blur: float = 1.0
     force_errors: tuple[Mapping[int, float], ...] = ()
 
-    def rows(self, unknowns: Array) -> tuple[ComplianceLaw, tuple[Residual, ...]]:
-        """Compliance curve and whitened residuals at the given unknowns."""
-        curve, K0, errors = (
-            self.basis.law(unknowns[: self.size]),
-            unknowns[self.size],
-            self.errors(unknowns),
-        )
+    def linearised(self, unknowns: Array) -> tuple[tuple[Residual, ...], Array, Array]:
+        """Whitened residuals of each photo, those of all (n,), and their derivatives by all unknowns (n, q)."""
+        curve, K0, errors = self.basis.law(unknowns[: self.size]), float(unknowns[self.size]), self.errors(unknowns)
         bow = self.bow(unknowns)
-        return curve, tuple(
-            residual(d, curve, float(K0), varying=bow_terms(d) @ bow, errors=errors, blur=self.blur) for d in self.data
+        rows = tuple(
+            residual(d, curve, K0, varying=bow_terms(d) @ bow, errors=errors, blur=self.blur) for d in self.data
         )
+        J = np.vstack([self.columns(d, row) for d, row in zip(self.data, rows, strict=True)])
+        return rows, np.concatenate([row.value for row in rows]), J
 
     @property
     def size(self) -> int:
@@ -133,10 +131,10 @@ def bow_terms(data: MomentPoints) -> Array:
     return np.asarray(np.polynomial.legendre.legvander(t, BOW_TERMS)[:, 1:])
 
 
-def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -> Regression | None:
+def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
     """Fit by Gauss-Newton from a straight line of compliance; None if it does not settle."""
     unknowns = np.concatenate([np.zeros(model.size), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
-    found = _settled(model, unknowns, iterations, smooth=False)
+    found = _settled(model, unknowns, smooth=False)
     for laid in range(LAYINGS):
         if found is None:
             return None
@@ -144,23 +142,21 @@ def regress(model: MomentModel, *, pre_curvature: float, iterations: int = 25) -
         known = found.posterior.covariance[: model.size, : model.size]
         basis = refreshed(found.curve, known, float(met.min()), float(met.max()))
         unknowns = np.concatenate([basis.projected(found.curve), found.unknowns[model.size :]])
-        found = _settled(replace(model, basis=basis), unknowns, iterations, smooth=laid == LAYINGS - 1)
+        found = _settled(replace(model, basis=basis), unknowns, smooth=laid == LAYINGS - 1)
     return found
 
 
-def _settled(model: MomentModel, unknowns: Array, iterations: int, *, smooth: bool) -> Regression | None:
+def _settled(model: MomentModel, unknowns: Array, *, smooth: bool) -> Regression | None:
     """Gauss-Newton from given unknowns; see `rod.law_prior.priors` for `smooth`."""
     p = model.size
-    for _ in range(iterations):
-        rows = model.rows(unknowns)[1]
-        value = np.concatenate([row.value for row in rows])
-        J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
+    for _ in range(ITERATIONS):
+        rows, value, J = model.linearised(unknowns)
         posterior = model.posterior(unknowns, value, J, smooth=smooth)
         move = posterior.mean - unknowns
         # A fiftieth of a standard deviation is nothing anyone could see.
         if np.all(np.abs(move) <= 0.02 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
             mean = posterior.mean  # the last move is made, its rows are not taken again
-            return Regression(model, model.basis.law(mean[:p]), mean, posterior, rows, J)
+            return Regression(model, model.basis.law(mean[:p]), mean, posterior, rows)
         # One unit of log c is a factor e in stiffness: longer steps leave the range of the linearisation.
         unknowns = unknowns + move * min(1.0, 1.0 / max(float(np.max(np.abs(move[:p]))), 1e-12))
     return None
@@ -175,9 +171,7 @@ def assumption_checks(model: MomentModel, found: Regression) -> dict[str, float]
         ``left_right_z``: curvature linear in s, in sigma. ``photos_p``: an own K0 for each photo. ``uniform_p``: K0(s)
         with Legendre terms 1 to 4. ``chi2``, ``degrees_of_freedom`` of the fit.
     """
-    rows = model.rows(found.unknowns)[1]
-    J = np.vstack([model.columns(d, row) for d, row in zip(model.data, rows, strict=True)])
-    value = np.concatenate([row.value for row in rows])
+    rows, value, J = model.linearised(found.unknowns)
     response = model.posterior(found.unknowns, value, J).covariance
     value = value - J @ (response @ (J.T @ value))  # nothing where the model is the one that was fitted
     bow = np.vstack([row.whitened(d.by_curvature @ bow_terms(d)) for d, row in zip(model.data, rows, strict=True)])

@@ -13,9 +13,11 @@ import numpy as np
 from rod.compliance_law import ComplianceLaw
 from rod.inverse.evaluation import Evaluation, evaluate
 from rod.inverse.fit_model import FitModel
-from rod.inverse.options import InverseOptions
 from rod.law_prior import Posterior, averaged, priors
 from rod.measured_law import Array, MeasuredLaw, Source, propagated
+
+INVISIBLE = 0.5
+"""Standard deviation of log f, or K0 times length, beyond which it counts as not visible: a factor of 1.6."""
 
 
 class InverseOutcome(Enum):
@@ -93,7 +95,7 @@ class Estimate:
 
 
 def read_off(
-    model: FitModel, found: Evaluation, posterior: Posterior, *, options: InverseOptions, outcome: InverseOutcome
+    model: FitModel, found: Evaluation, posterior: Posterior, *, grid: int, outcome: InverseOutcome
 ) -> Estimate:
     """Estimate from a settled fit: curves on the visited range with bands by propagation."""
     p, u = model.basis.size, found.unknowns
@@ -103,7 +105,7 @@ def read_off(
     visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
     # the abscissa was laid along the fit before the last: beyond it, by a little at most, nothing is known of the law
     low, high = np.clip([min(visited), max(visited)], K0 + curve.bends[0], K0 + curve.bends[-1])
-    kappa = np.linspace(low, high, options.grid)
+    kappa = np.linspace(low, high, grid)
     moment, f = curve.bound(np.array([K0]))(kappa)
     by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
     by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)
@@ -124,6 +126,7 @@ def read_off(
     splines = model.basis.at(moment)
     rest = tuple(name for name in found.blocks if _is_rest(model, name))
     loaded = _without(model, found, rest) if rest else replace(posterior, mean=u)
+    blurred = model.blur != (1.0, 1.0)
     return Estimate(
         outcome=outcome,
         characteristic=curve,
@@ -137,10 +140,10 @@ def read_off(
         ),
         law_forms=splines @ posterior.law_forms,
         model=model,
-        evaluation=found if model.blur == (1.0, 1.0) else _as_stated(model, found),
+        evaluation=evaluate(replace(model, blur=(1.0, 1.0)), u, starts=found.equilibria) if blurred else found,
         unknowns=u,
         covariance=covariance,
-        invisible=invisible_combinations(model, law, covariance, bound=options.invisible),
+        invisible=invisible_combinations(model, law, covariance),
     )
 
 
@@ -154,11 +157,6 @@ def _unknown_scale(model: FitModel, found: Evaluation, log_covariance: Array) ->
     return float(np.sqrt(max(1.0 / sum(known) - float(log_covariance.mean()), 0.0)))
 
 
-def _as_stated(model: FitModel, found: Evaluation) -> Evaluation:
-    """The same evaluation with the noise as stated."""
-    return evaluate(replace(model, blur=(1.0, 1.0)), found.unknowns, starts=found.equilibria)
-
-
 def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Posterior:
     """The posterior with some blocks of the data left out."""
     keep = np.ones(found.value.size, dtype=bool)
@@ -168,9 +166,9 @@ def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Pos
 
 
 def invisible_combinations(
-    model: FitModel, law: MeasuredLaw, covariance: Array, *, bound: float
+    model: FitModel, law: MeasuredLaw, covariance: Array
 ) -> tuple[tuple[float | None, float], ...]:
-    """Parts of the law and K0 whose std exceeds `bound` (log f_EI, K0 times length).
+    """Parts of the law and K0 whose standard deviation exceeds `INVISIBLE`.
 
     Returns
     -------
@@ -181,10 +179,10 @@ def invisible_combinations(
     std = np.sqrt(np.diag(law.log_covariance))
     for where in (slice(None, law.kappa.size // 3), slice(law.kappa.size // 3, None)):
         worst = int(np.argmax(std[where])) + (where.start or 0)
-        if std[worst] > bound:
+        if std[worst] > INVISIBLE:
             open_ones.append((float(law.kappa[worst]), float(std[worst])))
     K0_std = float(np.sqrt(covariance[model.basis.size, model.basis.size]))
-    if K0_std > bound:
+    if K0_std > INVISIBLE:
         open_ones.append((None, K0_std / model.length))
     return tuple(open_ones)
 

@@ -41,6 +41,9 @@ LAW_STEP = 1.0
 BEND_STEP = 0.3
 """Of K0 in one step, over the range of the bend."""
 
+EVALUATIONS = 60
+"""Bound of one fit; ten are usual."""
+
 SHORTER = 6
 """Halvings of a step that leads to a cable without equilibrium."""
 
@@ -82,7 +85,7 @@ class Fit:
         return float(m[0]), float(m[1])
 
 
-def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
+def fit(model: FitModel, start: Array) -> Fit:
     """Fit from the unknowns `start` (q,).
 
     The noise is lowered to what is stated, or as far as the simulation follows the data. Where it does not, its misfit
@@ -94,10 +97,10 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         # toward data that contradict each other laws become wavy, and cost fifty times as much: foreseen, not tried
         misfit = (0.0, 0.0) if loud is None else _foreseen(loud, noise)
         if max(misfit) <= FOLLOWS:
-            quiet = _quieter(found, (noise, noise), FINELY if noise == 1.0 else ROUGHLY, evaluations - used)
+            quiet = _quieter(found, (noise, noise), FINELY if noise == 1.0 else ROUGHLY, EVALUATIONS - used)
             used, misfit = used + quiet.evaluations, quiet.misfit
         if loud is not None and max(misfit) > FOLLOWS:
-            found = _quieter(loud, _needed(loud, misfit, noise), ROUGHLY, evaluations)
+            found = _quieter(loud, _needed(loud, misfit, noise), ROUGHLY)
             used += found.evaluations
             break
         found = loud = quiet
@@ -109,7 +112,7 @@ def fit(model: FitModel, start: Array, *, evaluations: int = 60) -> Fit:
         within = FINELY if max(found.model.blur) == 1.0 else ROUGHLY
         for _ in range(LAYINGS):
             if found.settled:
-                found = _quieter(found, found.model.blur, within, evaluations, smooth=True)
+                found = _quieter(found, found.model.blur, within, smooth=True)
                 used += found.evaluations
     return replace(found, evaluations=used)
 
@@ -137,7 +140,9 @@ def _needed(loud: Fit, misfit: tuple[float, float], noise: float) -> tuple[float
     return needed[0], needed[1]
 
 
-def _quieter(found: Fit, noise: tuple[float, float], within: float, evaluations: int, *, smooth: bool = False) -> Fit:
+def _quieter(
+    found: Fit, noise: tuple[float, float], within: float, evaluations: int = EVALUATIONS, *, smooth: bool = False
+) -> Fit:
     """From a fit on with another noise, the abscissa of the law laid along the law found."""
     model, u = found.model, found.evaluation.unknowns
     if found.posterior is not None:

@@ -17,14 +17,8 @@ class InverseOptions:
         Independent data of one photo at most, see `rod.midline`.
     grid : int
         Points of the reported curve.
-    evaluations : int
-        Bound of one fit; ten are usual.
-    invisible : float
-        Standard deviation of log f beyond which it counts as not visible: a factor of 1.6.
     """
 
     elements: int = 100
     blocks: int = 160
     grid: int = 61
-    evaluations: int = 60
-    invisible: float = 0.5

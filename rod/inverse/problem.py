@@ -88,7 +88,7 @@ def estimate(
     line = basis.law(np.zeros(basis.size)), straight[1]
     used = 0
     for law, K0 in ([regressed(*line, moments, curvatures)] if start is None else []) + [line]:
-        best = _from(model, law, K0, options)
+        best = _from(model, law, K0)
         used += best.evaluations
         if best.posterior is not None:
             break
@@ -97,17 +97,18 @@ def estimate(
             law, K0 = best.model.law(best.evaluation.unknowns), best.model.pre_curvature(best.evaluation.unknowns)
         apart = SIDE * float(np.ptp(curvatures))
         for begin in (K0 - apart, K0 + apart):
-            found = _from(model, law, begin, options)
+            found = _from(model, law, begin)
             used += found.evaluations
             if found.log_evidence > best.log_evidence:
                 best = found
     if best.posterior is None:
-        return Estimate(_refusal(best.evaluation.failure), iterations=used)
+        limit = best.evaluation.failure is Outcome.LIMIT_POINT
+        return Estimate(InverseOutcome.LIMIT_POINT if limit else InverseOutcome.NO_EQUILIBRIUM, iterations=used)
     result = read_off(
         best.model,
         best.evaluation,
         best.posterior,
-        options=options,
+        grid=options.grid,
         outcome=InverseOutcome.CONVERGED if best.settled else InverseOutcome.STALLED,
     )
     if result.converged and result.invisible:
@@ -115,7 +116,7 @@ def estimate(
     return replace(result, iterations=used)
 
 
-def _from(model: FitModel, law: ComplianceLaw, K0: float, options: InverseOptions) -> Fit:
+def _from(model: FitModel, law: ComplianceLaw, K0: float) -> Fit:
     """Fit from a law and K0 (1/m)."""
     model = replace(model, basis=law.basis)
     u = model.start(law, K0)
@@ -125,7 +126,7 @@ def _from(model: FitModel, law: ComplianceLaw, K0: float, options: InverseOption
         trial = evaluate(model, u)
     if trial.failure is None:
         u = rescaled(model, trial)
-    return fit(model, u, evaluations=options.evaluations)
+    return fit(model, u)
 
 
 def moments_and_curvatures(data: tuple[StepData, ...]) -> tuple[Array, Array]:
@@ -191,7 +192,3 @@ def rescaled(model: FitModel, trial: Evaluation) -> Array:
     if c > 0.0:
         u[: model.basis.size] -= np.log(c)
     return u
-
-
-def _refusal(failure: Outcome | None) -> InverseOutcome:
-    return InverseOutcome.LIMIT_POINT if failure is Outcome.LIMIT_POINT else InverseOutcome.NO_EQUILIBRIUM

@@ -247,9 +247,9 @@ def test_what_is_not_visible_is_named():
     p, size = result.model.basis.size, result.model.size
     blind = np.zeros((size, size))
     blind[p, p] = 1.0
-    assert invisible_combinations(result.model, result.law, blind, bound=0.5) == ((None, 1.0 / result.model.length),)
+    assert invisible_combinations(result.model, result.law, blind) == ((None, 1.0 / result.model.length),)
     wide = replace(result.law, log_covariance=np.diag(np.where(result.law.kappa > 8.0, 1.0, 1e-4)))
-    ((kappa, std),) = invisible_combinations(result.model, wide, np.zeros((size, size)), bound=0.5)
+    ((kappa, std),) = invisible_combinations(result.model, wide, np.zeros((size, size)))
     assert 8.0 < kappa < 9.0 and std == 1.0
 
 

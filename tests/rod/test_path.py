@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rod.bending_test import simulate
-from rod.branch import bow_side
-from rod.equilibrium import Outcome, solve
+from rod.bending_test import BendingTest, simulate
+from rod.equilibrium import Outcome, bow_side, solve
+from rod.laws import StickSlip
 from rod.newton import Start, descended, softest
 from rod.path import Ramp, followed
 from rod.reduction import Hold, System
 from rod.support import Support
+from tests.rod.potential_energy import Potential
 from tests.rod.test_literature import CANTILEVER, CASES, EULER, LENGTH, STRAIGHT, arch
 
 DRIVEN = {
@@ -90,3 +91,16 @@ def test_a_bowed_cable_is_brought_to_its_chord_at_once(K0, chord):
     step = simulate(replace(STRAIGHT, pre_curvature=K0), chords=[chord])[0]
     assert step.good
     assert step.iterations <= 9  # one for the tangent, at most eight of Newton's method
+
+
+def test_a_leap_to_an_unstable_shape_is_not_taken():
+    """An arch under a load across, its ends pressed together: the chord asked for has a shape, but none that stays."""
+    test = BendingTest(LENGTH, StickSlip(1e-2, 2.5e-3, 3.0), 5.0, load=(0.0, -5.0), elements=20)
+    step = simulate(test, chords=[0.05 * test.zero_chord])[0]
+    assert step.outcome is Outcome.BIFURCATION
+    # the last stable one, in equilibrium: chord and load have grown by one share
+    share = (test.zero_chord - step.chord) / (0.95 * test.zero_chord)
+    assert 0.8 < share < 1.0
+    V = Potential(replace(test, load=(0.0, -5.0 * share)).rod, step.before)
+    q = V.unknowns(step.angles, step.x, step.y)
+    assert np.abs(V.gradient(q)[V.free()]).max() < 1e-6 * step.force

@@ -92,8 +92,6 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
     ),
     "plastic_set": (lambda t, h: replace(t, plastic_rate=t.plastic_rate + h), 3e-5),
     "set_threshold": (lambda t, h: replace(t, set_threshold=t.set_threshold + h), 3e-4),
-    "axial_flexibility": (lambda t, h: replace(t, axial_stiffness=1.0 / (1.0 / t.axial_stiffness + h)), 3e-7),
-    "shear_flexibility": (lambda t, h: replace(t, shear_stiffness=1.0 / (1.0 / t.shear_stiffness + h)), 3e-6),
 }
 PARAMETERS = [
     (name.partition("[")[0], BASIS) if name.endswith("[0]") and not name.startswith("ordinates") else name
@@ -219,7 +217,7 @@ def test_score_at_zero_is_the_one_sided_derivative(name: str) -> None:
         assert forward == pytest.approx(d.force[0], rel=2e-4)  # error of order h^2
 
 
-@pytest.mark.parametrize("name", [name for name in VARIATIONS if "flexibility" not in name])
+@pytest.mark.parametrize("name", VARIATIONS)
 def test_toward_a_test_that_differs_is_the_parameter_that_differs(name: str) -> None:
     vary, step = VARIATIONS[name][0], 1e-2 * VARIATIONS[name][1]
     named, column = name.partition("[")[0], int(name[-2]) if name.startswith("ordinates") else 0

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.bending_test import BendingTest
-from rod.branch import Branch
+from rod.equilibrium import Branch
 from rod.measurement import MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]
