@@ -89,7 +89,7 @@ INSIDE = {
     "pipeline.vision": [
         ("guard",),
         ("photo_file",),
-        ("median", "photo", "render"),
+        ("median", "polyline", "photo", "render"),
         ("evidence",),
         ("rough",),
         ("scale", "search"),
@@ -107,7 +107,7 @@ INSIDE = {
         ("flanks", "strips", "backdrop"),
         ("crosscut",),
         ("bands", "closeup"),
-        ("candidates",),
+        ("candidates", "one_colour"),
         ("ends",),
         ("beyond",),
     ],

@@ -18,6 +18,7 @@ from pipeline.records import Array, PhotoHints
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.strips import Strip
@@ -73,7 +74,7 @@ def widths_tried(cable: Cable) -> list[float]:
 def reading_along(standout: Standout, path_px: tuple[tuple[float, float], ...], width_px: float) -> Reading:
     """A reading with one strip, of a width (px), along clicks."""
     clicks = standout.to_cells(np.array(path_px))
-    s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(clicks, axis=0).T))]
+    s = arc_lengths(clicks)
     keep = np.r_[True, np.diff(s) > 0.0]
     path = CubicSpline(s[keep], clicks[keep])(np.linspace(0.0, s[-1], max(3, round(s[-1]) + 1)))
     width = width_px / standout.reduction

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from pipeline.messages import Message
 from pipeline.records import Array
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
+from pipeline.vision.polyline import step_lengths
 
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
 _NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the window along a cable reaches to 2.25
@@ -127,7 +128,7 @@ def weigh(
         Distance of values of the picture that tell something new.
     """
     middle, width = course.middle, median(widths)
-    gap = median(np.hypot(*np.diff(middle, axis=0).T))
+    gap = median(step_lengths(middle))
     each = max(1, round(width / max(gap, 1e-9)))
     length = gap * (len(middle) - 1)
     if len(middle) < 4 * each:
@@ -136,7 +137,7 @@ def weigh(
     blocks = _blocks(picture, each)
     reach = max(1, round(0.25 * width / (offset[1] - offset[0])))
     ground = _steps(blocks, offset, np.concatenate([np.array(_NULL), -np.array(_NULL)]) * width, reach)
-    noise = float(np.hypot(1.4826 * median(np.abs(ground - np.median(ground, axis=0))), _LEVEL))
+    noise = float(np.hypot(scatter(ground - np.median(ground, axis=0), 0.0), _LEVEL))
     weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
     return Evidence(
         length=length,
@@ -174,8 +175,7 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
 
 def _unsteady(widths: Array, width: float, std: float, grid: float) -> float:
     calm = np.convolve(widths, np.ones(_ALONG) / _ALONG, mode="valid") if len(widths) > _ALONG else widths
-    scatter = 1.4826 * median(np.abs(calm - median(calm)))
-    return scatter / max(_CALM_PX * grid, _CALM * width, 1.5 * std)
+    return scatter(calm) / max(_CALM_PX * grid, _CALM * width, 1.5 * std)
 
 
 def _crossed(

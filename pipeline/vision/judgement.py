@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
@@ -19,12 +18,13 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.evidence import Course, weigh
-from pipeline.vision.median import median
+from pipeline.vision.median import scatter
 from pipeline.vision.photo import Photo
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.bands import by_diameter
-from pipeline.vision.search.beyond import follow, followed_in, shaded
+from pipeline.vision.search.beyond import follow, followed_in
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
@@ -39,7 +39,6 @@ from pipeline.vision.search.ends import (
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
-_MAD_TO_STD = 1.4826
 _FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
 _LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
@@ -81,14 +80,9 @@ def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage:
     if not reading.banded:
         cut = cut_across(standout, path, reading.width, stage, known=True)
         width = cut.seen_widths
-        if len(width) and _scatter(width) < _SURE_WIDTH_SCATTER * cut.usual_width:
+        if len(width) and scatter(width) < _SURE_WIDTH_SCATTER * cut.usual_width:
             return cut
     return cut_across(standout, path, reading.width, by_diameter(stage), known=True, shaded=reading.banded)
-
-
-def _scatter(values: Array) -> float:
-    """Robust standard deviation about the median."""
-    return _MAD_TO_STD * median(np.abs(values - median(values)))
 
 
 def judge_strip(
@@ -221,7 +215,7 @@ def _check_width(
 ) -> Rejected | None:
     """Refuse a strip whose width is not that of a cable of known diameter, and one too short for a cable."""
     width = cut.usual_width * reduction
-    slender = float(np.hypot(*np.diff(cut.path, axis=0).T).sum()) / cut.usual_width
+    slender = float(step_lengths(cut.path).sum()) / cut.usual_width
     if cable.diameter_px is None and slender < stage.least_slenderness:
         return refused(photo, "photo/width.short", slenderness=slender)
     low, high = _ACCEPTED_WIDTH_RATIO
@@ -248,7 +242,7 @@ def _assemble(
 ) -> RoughCable | Rejected:
     stage = settings.segmentation
     path = standout.to_pixels(cut.path)
-    kept = without_specks(_seen(standout, cut, stage), cut.usual_width)
+    kept = without_specks(cut.step > stage.seen_share * cut.contrast, cut.usual_width)
     unlike = unlike_from(path, kept, axes, cut.usual_width)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)
@@ -265,7 +259,6 @@ def _assemble(
     if moved is not None:
         return moved
     ratio = cut.contrast / float(np.hypot(cut.texture, closeup.noise))
-    scatter = _scatter(cut.seen_widths) / cut.usual_width
     return RoughCable(
         image=photo.name,
         path_px=path,
@@ -281,7 +274,7 @@ def _assemble(
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         grid_px=photo.grid_px,
-        quality={"contrast_to_noise": ratio, "width_scatter": scatter},
+        quality={"contrast_to_noise": ratio, "width_scatter": scatter(cut.seen_widths) / cut.usual_width},
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
 
@@ -296,12 +289,6 @@ def _settled(
     right, path = settle_end(axes[1], path, closeup, width)
     left, backward = settle_end(axes[0], path[::-1], closeup, width)
     return closeup, (left, right), backward[::-1]
-
-
-def _seen(standout: Standout, cut: CrossCut, stage: SegmentationSettings) -> NDArray[np.bool_]:
-    """Sections on which the cable is seen: it stands out, or looks the same but for a shadow."""
-    dimmed = shaded(standout, cut, cut.usual_width, stage)
-    return (cut.step > stage.seen_share * cut.contrast) | dimmed
 
 
 def _hidden_end(axis: Bearing, cable: Cable) -> Finding:

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+MAD_TO_STD = 1.4826
+"""Standard deviation of a normal distribution by its median absolute deviation."""
+
 _SHORT = 1000  # numbers that are sorted sooner than divided in two
 
 
@@ -54,3 +57,8 @@ def quantile(values: NDArray[Any], share: float) -> float:
     low = int(place)
     lower, upper = float(ordered[low]), float(ordered[min(low + 1, len(ordered) - 1)])
     return lower + (place - low) * (upper - lower)
+
+
+def scatter(values: NDArray[Any], about: float | None = None) -> float:
+    """Robust standard deviation of all values about their median, or ``about`` a number."""
+    return MAD_TO_STD * median(np.abs(values - (median(values) if about is None else about)))

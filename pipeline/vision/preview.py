@@ -16,6 +16,7 @@ from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision.photo import PreviewSettings
 from pipeline.vision.median import quantile
 from pipeline.vision.photo import Photo, reduce_area
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.crosscut import path_normals
 
@@ -45,7 +46,7 @@ def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: 
 def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSettings) -> bytes:
     """JPEG: arc length to the right from the left bearing axis, the side of the bow downward, magnified across."""
     path = np.column_stack([line.u_px, line.v_px])
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    s = arc_lengths(path)
     along = np.linspace(0.0, s[-1], settings.long_side_px)
     points = np.column_stack([np.interp(along, s, path[:, 0]), np.interp(along, s, path[:, 1])])
     _, normal = path_normals(points)

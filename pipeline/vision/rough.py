@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Finding
 from pipeline.vision.evidence import Evidence
+from pipeline.vision.polyline import step_lengths
 
 AxisKind = Literal["cover", "given", "end", "clamp"]
 
@@ -113,4 +114,4 @@ class RoughCable:
     @property
     def length_px(self) -> float:
         """Length of the path from axis to axis, px."""
-        return float(np.hypot(*np.diff(self.path_px, axis=0).T).sum())
+        return float(step_lengths(self.path_px).sum())

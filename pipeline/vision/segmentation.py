@@ -25,6 +25,7 @@ from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
@@ -154,15 +155,24 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
             return alone
     standout = stand_out(photo, reduction, stage, window=window)
     wanted = _wanted(standout, cable)
-    alike = in_one_colour(photo, standout)
-    if alike is not None:
+
+    def read_whole(alike: Photo | None) -> RoughCable | None:
+        """The cable in a photo of one colour: a piece of it may be anything that has that colour too."""
+        if alike is None:
+            return None
         found = _read(alike, stand_out(alike, reduction, stage, window=window), wanted, cable, settings)
-        if isinstance(found, RoughCable):
-            alike = in_colour_of(photo, standout, found)
-            again = _read(alike, stand_out(alike, reduction, stage, window=window), wanted, cable, settings)
-            better = isinstance(again, RoughCable) and again.evidence.value > found.evidence.value
-            return again if better else found
-    return _read(photo, standout, wanted, cable, settings)
+        return None if isinstance(found, Rejected) or _is_piece(found) else found
+
+    first = read_whole(in_one_colour(photo, standout))
+    if first is None:
+        return _read(photo, standout, wanted, cable, settings)
+    second = read_whole(in_colour_of(photo, standout, first))
+    return first if second is None or second.evidence.value < first.evidence.value else second
+
+
+def _is_piece(found: RoughCable) -> bool:
+    """True of a strip that more of it may follow."""
+    return any(finding.code == "photo/hidden-end" for finding in found.findings)
 
 
 def _read(
@@ -240,7 +250,7 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
     best = _widest_alike(likely)
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
-        length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+        length = float(step_lengths(path).sum())
         # blur is judged last: a strip refused for it looks like a cable in all else
         if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
             return _two_candidates(photo, best.length_px, length)
@@ -251,8 +261,7 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
     if not best.evidence.enough:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
     # in one colour the arms of a crossing look alike, whatever cables they are of
-    unsure = best.grid_px > 1.0 or any(finding.code == "photo/hidden-end" for finding in best.findings)
-    if best.evidence.crossed is not None or (best.branching and unsure):
+    if best.evidence.crossed is not None or (best.branching and (best.grid_px > 1.0 or _is_piece(best))):
         return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
     beside = next(reading.outcomes for reading in judged if any(best is found for found in reading.outcomes))
     other = next((o for o in beside if isinstance(o, RoughCable) and _is_rival(o, best)), None)

@@ -22,7 +22,7 @@ from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
-from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.calibration import Calibration, chords_px, from_number
 from pipeline.vision.segmentation import find_cable
 
@@ -126,18 +126,35 @@ def _find_as_on(
 
     ``first`` (m) is the displacement of the first photo.
     """
-    name = str(shot.step.image)
-    photo = guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
-    if isinstance(photo, Rejected) or isinstance(near.found, Rejected) or isinstance(shot.found, RoughCable):
+    if isinstance(near.found, Rejected):
         return shot.found
     scale = np.nan if calibration is None else calibration.scale.px_per_m
     travel = (shot.step.displacement_m - near.step.displacement_m) * scale
     cable = _expected(specimen, calibration, shot.step.displacement_m - first)
     seen = expected_covers(near.found, specimen.rig.moving_bearing, travel)
     cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-    hints = specimen.hints.get(photo.name)
-    again = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near.found, hints=hints))
+    again = _find_again(specimen, shot, cable, settings, near=near.found)
     return again if isinstance(again, RoughCable) else shot.found
+
+
+def _find_again(
+    specimen: Specimen, shot: Shot, cable: Cable, settings: VisionSettings, *, near: RoughCable | None = None
+) -> RoughCable | Rejected:
+    """The cable on a photo that was searched before."""
+    photo = _loaded(specimen, shot.step, settings)
+    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, settings, near)
+
+
+def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Photo | Rejected:
+    name = str(step.image)
+    return guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
+
+
+def _find(
+    specimen: Specimen, photo: Photo, cable: Cable, settings: VisionSettings, near: RoughCable | None
+) -> RoughCable | Rejected:
+    hints = specimen.hints.get(photo.name)
+    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near, hints=hints))
 
 
 def _with_covers_by_length(
@@ -180,7 +197,7 @@ def _with_axes_shown(shot: Shot) -> Shot:
 def _with_photos(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Iterator[tuple[Photo, RoughCable]]:
     """The photos once more: they are not kept, a series of them would not fit into memory."""
     for shot in shots:
-        photo = load_photo(specimen.images[str(shot.step.image)], settings.photo, name=str(shot.step.image))
+        photo = _loaded(specimen, shot.step, settings)
         if isinstance(photo, Photo) and isinstance(shot.found, RoughCable):
             yield photo, shot.found
 
@@ -194,11 +211,10 @@ def _find_all(
     first: LoadStep | None = None
     last = specimen.steps[0]
     for step in specimen.steps:
-        path = None if step.image is None else specimen.images.get(step.image)
-        if step.image is None or path is None:
+        if step.image is None or step.image not in specimen.images:
             continue
         first = step if first is None else first
-        photo = guarded(step.image, partial(load_photo, path, settings.photo, name=step.image))
+        photo = _loaded(specimen, step, settings)
         if isinstance(photo, Rejected):
             shots.append(Shot(step, photo, None))
             continue
@@ -210,8 +226,7 @@ def _find_all(
             scale = 1.0 if calibration is None else calibration.scale.px_per_m
             seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
             cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-        hints = specimen.hints.get(photo.name)
-        found = guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near, hints=hints))
+        found = _find(specimen, photo, cable, settings, near)
         if isinstance(found, RoughCable):
             near, last = found, step
         shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))
@@ -250,14 +265,18 @@ def with_fixed_cover(
     fixed = fixed_cover(found, limit)
     if fixed is None:
         return shots
-    travel = np.array([shots[k].step.displacement_m for k in there]) * calibration.scale.px_per_m
+    scale = calibration.scale.px_per_m
+    diameter = None if fixed.cover.radius_px is None else 2.0 * fixed.cover.radius_px
+    hints = BearingHints(cover_px=diameter, seen=(fixed.cover,))
+    expected = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
+    travel = np.array([shots[k].step.displacement_m for k in there]) * scale
     settled = list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
-        again = _find_beside(specimen, shots[k], fixed.cover, calibration, settings)
+        again = _find_again(specimen, shots[k], expected, settings)
         if isinstance(again, RoughCable) and apart_px(again, fixed) <= limit:
             settled[k] = replace(shots[k], found=again)
         elif not is_sure(cable, fixed.side) or _chord_speaks_against(cable, found, fixed, travel, k=there.index(k)):
-            apart = apart_px(cable, fixed) / calibration.scale.px_per_m
+            apart = apart_px(cable, fixed) / scale
             said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart)
             settled[k] = replace(shots[k], found=Rejected(cable.image, said))
     return settled
@@ -277,20 +296,3 @@ def _chord_speaks_against(
     other = cable.right if fixed.side == "left" else cable.left
     there = float(np.hypot(*np.subtract(other.center_px, fixed.cover.center_px)))
     return bool(abs(there - known) < abs(float(chords_px([cable])[0]) - known))
-
-
-def _find_beside(
-    specimen: Specimen, shot: Shot, cover: Bearing, calibration: Calibration, settings: VisionSettings
-) -> RoughCable | Rejected:
-    """The cable on a photo once more, with a cover known."""
-    name = str(shot.step.image)
-    photo = guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
-    if isinstance(photo, Rejected):
-        return photo
-    scale = calibration.scale.px_per_m
-    diameter = None if cover.radius_px is None else 2.0 * cover.radius_px
-    cable = Cable(
-        specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=diameter, seen=(cover,))
-    )
-    hints = specimen.hints.get(photo.name)
-    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable, hints=hints))

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.beyond import fades, goes_on, rest_ahead
@@ -49,7 +50,7 @@ def rest_faced_at(
     ``others`` are the other strips of the reading; a strip as long as the cable is known to be, ``length_px``, has no
     rest.
     """
-    length = float(np.hypot(*np.diff(cut.path, axis=0).T).sum())
+    length = float(step_lengths(cut.path).sum())
     if length_px is not None and length * standout.reduction > _WHOLE_SHARE * length_px:
         return None
     gaps: list[tuple[float, Place]] = []

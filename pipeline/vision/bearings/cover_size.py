@@ -28,6 +28,7 @@ from pipeline.vision.bearings.rim import Circle, Radius
 from pipeline.vision.bearings.rings import find_marks
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.ends import CableEnd
 
@@ -148,7 +149,7 @@ def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     """The first and the last point in which the cable is seen, with the direction in which it goes on."""
     first, last = cable.visible
     body = cable.path_px[first : last + 1]
-    gaps = np.hypot(*np.diff(body, axis=0).T)
+    gaps = step_lengths(body)
     back = min(max(1, round(2.0 * cable.half_width_px / median(gaps))), len(body) - 1)
     starts = body[0] - body[back], body[-1] - body[-1 - back]
     ends = [CableEnd(place, way / np.hypot(*way)) for place, way in zip(body[[0, -1]], starts, strict=True)]

@@ -20,11 +20,10 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.median import median, medians, quantile
+from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 
-_MAD_TO_STD = 1.4826
 _LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slopes are fitted with it
 _BEVEL_SPREAD_SHARE = 0.22
 """Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
@@ -308,7 +307,7 @@ def _robust_circle(
         settled = np.abs(change).max() < 1e-3 and step >= 6
         # half of few numbers: sorting them is quicker than any function that looks for a median
         ordered = np.sort(np.abs(residual))
-        scale = max(_MAD_TO_STD * 0.5 * float(ordered[middle[0]] + ordered[middle[1]]), floor)
+        scale = max(MAD_TO_STD * 0.5 * float(ordered[middle[0]] + ordered[middle[1]]), floor)
         if settled:
             break
     spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))

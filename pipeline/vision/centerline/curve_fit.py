@@ -24,7 +24,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
 from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def _settle(
     moved = 0.0
     for iteration in range(iterations):
         s, residual = _step_to_foot(curve, points, s)
-        spread = max(1.4826 * median(np.abs(residual / std)), 1e-12)
+        spread = max(scatter(residual / std, 0.0), 1e-12)
         if iteration:
             # A step leaves less than a tenth of its length: points as near as that may still be the curve's. A gap
             # among them starts the fit pixels off, and all beyond it would count as outliers.

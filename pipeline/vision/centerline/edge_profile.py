@@ -23,7 +23,7 @@ from scipy.special import ndtr
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.slow_light import steadied
-from pipeline.vision.median import median, medians, quantile
+from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
@@ -212,7 +212,7 @@ def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:
 
 def _scatter(residual: Float32) -> Array:
     """Robust standard deviation of each row of absolute residuals."""
-    return 1.4826 * medians(residual, axis=1).astype(np.float64)
+    return MAD_TO_STD * medians(residual, axis=1).astype(np.float64)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 
 _HIGHEST = 30
 """Degree of the finest polynomial: waves of a fifteenth of the length, which a curve through the points can follow."""
@@ -155,7 +155,7 @@ def _surprise(found: Array, counts: Array, share: Array, variances: Array) -> Ar
 def _components(photo: HalfWidths) -> Array:
     """Components of half the width along the polynomials, and what the scatter alone puts there (variance): (2, k)."""
     basis = _polynomials(2.0 * (photo.s - photo.s[0]) / np.ptp(photo.s) - 1.0)
-    spread = 1.4826 * median(np.abs(photo.half))
+    spread = scatter(photo.half, 0.0)
     half = np.clip(photo.half, -4.0 * spread, 4.0 * spread)  # a speck on one edge is no wave
     return np.array([basis.T @ half, _scatter(basis * photo.std[:, None], photo.s, photo.correlation_length)])
 

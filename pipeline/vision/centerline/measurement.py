@@ -27,7 +27,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
-from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along, width_excess
+from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
@@ -39,7 +39,8 @@ from pipeline.vision.centerline.refusal import (
     refusal_of_band,
 )
 from pipeline.vision.centerline.smoothing import Witness
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import AxisKind, RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
@@ -193,10 +194,7 @@ def follow_cable(
         return refused
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
-    covariance, slow = fit.smooth.covariance, slow_errors(fit, *light)
-    # what the width shows beyond that is short, as the scatter is: the light's slow error is none the larger
-    covariance = covariance * width_excess(fit, sections.balance * (width - median(width)), covariance, options) ** 2
-    covariance = covariance + slow
+    covariance = fit.smooth.covariance + slow_errors(fit, *light)
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
@@ -206,7 +204,7 @@ def _fit(
     """Curvature spline through the midline in the chord frame, ``s = 0`` near the left axis."""
     points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second))
     before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
-    s = before + np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+    s = before + arc_lengths(points)
     std = np.maximum(sections.std, _LEAST_STD_PX) * width / sections.width
     return fit_along(
         points,
@@ -234,7 +232,7 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     s, width = s[two], width[two]
     slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, options.slow_width_order)
     off = 0.5 * (width - median(width))
-    spread = 1.4826 * median(np.abs(off))
+    spread = scatter(off, 0.0)
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 

@@ -43,7 +43,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
-from pipeline.vision.median import median, medians
+from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
@@ -210,7 +210,7 @@ def _serves(plain: Profiles, shaded: Profiles, half_width: float, diameter: floa
         width = profiles.place.sum(axis=0) + 2.0 * half_width
         middle = median(width)
         off = 0.0 if diameter is None else abs(middle - diameter)
-        spread = 1.4826 * median(np.abs(width - middle))
+        spread = scatter(width, middle)
         return float(np.hypot(spread, max(off - _WIDTH_PLAY * 2.0 * half_width, 0.0)))
 
     return unlike(plain) <= _RAMPS_WORTH * unlike(shaded)
@@ -224,7 +224,7 @@ def _of_usual_width(width: Array) -> NDArray[np.bool_]:
     middle = median(width)
     off = np.abs(width - middle)
     # An outline may wave; and edges of webcams and JPEG are found to a third of a pixel, whatever the width.
-    limit = max(_WIDTH_DEPARTURE * middle, 4.0 * 1.4826 * median(off), _WIDTH_FLOOR)
+    limit = max(_WIDTH_DEPARTURE * middle, 4.0 * scatter(off, 0.0), _WIDTH_FLOOR)
     smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
@@ -235,15 +235,6 @@ def _from_stretch_to_stretch(keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
     stretch = np.flatnonzero(binary_opening(keep, np.ones(_TOGETHER, dtype=bool)))
     index = np.arange(len(keep))
     return keep & (index >= stretch[0]) & (index <= stretch[-1]) if len(stretch) else keep
-
-
-def slow_part(s: Array, values: Array, order: int) -> Array:
-    """What of ``values`` (n,) follows a polynomial of ``s``, outliers clipped, without its mean."""
-    off = values - median(values)
-    spread = 1.4826 * median(np.abs(off))
-    slow = np.polynomial.legendre.legvander(2.0 * (s - s.min()) / max(float(np.ptp(s)), 1e-300) - 1.0, order)
-    fitted = slow @ np.linalg.lstsq(slow, np.clip(off, -4.0 * spread, 4.0 * spread), rcond=None)[0]
-    return np.asarray(fitted - fitted.mean())
 
 
 def _running_median(values: Array) -> Array:
@@ -258,7 +249,7 @@ def _consistent(
     filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
     local = np.column_stack([_running_median(p) for p in filled.T])
     off = np.abs(filled - local)
-    limit = outlier * 1.4826 * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
+    limit = outlier * MAD_TO_STD * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
     good = good & (off < limit)
     width = local.sum(axis=1)
     out, spread = filled.copy(), std.copy()

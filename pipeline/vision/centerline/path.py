@@ -15,6 +15,7 @@ from pipeline.vision.centerline.edges import Ground, in_picture, search_edges
 from pipeline.vision.centerline.midline import Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 
 _BLOCK = 1.5  # half widths before what hides a cable up to a given axis: its border may lie aslant by 45 degrees or so
@@ -122,7 +123,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     """
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(rough.path_px, axis=0).T))]
+    along = arc_lengths(rough.path_px)
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
     points, s = _guides(rough, along, half_width)

@@ -17,7 +17,7 @@ from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.evidence import Course, Evidence, unlike_a_cable, weigh
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.chord import ChordFrame
 
@@ -117,4 +117,4 @@ def feet_of_axes(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
 def middle_width(width: Array) -> tuple[float, float]:
     """Median width, and its robust relative scatter along s."""
     middle = median(width)
-    return middle, 1.4826 * median(np.abs(width - middle)) / middle
+    return middle, scatter(width, middle) / middle

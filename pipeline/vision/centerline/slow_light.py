@@ -20,7 +20,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.settings.vision.centerline import CurveSettings
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 
 _BLOCK = 8  # sections: short beside the bends of the polynomial, long beside texture
 _LASTING = 4.0  # blocks that a misfit lasts at most, before the polynomial follows it
@@ -66,7 +66,7 @@ def steadied(
             there, variance = known[side], covariance[side, known[side], k, k]
             away = _off_slow(light[side, there, k], slow[there])
             # Letters and dirt are no light: what they do to a section says nothing of its place.
-            near = np.abs(away) < 4.0 * np.sqrt(np.maximum(variance, _scatter(away) ** 2) + _ROUNDING)
+            near = np.abs(away) < 4.0 * np.sqrt(np.maximum(variance, scatter(away, 0.0) ** 2) + _ROUNDING)
             extra[side, k] = _extra(np.where(near, away, 0.0), variance, slow.shape[1])
             off[side, there, k] = away
             plain[side, there] &= near
@@ -83,7 +83,8 @@ def _off_slow(values: Array, slow: Array) -> Array:
     """Values ``(n,)`` less the combination of the columns of ``slow`` that most of them follow."""
     off = values - median(values)
     for _ in range(4):
-        weight = np.clip(1.0 - (off / (6.0 * _scatter(off) + 1e-12)) ** 2, 0.0, None)  # the root of Tukey's biweight
+        # the root of Tukey's biweight
+        weight = np.clip(1.0 - (off / (6.0 * scatter(off, 0.0) + 1e-12)) ** 2, 0.0, None)
         weighted = slow * (weight * weight)[:, None]
         # Legendre's polynomials are nearly orthogonal: their normal equations lose no digits that matter.
         off = values - slow @ np.linalg.solve(weighted.T @ slow, weighted.T @ values)
@@ -98,9 +99,4 @@ def _extra(off: Array, variance: Array, followed: int) -> float:
     usual = median(variance)
     means = off[: len(off) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(axis=1)
     lasting = float((means**2).sum()) / max(len(means) - followed, 1)
-    return max(_scatter(off) ** 2 - _CHANCE * usual, _LASTING * (_BLOCK * lasting - _CHANCE * usual))
-
-
-def _scatter(off: Array) -> float:
-    """Robust standard deviation about zero."""
-    return 1.4826 * median(np.abs(off))
+    return max(scatter(off, 0.0) ** 2 - _CHANCE * usual, _LASTING * (_BLOCK * lasting - _CHANCE * usual))

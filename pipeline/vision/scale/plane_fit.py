@@ -21,6 +21,7 @@ from scipy.optimize import least_squares
 from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.vision.median import scatter
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
 _LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
@@ -212,7 +213,7 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float, settin
         found = least_squares(residual, q, x_scale="jac", loss="soft_l1", f_scale=3.0 * used, max_nfev=60)
         q, error = np.asarray(found.x), corners(np.asarray(found.x))
         # of most of them: a corner mistaken for another thing shall not widen what it is judged by
-        std = max(1.4826 * float(np.median(np.abs(error))), settings.corner_step_px)
+        std = max(scatter(error, 0.0), settings.corner_step_px)
     rms = float(np.sqrt(error @ error / max(len(error) - len(q), 1)))
     slopes = np.asarray(found.jac)
     slopes[-1] *= rms / used

@@ -11,6 +11,7 @@ Units: grey values are fractions of full range; pixels of the reduced photo are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -18,11 +19,10 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median, medians
+from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
-_MAD_TO_STD = 1.4826  # standard deviation of a normal distribution by its median absolute deviation
 _HIGHER_LEVELS = 2  # levels above Otsu's, each splits what stands above the last: shadow, then cable
 _REDUCED_SIDE_CELLS = 1000
 """Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
@@ -52,6 +52,7 @@ class Standout:
     covariance: Array
     picture: Image
 
+    @cached_property
     def distance(self) -> Image:
         """Picture ``(h, w)``: colour distance from the ground in standard deviations of the ground."""
         whitener = np.linalg.cholesky(np.linalg.inv(self.covariance)).T
@@ -59,6 +60,11 @@ class Standout:
         if white is None:
             return np.abs(self.residual[..., 0]) * np.float32(whitener[0, 0])
         return np.asarray(np.sqrt(np.einsum("ijc,ijc->ij", white, white)), np.float32)
+
+    @cached_property
+    def levels(self) -> list[float]:
+        """Levels of that distance above which something stands out, the likeliest first; see `otsu_levels`."""
+        return otsu_levels(self.distance)
 
     def brightness(self) -> Image:
         """Picture ``(h, w)``: mean residual of the channels, in standard deviations of the ground."""
@@ -126,7 +132,7 @@ def _robust_fit(terms: Array, values: Array) -> Array:
     coefficients[0] = median(values)
     for _ in range(8):
         residual = values - terms @ coefficients
-        spread = _MAD_TO_STD * median(np.abs(residual)) + 1e-6
+        spread = scatter(residual, 0.0) + 1e-6
         weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
         normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
         coefficients[:] = np.linalg.solve(normal, terms.T @ (weight * values))
@@ -139,7 +145,7 @@ def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
     stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
     sample = residual[::stride, ::stride].reshape(-1, residual.shape[2]).T.copy()  # each channel in one piece
     off = np.abs(sample)
-    spread = _MAD_TO_STD * medians(off, axis=1) + settings.min_ground_std
+    spread = MAD_TO_STD * medians(off, axis=1) + settings.min_ground_std
     calm = sample[:, (off < 3.0 * spread[:, None]).all(axis=0)]
     enough = calm.shape[1] > len(calm) + 1
     covariance = np.atleast_2d(np.cov(calm, dtype=np.float64)) if enough else 0.0

@@ -17,13 +17,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.search.backdrop import Image
 from pipeline.vision.search.crosscut import path_normals, smooth_path, straighten
 from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import Mask, Strip, find_strips
 
-_MAD_TO_STD = 1.4826
 _MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 
 
@@ -79,5 +78,5 @@ def _cable_within(
         band,
         path=path + np.interp(np.arange(len(path)), rows, middle)[:, None] * normal,
         width=median(across),
-        width_scatter=_MAD_TO_STD * median(np.abs(across - median(across))) / width,
+        width_scatter=scatter(across) / width,
     )

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
@@ -228,15 +229,11 @@ def _may_go_on(
     least = settings.beyond_least_widths * width
     if len(ahead) < least:
         return False
-    _, normal = path_normals(ahead)
-    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
-    light, _, _ = straighten(standout.picture, ahead, normal, width, settings)
-    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
-    darkest = np.maximum(light.mean(axis=2).min(axis=1), _BEYOND_DARKEST)
-    strong = (-relief if cut.dark else relief) > (_BEYOND_CONTRAST[0] * usual) * darkest[:, None]
-    enough = 0.25 * width / (offsets[1] - offsets[0])
-    length = float(np.hypot(*np.diff(ahead, axis=0).T).sum())
-    return bool(np.count_nonzero(strong.sum(axis=1) >= enough) * length / (len(rows) - 1) > least)
+    straight, _, _ = straighten(standout.picture, ahead, path_normals(ahead)[1], width, settings)
+    darkest = np.maximum(straight.mean(axis=2).min(axis=1), _BEYOND_DARKEST)
+    strong = _standing_out(standout, cut, ahead, width, (_BEYOND_CONTRAST[0] * usual) * darkest[:, None], settings)
+    length = float(step_lengths(ahead).sum())
+    return bool(np.count_nonzero(strong >= 0.25) * length / (len(strong) - 1) > least)
 
 
 def _may_fade(
@@ -253,11 +250,18 @@ def _may_fade(
     Half of the sections ``near`` would hold a core half a width broad (edges a width apart to 15 %, a pair's to 20 % of
     that) that stands out so far in its median: a fifth of a width does then, on two fifths of them at the very least.
     """
-    _, normal = path_normals(ahead)
-    straight, rows, offsets = straighten(standout.residual, ahead, normal, width, settings)
+    strong = _standing_out(standout, cut, ahead, width, least, settings)
+    return bool(np.count_nonzero(strong >= 0.2) * len(ahead) / len(strong) >= 0.4 * (near.stop - near.start))
+
+
+def _standing_out(
+    standout: Standout, cut: CrossCut, ahead: Array, width: float, least: float | Array, settings: SegmentationSettings
+) -> Array:
+    """How much (widths) of each section of a lead (n,) stands out of its ground by ``least`` as the strip does."""
+    straight, _, offsets = straighten(standout.residual, ahead, path_normals(ahead)[1], width, settings)
     relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
-    strong = ((-relief if cut.dark else relief) > least).sum(axis=1) >= 0.2 * width / (offsets[1] - offsets[0])
-    return bool(np.count_nonzero(strong) * len(ahead) / len(rows) >= 0.4 * (near.stop - near.start))
+    strong = (-relief if cut.dark else relief) > least
+    return np.asarray(strong.sum(axis=1) * (offsets[1] - offsets[0]) / width)
 
 
 def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple[float, float]) -> tuple[Array, Array]:
@@ -269,11 +273,6 @@ def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple
     rows, columns = standout.residual.shape[:2]
     inside = np.all((ahead >= 0) & (ahead <= (columns - 1, rows - 1)), axis=1)
     return led, ahead if inside.all() else ahead[: int(np.argmin(inside))]
-
-
-def shaded(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> NDArray[np.bool_]:
-    """Sections ``(k,)`` that look like most of the strip but for the light on them."""
-    return _alike(standout, cut, width, median(_weber(standout, cut, width)))
 
 
 def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDArray[np.bool_]:

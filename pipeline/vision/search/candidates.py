@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median, quantile
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
 from pipeline.vision.search.bands import strips_in_bands
 from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
@@ -147,15 +147,14 @@ def _touches(end: int, strip: Strip, other: Strip) -> bool:
 
 def approaches_itself(path: Array, width: float) -> bool:
     """True if the path comes back to within 1.2 widths of itself: the cable crosses or touches itself."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    s = arc_lengths(path)
     first, second = cKDTree(path).query_pairs(1.2 * width, output_type="ndarray").T
     return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
 
 
 def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
     """Pictures in ground sigmas and levels, the likeliest first."""
-    distance = standout.distance()
-    otsu, *higher = otsu_levels(distance)
+    distance, (otsu, *higher) = standout.distance, standout.levels
     yield distance, otsu
     for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
         if level > _LOWEST_LEVEL:
@@ -181,8 +180,6 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
         if width * length < largest:
             continue  # the largest strip will speak for the photo; these are all smaller together
         reading = _read(above, width, level, wanted, settings)
-        merged = _split_by_highlight(reading) if wanted.width is None else None
-        reading = reading if merged is None else _read(above, merged, level, wanted, settings)
         if reading.longest >= wanted.least_length:
             largest = max(largest, reading.longest * reading.width)
         yield reading
@@ -227,18 +224,3 @@ def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     closed = ridge_widths(strip_mask(above, widths[0][0])) if widths else []
     new = [guess for guess in closed if all(abs(np.log(guess[0] / known)) > 0.2 for known, _ in widths)]
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
-
-
-def _split_by_highlight(reading: Reading) -> float | None:
-    """Width of the cable if another strip runs beside the longest one, its other side along a highlight, else None."""
-    if len(reading.strips) < 2:
-        return None
-    side = reading.strips[0]
-    others = np.vstack([strip.path for strip in reading.strips[1:]])
-    apart = np.asarray(cKDTree(others).query(side.path)[0])
-    beside = apart[apart < 4.0 * side.width]
-    if len(beside) < 0.6 * len(apart):
-        return None
-    distance = median(beside)
-    calm = quantile(beside, 0.8) - quantile(beside, 0.2) < 0.35 * distance
-    return distance + side.width if calm else None

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.crosscut import path_normals
 
-_MAD_TO_STD = 1.4826
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
 _TILE = 128  # px; pieces of the window that are projected or left out
 _CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
@@ -103,7 +102,7 @@ def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
     before, here, after = (grey.ravel()[at + k] for k in (-1, 0, 1))
     differences = before - 2.0 * here + after
     # 1 + 4 + 1 = 6 pixel variances in each difference
-    return _MAD_TO_STD * median(np.abs(differences)) / np.sqrt(6.0) if len(differences) else 0.0
+    return scatter(differences, 0.0) / np.sqrt(6.0) if len(differences) else 0.0
 
 
 def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:

@@ -17,11 +17,11 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median, medians
+from pipeline.vision.median import median, medians, scatter
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
-_MAD_TO_STD = 1.4826
 _TEXTURE_WIDTHS = 12.0  # widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter
 
 
@@ -71,7 +71,7 @@ class CrossCut:
 
 def smooth_path(path: Array, sigma: float) -> Array:
     """Resample a path (n, 2) to points one cell apart, (m, 2), and smooth it; the ends stay in place."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    s = arc_lengths(path)
     grid = np.linspace(0.0, s[-1], max(3, round(s[-1]) + 1))
     even = np.column_stack([np.interp(grid, s, path[:, 0]), np.interp(grid, s, path[:, 1])])
     pad = min(len(even) - 1, int(4 * sigma) + 1)
@@ -158,10 +158,10 @@ def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, 
     # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
     # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
     values = values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="reflect")
-    values = np.abs(values - medians(values, axis=0))
+    values = values - medians(values, axis=0)
     right = offset_widths[beside] > 0.0
     sides = (values[:, right], values[:, ~right]) if shaded else (values,)
-    return _MAD_TO_STD * min(median(side) for side in sides)
+    return min(scatter(side, 0.0) for side in sides)
 
 
 def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:

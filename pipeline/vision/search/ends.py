@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.photo import Photo
+from pipeline.vision.polyline import arc_lengths, step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
@@ -63,7 +64,7 @@ def find_end(path: Array, reading: Reading, standout: Standout, cover_radius_px:
 
 def straight_body(path: Array, width: float, trimmed: float) -> tuple[Array, Array]:
     """The path (n, 2) without the piece at its end that runs into a corner, and the direction (2,) in which it ends."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    s = arc_lengths(path)
     count = int(np.searchsorted(s, s[-1] - trimmed))
     body = path[: max(3, count)]
     return body, end_direction(body, width)
@@ -137,7 +138,7 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
         return settled, path
     middle = median(known)
     # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
-    std = float(np.hypot(1.4826 * median(np.abs(known - middle)) / 2.0, _CUT_STD_WIDTHS * width))
+    std = float(np.hypot(scatter(known, middle) / 2.0, _CUT_STD_WIDTHS * width))
     path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 
@@ -213,7 +214,7 @@ def between_axes(path: Array, axes: tuple[Bearing, Bearing], margin: float) -> t
     if len(indices) < 5:
         return path, None
     body = path[indices[0] : indices[-1] + 1]
-    spacing = median(np.hypot(*np.diff(body, axis=0).T))
+    spacing = median(step_lengths(body))
     head, tail = _lead(left, body[0], spacing), _lead(right, body[-1], spacing)[::-1]
     return np.vstack([head, body, tail]), (len(head), len(head) + len(body) - 1)
 

@@ -9,34 +9,46 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.backdrop import Standout, otsu_levels
+from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.crosscut import path_normals
 
 _UNEVEN = 0.3  # of the step to the ground; cables of one colour with gloss, print and shade scatter by less
 _STIFF = 0.01  # of the squared step, added to every colour's variance: colours that hardly differ are not chased
 _CORE = 0.45  # of the depth around; cells of a mask nearer to its rim than that are mixed with the ground
 _AROUND = np.ones((9, 9), np.uint8)  # cells
+_SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
 _INSIDE, _BESIDE = np.linspace(-0.3, 0.3, 7), np.linspace(0.9, 1.3, 4)  # widths from a cable's middle
 _ROWS = 256  # px; worked on at a time: large photos shall not be held as single precision
+_LEAST_CABLE = 0.25  # of what stands out; where all but less is the ground dimmed, the cable may be grey itself
 _COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
 
 
 def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
     """The photo as grey values along that direction; None where what stands out is of one brightness as it is."""
-    distance = standout.distance()
-    mask = (distance > otsu_levels(distance)[0]).astype(np.uint8)
+    mask = (standout.distance > standout.levels[0]).astype(np.uint8)
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
-    core = standout.residual[(depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)].astype(np.float64)
-    channels = core.shape[1]
-    if channels == 1 or len(core) < 4 * channels:
+    middle = (depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)
+    core = standout.residual[middle].astype(np.float64)
+    shadow = _dimmed(core, standout.picture[middle] - core)
+    channels, cable = core.shape[1], core[~shadow]
+    if channels == 1 or len(cable) < max(4 * channels, _LEAST_CABLE * len(core)):
         return None
-    weights = np.linalg.solve(standout.covariance, np.median(core, axis=0))
-    seen = core @ weights
-    return None if np.std(seen) < _UNEVEN * np.median(seen) else _along(photo, core, standout.covariance)
+    seen = core @ np.linalg.solve(standout.covariance, np.median(core, axis=0))
+    if np.std(seen) < _UNEVEN * np.median(seen):
+        return None
+    return _along(photo, cable, standout.covariance + core[shadow].T @ core[shadow] / max(int(shadow.sum()), 1))
+
+
+def _dimmed(colours: Array, ground: Array) -> NDArray[np.bool_]:
+    """Colours (n, c) less the ground's that are the ground's own, with less light: shadows."""
+    less = -(colours * ground).sum(axis=1)
+    sizes, light = np.linalg.norm(colours, axis=1), np.linalg.norm(ground, axis=1)
+    return np.asarray((less > _SHADE_COSINE * sizes * light) & (sizes < _DARKEST_SHADE * light))
 
 
 def in_colour_of(photo: Photo, standout: Standout, cable: RoughCable) -> Photo:

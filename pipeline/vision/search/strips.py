@@ -20,7 +20,8 @@ from skimage.morphology import skeletonize
 
 from pipeline.records import Array
 from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
+from pipeline.vision.polyline import arc_lengths, step_lengths
 
 Mask = NDArray[np.uint8]
 
@@ -62,7 +63,7 @@ class Strip:
     @property
     def length(self) -> float:
         """Length of the path in cells."""
-        return float(np.hypot(*np.diff(self.path, axis=0).T).sum())
+        return float(step_lengths(self.path).sum())
 
 
 def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
@@ -228,7 +229,7 @@ def _continues(first: Array, second: Array, width: float, settings: Segmentation
 
 def end_direction(path: Array, width: float) -> Array:
     """Unit vector (2,) that leaves a path (n, 2) at its last point, over three widths, without the last half width."""
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    s = arc_lengths(path)
     far, near = np.searchsorted(s, [s[-1] - 3.5 * width, s[-1] - 0.5 * width])
     piece = path[max(far, 0) : max(near, far + 2)]
     piece = path if len(piece) < 2 else piece
@@ -255,8 +256,8 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
     inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
     middle = median(inner)
-    scatter = 1.4826 * median(np.abs(inner - middle)) / max(middle, 1e-9)
-    return Strip(path, middle, scatter, _longest_branch(skeleton, vu[nodes], width))
+    uneven = scatter(inner, middle) / max(middle, 1e-9)
+    return Strip(path, middle, uneven, _longest_branch(skeleton, vu[nodes], width))
 
 
 def _farthest(reach: Array) -> int:
