@@ -84,8 +84,8 @@ def site(tmp_path_factory):
     result = result.model_copy(update={"diagnosis": diagnosis_of("class", result.photos)})
     write_report(result, folder / "cable-0")
     write_report(result, folder / "de", ReportSettings(language="de"))
-    write_index(batch(result, 20), folder)
-    write_index(batch(result, ROWS), folder / "large")
+    for count, place in ((20, folder), (32, folder / "printed"), (ROWS, folder / "large")):
+        write_index(batch(result, count), place)
     write_rows(list(many_rows(result)), folder / "huge", ReportSettings())
     return folder.as_uri()
 
@@ -273,7 +273,7 @@ def visible_names(driver):
 
 def test_the_printed_index_begins_below_its_title(show, site):
     """A table that is kept together leaves the first page to the title alone."""
-    driver = show(f"{site}/index.html")
+    driver = show(f"{site}/printed/index.html")
 
     def pages():
         printed = driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]

@@ -160,7 +160,7 @@ def statements(paper: Paper, words: Words) -> list[tuple[str, ...]]:
         Message("paper.table", **forces),
         Message("paper.needs", found=[_found(discovery) for discovery in paper.discoveries]),
         Message("paper.converged", reached=reached, rest=inverse.iterations),
-        Message("paper.straight", stiffness=low, nodes=paper.straight.steps[0].kappa.size),
+        Message("paper.straight", stiffness=words.fixed(1e3 * low, 2), nodes=paper.straight.steps[0].kappa.size),
         Message("paper.forces", off=off, largest=largest),
         Message("paper.ways", shares=shares, together=together.rms, **conditions),
         Message("paper.iteration", counts=counts),

@@ -52,17 +52,15 @@ def test_both_languages_have_the_same_sentences_with_the_same_gaps():
 
 
 def test_every_sentence_is_used_and_every_key_has_one():
-    found = set()
-    for path in (ROOT / "pipeline").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and KEY.fullmatch(node.value):
-                found.add(node.value)
+    files = (ROOT / "pipeline").rglob("*.py")
+    nodes = [node for path in files for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+    texts = (node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str))
+    found = {text for text in texts if KEY.fullmatch(text)}
     known = {key for key in catalogue("en") if "." in key or "/" in key}
     assert sorted(key for key in known - found if not key.startswith(MADE)) == []
     calls = {
         node.args[0].value
-        for path in (ROOT / "pipeline").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("Message", "inferred", "doubtful")
         if node.args and isinstance(node.args[0], ast.Constant)
     }

@@ -64,7 +64,7 @@ def test_statements_and_figures_are_german_where_asked_for(made):
     said = " ".join(part for row in statements(made[1], words) for part in row)
     assert re.search(r"bis zu \d+ % einer Kraft", said)
     assert "veränderliche Vorkrümmung" in said and "Newton-Schritten" in said
-    assert "EI = 0,01 N m²" in said and "step" not in said
+    assert "EI = 0,01 N m²" in said and "f_EI(0) = −0,6" in said and "step" not in said
     figures = draw(made[1], words)
     assert [title for title, _ in figures][-1] == "Bild 7: alles zusammen"
     drawn = "".join(figure.svg for _, figure in figures)
