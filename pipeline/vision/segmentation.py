@@ -164,9 +164,10 @@ def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Windo
         return None if isinstance(found, Rejected) or _is_piece(found) else found
 
     first = read_whole(in_one_colour(photo, standout))
-    if first is None:
+    its_own = None if first is None else in_colour_of(photo, standout, first)
+    if first is None or its_own is None:
         return _read(photo, standout, wanted, cable, settings)
-    second = read_whole(in_colour_of(photo, standout, first))
+    second = read_whole(its_own)
     return first if second is None or second.evidence.value < first.evidence.value else second
 
 

@@ -110,7 +110,7 @@ def cut_across(
     path = smooth_path(path, settings.smoothing_widths * width)
     _, normal = path_normals(path)
     straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
-    weights = _projection(straight, offsets / width, standout.covariance, known=known) if weights is None else weights
+    weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
     relief, ground = against_ground(grey, offsets / width)
     core = np.abs(offsets) < 0.35 * width
@@ -196,25 +196,17 @@ def _centres(many: int, few: int) -> Array:
     return np.asarray((np.arange(few) + 0.5) * (many / few) - 0.5)
 
 
-def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array, *, known: bool) -> Array:
-    """Fisher's discriminant of core against flanks, kept from chasing channels that hardly differ.
-
-    A striped wire has another colour on each side. The weaker side stands out most in the discriminant of the point
-    between both colours that is nearest to the ground's. Two wires that touch look the same: only a ``known`` width
-    tells them from one.
-    """
+def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:
+    """Fisher's discriminant of core against flanks, kept from chasing channels that hardly differ."""
     channels = straight.shape[2]
     if channels == 1:
         return np.ones(1)
-    sides = (np.abs(offset_widths) < 0.35, *(np.abs(offset_widths - side) < 0.17 for side in (-0.25, 0.25)))
-    ground = medians(straight[:, _beside(offset_widths)].reshape(-1, channels), axis=0)
-    core, first, second = (
-        (medians(straight[:, side].reshape(-1, channels), axis=0) - ground).astype(np.float64) for side in sides
+    ground, core = (
+        medians(straight[:, where].reshape(-1, channels), axis=0).astype(np.float64)
+        for where in (_beside(offset_widths), np.abs(offset_widths) < 0.35)
     )
-    metric = np.linalg.inv(covariance + (0.1 * float(core @ core) + 1e-9) * np.eye(channels))
-    apart = second - first
-    share = -float(first @ metric @ apart) / (float(apart @ metric @ apart) + 1e-300)
-    weights = metric @ (first + share * apart if known and 0.0 < share < 1.0 else core)
+    core -= ground
+    weights = np.linalg.solve(covariance + (0.1 * float(core @ core) + 1e-9) * np.eye(channels), core)
     # One sign convention: brightness counts positive, so "dark" means dark to a person wherever that makes sense.
     weights *= 1.0 if weights.sum() >= 0 else -1.0
     return np.asarray(weights / (np.abs(weights).sum() + 1e-300))

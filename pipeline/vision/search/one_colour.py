@@ -24,38 +24,52 @@ _AROUND = np.ones((9, 9), np.uint8)  # cells
 _SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
 _INSIDE, _BESIDE = np.linspace(-0.3, 0.3, 7), np.linspace(0.9, 1.3, 4)  # widths from a cable's middle
 _ROWS = 256  # px; worked on at a time: large photos shall not be held as single precision
-_LEAST_CABLE = 0.25  # of what stands out; where all but less is the ground dimmed, the cable may be grey itself
+_LEAST_CABLE = 0.25  # of what stands out; with less, its colours are those of shadow or of other things
 _COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
 
 
 def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
     """The photo as grey values along that direction; None where what stands out is of one brightness as it is."""
-    mask = (standout.distance > standout.levels[0]).astype(np.uint8)
-    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
-    middle = (depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)
-    core = standout.residual[middle].astype(np.float64)
-    shadow = _dimmed(core, standout.picture[middle] - core)
-    channels, cable = core.shape[1], core[~shadow]
-    if channels == 1 or len(cable) < max(4 * channels, _LEAST_CABLE * len(core)):
+    cable, shadow = (standout.residual[part].astype(np.float64) for part in _cable_and_shadow(standout))
+    channels, count = cable.shape[1], len(cable) + len(shadow)
+    if channels == 1 or len(cable) < max(4 * channels, _LEAST_CABLE * count):
         return None
+    core = np.concatenate([cable, shadow])
     seen = core @ np.linalg.solve(standout.covariance, np.median(core, axis=0))
     if np.std(seen) < _UNEVEN * np.median(seen):
         return None
+<<<<<<< HEAD
     return _along(photo, cable, standout.covariance + core[shadow].T @ core[shadow] / max(int(shadow.sum()), 1))
+=======
+    return _along(photo, cable, standout.covariance + shadow.T @ shadow / (len(shadow) + 1.0))
+>>>>>>> vision
 
 
-def _dimmed(colours: Array, ground: Array) -> NDArray[np.bool_]:
-    """Colours (n, c) less the ground's that are the ground's own, with less light: shadows."""
-    less = -(colours * ground).sum(axis=1)
-    sizes, light = np.linalg.norm(colours, axis=1), np.linalg.norm(ground, axis=1)
-    return np.asarray((less > _SHADE_COSINE * sizes * light) & (sizes < _DARKEST_SHADE * light))
+def _cable_and_shadow(standout: Standout) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Cells ``(h, w)`` in the middle of what stands out, and those of them whose colour is the ground's, dimmed."""
+    mask = (standout.distance > standout.levels[0]).astype(np.uint8)
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
+    middle = (depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)
+    ground = standout.picture - standout.residual
+    less, light = -(standout.residual * ground).sum(axis=2), np.linalg.norm(ground, axis=2)
+    sizes = np.linalg.norm(standout.residual, axis=2)
+    shadow = (less > _SHADE_COSINE * sizes * light) & (sizes < _DARKEST_SHADE * light)
+    return middle & ~shadow, middle & shadow
 
 
-def in_colour_of(photo: Photo, standout: Standout, cable: RoughCable) -> Photo:
-    """The same by a cable that was found: its colours, and those of the ground and shadow beside it."""
+def in_colour_of(photo: Photo, standout: Standout, cable: RoughCable) -> Photo | None:
+    """The same by a cable that was found: its colours, and those of the ground and shadow beside it.
+
+    None where nearly all of what stands out lies elsewhere: then its colours were not those of this cable.
+    """
     first, last = cable.visible
     path = standout.to_cells(cable.path_px[first : last + 1])
-    across = 2.0 * cable.half_width_px / standout.reduction * path_normals(path)[1][:, None]
+    width = 2.0 * cable.half_width_px / standout.reduction
+    stands_out, drawn = _cable_and_shadow(standout)[0], np.zeros(standout.residual.shape[:2], np.uint8)
+    cv2.polylines(drawn, [np.rint(path).astype(np.int32)], False, 1, max(1, round(width)))
+    if np.count_nonzero(stands_out & (drawn > 0)) < _LEAST_CABLE * np.count_nonzero(stands_out):
+        return None
+    across = width * path_normals(path)[1][:, None]
 
     def colours(widths: Array) -> Array:
         u, v = np.moveaxis((path[:, None] + widths[:, None] * across).astype(np.float32), -1, 0)
