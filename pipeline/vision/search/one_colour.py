@@ -38,11 +38,7 @@ def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
     seen = core @ np.linalg.solve(standout.covariance, np.median(core, axis=0))
     if np.std(seen) < _UNEVEN * np.median(seen):
         return None
-<<<<<<< HEAD
-    return _along(photo, cable, standout.covariance + core[shadow].T @ core[shadow] / max(int(shadow.sum()), 1))
-=======
     return _along(photo, cable, standout.covariance + shadow.T @ shadow / (len(shadow) + 1.0))
->>>>>>> vision
 
 
 def _cable_and_shadow(standout: Standout) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
