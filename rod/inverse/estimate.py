@@ -51,10 +51,6 @@ class InverseOutcome(Enum):
     )
 
 
-def _none() -> Array:
-    return np.empty(0)
-
-
 @dataclass(frozen=True)
 class Estimate:
     """What the inverse problem makes of a test; SI units, tangent reading.
@@ -80,11 +76,11 @@ class Estimate:
     outcome: InverseOutcome
     characteristic: ComplianceLaw | None = None
     law: MeasuredLaw | None = None
-    law_forms: Array = field(default_factory=_none)
+    law_forms: Array = field(default_factory=lambda: np.empty(0))
     model: FitModel | None = None
     evaluation: Evaluation | None = None
-    unknowns: Array = field(default_factory=_none)
-    covariance: Array = field(default_factory=_none)
+    unknowns: Array = field(default_factory=lambda: np.empty(0))
+    covariance: Array = field(default_factory=lambda: np.empty(0))
     invisible: tuple[tuple[float | None, float], ...] = ()
     iterations: int = 0
 
