@@ -282,12 +282,16 @@ def with_fixed_cover(
     return settled
 
 
+_NEARER = 0.25  # of the error of one chord, that of another which is right beside it
+
+
 def _chord_speaks_against(
     cable: RoughCable, found: list[RoughCable], fixed: Fixed, travel_px: Array, *, k: int
 ) -> bool:
-    """Whether the chord from where the fixed cover stands is nearer to what log and other photos say than that found.
+    """Whether the chord from where the fixed cover stands is what log and other photos say, and that found is not.
 
-    ``k`` is the place of the cable among those found; one without a displacement tells nothing.
+    Of a camera that came nearer both are off, the first by half as much. ``k`` is the place of the cable among those
+    found; one without a displacement tells nothing.
     """
     others = [i for i in range(len(found)) if i not in fixed.astray and np.isfinite(travel_px[i])]
     if not others or not np.isfinite(travel_px[k]):
@@ -295,4 +299,4 @@ def _chord_speaks_against(
     known = float(np.median(chords_px([found[i] for i in others]) + travel_px[others])) - travel_px[k]
     other = cable.right if fixed.side == "left" else cable.left
     there = float(np.hypot(*np.subtract(other.center_px, fixed.cover.center_px)))
-    return bool(abs(there - known) < abs(float(chords_px([cable])[0]) - known))
+    return bool(abs(there - known) < _NEARER * abs(float(chords_px([cable])[0]) - known))

@@ -138,7 +138,7 @@ def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
     """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of each other kind.
 
     A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
-    Which setting is right may show only when further forms act beside. A kind is a label, a setting, a set of numbers.
+    A kind is a setting, a set of numbers, and a label too unless the forms act together: then others are added beside.
     """
     own = suspicion.of(cause)
     ranked = [int(k) for k in own[descending(suspicion.statistic[own])]]
@@ -147,7 +147,8 @@ def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
     kinds: dict[tuple[object, ...], int] = {}
     for k in ranked:
         form = suspicion.terms[k].variant
-        kinds.setdefault((form.label, form.setting, form.tuned), k)
+        label = "" if suspicion.causes[cause].combines else form.label
+        kinds.setdefault((label, form.setting, form.tuned), k)
     return list(dict.fromkeys([*loud, *kinds.values()]))
 
 

@@ -3,12 +3,11 @@
 A cable of uniform pre-curvature K0 with a law of any form (`fits.laws`), on ideal bearings, the displacement counted
 from the mounted position, loading and unloading with one and the same law. Beside them, with the prior knowledge the
 measurement states: where the bearing axes are on all photos alike, how far the camera is from looking straight down
-through a true lens, the zero from which displacements are counted, the scale of the photos and the length of the
-cable. Every candidate cause is an addition to this.
+through a true lens, the scale of the photos and the length of the cable. Every candidate cause is an addition to this.
 
 Parameters, in this order: the unknowns of the law, K0 (1/m), errors of the axes and of the camera (only if the
-measurement states any of the axes), error of the zero (m), errors of the displacement of single steps (m; only where
-the log scatters, or has none), relative error of the stated px/mm, relative error of the stated length.
+measurement states any of the axes), errors of the displacement of single steps (m; only where the log scatters, or has
+none), relative error of the stated px/mm, relative error of the stated length.
 """
 
 from __future__ import annotations
@@ -38,10 +37,6 @@ degree. Photos that are right to a hundredth of a pixel show that much; it chang
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
 
-ZERO = 2e-5
-"""Standard deviation of the position from which displacements are counted, m: a bearing set against the cable by a dial
-gauge. Where photos tell it to a micrometre, that much of it is no wrong zero."""
-
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
 
@@ -69,8 +64,6 @@ class Base:
         Unknowns of the law and K0 (1/m) as the photos show them by the moment P y.
     straight : bool
         K0 is held at zero (where the machinery starts from the poorest model).
-    pushed : tuple of int
-        Indices of the steps whose displacement is counted from a zero that may be off.
     moved : tuple of int
         Indices of the steps whose displacement is not exact, in rising order.
     moved_std : (k,) m
@@ -90,7 +83,6 @@ class Base:
     axis_std: float = 0.0
     axis_parallax_std: float = 0.0
     camera_foot_std: float = 0.0
-    pushed: tuple[int, ...] = ()
     moved: tuple[int, ...] = ()
     moved_std: Array = field(default_factory=lambda: np.zeros(0))
     moved_first: Array = field(default_factory=lambda: np.zeros(0))
@@ -100,8 +92,7 @@ class Base:
         """Names of the parameters."""
         bend = () if self.straight else ("pre_curvature",)
         moved = (f"{MOVED}{i}" for i in self.moved)
-        zero = ("zero",) if self.pushed else ()
-        return (*(f"stiffness_{i}" for i in range(self.law.size)), *bend, *self.axes, *zero, *moved, "scale", "length")
+        return (*(f"stiffness_{i}" for i in range(self.law.size)), *bend, *self.axes, *moved, "scale", "length")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -119,13 +110,11 @@ class Base:
         return np.asarray(vector[first : first + len(AXES)]) if self.axes else np.zeros(len(AXES))
 
     def shift(self, vector: Array, steps: int) -> Array | float:
-        """Errors (steps,) of the displacements, m; a plain zero where all are exact, or no step is asked for."""
-        if not (steps and (self.pushed or self.moved)):
+        """Errors (steps,) of the displacements, m; a plain zero where all are exact."""
+        if not self.moved:
             return 0.0
-        shift, first = np.zeros(steps), len(self.names) - 2 - len(self.moved)
-        shift[list(self.moved)] = vector[first:-2]
-        if self.pushed:
-            shift[list(self.pushed)] += vector[first - 1]
+        shift = np.zeros(steps)
+        shift[list(self.moved)] = vector[-2 - len(self.moved) : -2]
         return shift
 
     @property
@@ -141,8 +130,6 @@ class Base:
         if self.axes:
             first = self.names.index(self.axes[0])
             rows.extend(self._axis_rows() @ np.eye(size)[first : first + len(self.axes)])
-        if self.pushed:
-            rows.append(np.eye(size)[-3 - len(self.moved)] / ZERO)
         if self.moved:
             rows.extend(np.eye(size)[-2 - len(self.moved) : -2] / self.moved_std[:, None])
         return np.vstack([*rows, np.pad(self.law.prior(), ((0, 0), (0, size - count)))])
@@ -160,19 +147,19 @@ class Base:
     @property
     def known(self) -> int:
         """Number of rows of prior knowledge that are not about the form of the law; they come first."""
-        return 2 + len(self.axes) + bool(self.pushed) + len(self.moved)
+        return 2 + len(self.axes) + len(self.moved)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
-        places = np.full(len(self.axes) + bool(self.pushed) + len(self.moved), 1e-6 * facts.length)
+        places = np.full(len(self.axes) + len(self.moved), 1e-6 * facts.length)
         return np.asarray(np.r_[np.full(self.law.size, 1e-4), bend, places, 1e-6, 1e-6])
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
-        axes_and_zero = np.zeros(len(self.axes) + bool(self.pushed))
-        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes_and_zero, self.moved_first, 0.0, 0.0])
+        axes = np.zeros(len(self.axes))
+        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, 0.0, 0.0])
 
     def as_seen(self) -> Array:
         """Vector of a first guess by the photos alone; the neutral one where they do not tell."""
@@ -271,7 +258,6 @@ def start(
         axis_std=test.axis_std,
         axis_parallax_std=test.axis_parallax_std,
         camera_foot_std=test.camera_foot_std,
-        pushed=() if points else facts.pushed,
         moved=moved,
         moved_std=facts.displacement_std[list(moved)],
         moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),

@@ -117,11 +117,8 @@ def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> 
     bends.at.extend(range(share.shape[1]))
     if (bend := base.pre_curvature_index) is not None:
         bends.by("pre_curvature", bend)
-    first = len(base.names) - 2 - len(base.moved)
-    if base.pushed:
-        bends.travel[list(base.pushed), first - 1] = 1.0
-        bends.at.append(first - 1)
-    for j, step in enumerate(base.moved, start=first):
+    for k, step in enumerate(base.moved):
+        j = len(base.names) - 2 - len(base.moved) + k
         bends.travel[step, j] = 1.0
         bends.at.append(j)
     last = len(base.names) - 1

@@ -241,7 +241,6 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         length_std=1e-3 * plan.length_std_mm / plan.length,
         elements=settings.grid,
         first=plan.pre_curvature,
-        pushed=facts.pushed,
     )
     vector = base.neutral()
     vector[: form.size] = coefficients
