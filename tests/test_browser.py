@@ -70,10 +70,9 @@ def many_rows(result):
     row = index_row(result, ReportSettings())
     hostile = "<img src=x onerror=alert(1)></script>"
     for number in range(MANY):
-        fault = free_text(f"the forces of {hostile} are in mN")
-        faulty = {"usable": False, "fault": fault} if number % 100 == 50 else {}
+        fault = {"usable": False, "fault": free_text(f"forces of {hostile} are in mN")} if number % 100 == 50 else {}
         low = (row.low[0], (2.0 - number / MANY) * row.low[1], row.low[2])
-        yield replace(row, id=f"cable-{number}", type="HV", low=low, report=f"cable-{number}/report.html", **faulty)
+        yield replace(row, id=f"cable-{number}", type="HV", low=low, report=f"cable-{number}/report.html", **fault)
 
 
 @pytest.fixture(scope="session")
@@ -100,6 +99,7 @@ def show(browser):
             browser.get_log(log)
         metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
         browser.get(address)
         opened.append(address)
         return browser
