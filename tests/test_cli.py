@@ -378,7 +378,7 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
         "cablebend: folders more than 3 levels below the one given were not searched (2, first batch/1/2/3/b); "
         "give a folder nearer to them, or raise intake.search_depth.\n"
     )
-    assert "of 2 specimens would run" in done.stdout
+    assert "0 of 2 specimens would run" in done.stdout
     done = call("check", "batch/1", "--set", "intake.search_depth=2")
     assert done.exit_code == 3 and "not searched (2, first batch/1/2/3/b)" in done.stderr
 
@@ -387,6 +387,6 @@ def test_folders_without_description_are_told(cheap):
     (cheap / "batch/b/specimen.toml").unlink()
     done = call("check", "batch")
     assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
-    assert "of 2 specimens would run" in done.stdout
+    assert "0 of 2 specimens would run" in done.stdout
     (cheap / "batch/b").rename(cheap / "batch/b\x1b[2J")
     assert "batch/b\\x1b[2J: has photos" in call("check", "batch").stderr  # a name does not command the terminal
