@@ -155,7 +155,7 @@ class Relaxation:
         """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time, t since the hold began.
 
         With a memory (``width`` 1) it is the changes of the force from hold to hold that decay so, each since its own
-        hold began: a standard linear solid (Findley, Lai and Onaran, 1976, section 5.3).
+        hold began: a standard linear solid, by Boltzmann's superposition.
         """
 
         def left(since: Array) -> Array:
