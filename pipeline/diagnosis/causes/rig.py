@@ -68,8 +68,7 @@ def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:
     if not isinstance(cause, BearingFriction) or not amount > 0.0:
         return ()
     known = SCATTER * amount / cause.plausible(facts)
-    pushed = (k for k, branch in enumerate(facts.branch) if branch != "mounted")
-    return tuple(Variant("differing from step to step", at=float(k), known=known) for k in pushed)
+    return tuple(Variant("differing from step to step", at=float(k), known=known) for k in facts.pushed)
 
 
 @dataclass(frozen=True)
