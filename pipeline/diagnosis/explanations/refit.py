@@ -27,7 +27,7 @@ SHARES = (1.0, 0.3, 0.1)
 SANE = 5.0
 """Plausible sizes: no refit starts from a larger amount, however far the linear model goes."""
 
-OTHER_VALLEY = 0.1
+ELSEWHERE = 0.1
 """Of the curvature scale: a base model whose K0 is so far from what photos show has gone elsewhere."""
 
 
@@ -151,5 +151,5 @@ def _as_seen(added: Addition) -> list[Array]:
     """
     base, facts = added.base.extension.base, added.base.extension.facts
     seen = base.as_seen()
-    apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > OTHER_VALLEY * facts.curvature_scale
+    apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > ELSEWHERE * facts.curvature_scale
     return [added.start(seen)] if apart and len(seen) == len(added.base.vector) else []
