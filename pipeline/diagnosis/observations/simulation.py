@@ -104,12 +104,11 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
     free = [i for i in mounted if displacement[i] == 0.0 and at_rest]
     pulled = [i for i in mounted if i not in free and displacement[i] < 0.0]
     pressed = [i for i in mounted if i not in free and displacement[i] >= 0.0]
-    pushed = [i for i in range(len(facts.branch)) if i not in mounted]
     groups: list[tuple[list[int], Branch, bool]] = [
         (free, "natural", True),
         (pulled, "natural", False),
         (pressed, facts.rest_side, False),
-        (pushed, "up", False),
+        ([*facts.pushed], "up", False),
     ]
     return [group for group in groups if group[0]]
 
