@@ -14,7 +14,9 @@ from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.fits import ordinary
 from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
@@ -75,10 +77,12 @@ def diagnose(
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
     faults, bench, conclusion = concluded(faults, bench, settings)
-    part = present(bench, conclusion, settings, identified=known)
+    rig = _rig_off(bench, conclusion)
+    part = present(bench, conclusion, settings, identified=known, shown=rig)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     large = too_large(bench, conclusion) if part.verdict == "unexplained" else ()
-    return Diagnosed(part, (*faults.findings, *large, *search_ended(conclusion)), faults)
+    off = () if rig is None else ordinary.told(rig)
+    return Diagnosed(part, (*faults.findings, *large, *off, *search_ended(conclusion)), faults)
 
 
 def _not_to_be_compared(
@@ -130,8 +134,15 @@ def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> 
 
 def _scatter(bench: Workbench, conclusion: Conclusion) -> tuple[float, float]:
     """Probability that displacements scatter beyond the log beside what was concluded, and by how much if so (m)."""
-    fitted = bench.base if conclusion.accepted is None else conclusion.accepted.fitted
-    return weighed(conclusion.grid.plain, fitted).own.moved
+    return weighed(conclusion.grid.plain, conclusion.fitted(bench)).own.moved
+
+
+def _rig_off(bench: Workbench, conclusion: Conclusion) -> Fit | None:
+    """What was concluded beside a rig as far off as every rig is, where that is likelier than an exact one."""
+    fitted = conclusion.fitted(bench)
+    if conclusion.unmodelled or weighed(conclusion.grid.plain, fitted).own.rig < 0.5:
+        return None
+    return ordinary.beside_ordinary_rig(bench.observation, fitted, bench.suspicion)
 
 
 def _told(correction: ForceCorrection) -> ForceCorrectionPart:

@@ -179,6 +179,10 @@ class LensDistortion:
         return model.observed(seen_through(move))
 
 
+LEAN = 0.1
+"""Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
+
+
 @dataclass(frozen=True)
 class CameraTilt:
     """``camera_tilt``: the camera does not look straight down."""
@@ -197,12 +201,17 @@ class CameraTilt:
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Tilt along and across the chord, each without and with what it foreshortens, seen from ``width`` (m)."""
-        plain = (Variant("along the chord", at=0.0), Variant("across the chord", at=1.0))
+        lean = LEAN * tilt_of(facts.length)
+        plain = (
+            Variant("along the chord", at=0.0, ordinary=lean),
+            Variant("across the chord", at=1.0, ordinary=lean),
+        )
         labels = ("along the chord, and foreshortened", "across the chord, and foreshortened")
         steep = tuple(
             replace(
                 form,
                 label=label,
+                ordinary=0.0,
                 width=DISTANCES[1] * facts.length,
                 tuned=("width",),
                 width_range=(DISTANCES[0] * facts.length, DISTANCES[-1] * facts.length),

@@ -40,6 +40,9 @@ class Variant:
     known : float
         Multiple of the usual amount that is the standard deviation of what is known of the amount beforehand; infinite
         where nothing is.
+    ordinary : float
+        Standard deviation, in the unit of the cause, of what every rig has of it because nobody sets or measures it
+        better. So much is among the errors of the data, and is not named.
     """
 
     label: str = ""
@@ -53,6 +56,7 @@ class Variant:
     power: float = 1.0
     known: float = np.inf
     of_law: bool = False
+    ordinary: float = 0.0
 
     @property
     def has_place(self) -> bool:

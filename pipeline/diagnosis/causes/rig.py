@@ -154,6 +154,14 @@ class RigCompliance:
         return replace(model, bending=replace(model.bending, compliance=model.bending.compliance + amount))
 
 
+ZERO = 2e-5
+"""Of a displacement, m: who sets a dial or a spindle to zero by eye or by the first force does so to a few hundredths
+of a millimetre."""
+
+MEASURED = 1e-3
+"""Of a length: a cable is cut and measured with a steel rule, 0.3 mm of 300."""
+
+
 @dataclass(frozen=True)
 class DisplacementOffset:
     """``displacement_offset``: the zero of the displacement is wrong."""
@@ -172,8 +180,10 @@ class DisplacementOffset:
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Of the pushed steps, and where there is a mounted step, of that one too."""
-        pushed = Variant("between the mounted position and the first step")
-        return (pushed, Variant("at every step", at=1.0)) if "mounted" in facts.branch else PLAIN
+        if "mounted" not in facts.branch:
+            return (Variant(ordinary=ZERO),)
+        pushed = Variant("between the mounted position and the first step", ordinary=ZERO)
+        return (pushed, Variant("at every step", at=1.0, ordinary=ZERO))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to the displacements."""
@@ -199,7 +209,7 @@ class LengthError:
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """One form."""
-        return PLAIN
+        return (Variant(ordinary=MEASURED),)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Shorten the cable by ``1 + amount``; less than a tenth of a cable is never stated (a slip of the point)."""

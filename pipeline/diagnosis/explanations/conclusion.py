@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnosis.explanations.search import Search
+from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation
@@ -40,6 +41,10 @@ class Conclusion:
     classes: tuple[tuple[int, ...], ...]
     unmodelled: bool
     curtailed: bool = False
+
+    def fitted(self, bench: Workbench) -> Fit:
+        """The model that was concluded: extended where something was accepted, else the base model."""
+        return bench.base if self.accepted is None else self.accepted.fitted
 
     @property
     def singles(self) -> list[Explanation]:

@@ -26,14 +26,13 @@ from pipeline.diagnosis.explanations.pair_fits import (
     with_all_forms,
 )
 from pipeline.diagnosis.explanations.single_cause import refit_one
-from pipeline.diagnosis.fits.displacements import displacement_columns
 from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
-from pipeline.diagnosis.posterior.weigh import refitted, weighed
+from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
 from pipeline.diagnosis.statistics.pairs import Pair
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -59,8 +58,7 @@ class Search:
 
     def __init__(self, bench: Workbench, settings: DiagnosisSettings) -> None:
         self.bench, self.settings, self.effort = bench, settings, TO_THE_END
-        displacements = displacement_columns(bench.observation, bench.base)
-        self.grid: ErrorGrid = error_grid(bench.observation, bench.facts, displacements)
+        self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
         first = weighed(self.grid, bench.base, bench.suspicion)
         self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]

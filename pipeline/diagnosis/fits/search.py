@@ -19,7 +19,7 @@ from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.sensitivities import whole_residual
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
+from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score, span
 
 Array = NDArray[np.float64]
 
@@ -104,6 +104,25 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
     scores = score(fitted.residual, fitted.jacobian, table, visible=VISIBLE)
     sign = np.array([float(term.cause.sign) for term in terms])
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
+
+
+def ordinary(suspicion: Suspicion) -> Array:
+    """Whitened traces (N, r) of what every rig has a little of, each one standard deviation of it."""
+    size = np.array([term.variant.ordinary for term in suspicion.terms])
+    return np.asarray(suspicion.columns[:, size > 0.0] * size[size > 0.0])
+
+
+def taken_by_rig(unit: Array, fitted: Fit, suspicion: Suspicion) -> tuple[Array, float]:
+    """What a rig that is off by what every rig is takes of scores along directions (N, k): of their squares (k,).
+
+    ``unit`` are orthogonal to the sensitivities of the fit, as those of `Scores`. With it the log of how much better
+    the data know the rig than anybody did beforehand, which its evidence pays.
+    """
+    rig, basis = ordinary(suspicion), span(fitted.jacobian)
+    rig = rig - basis @ (basis.T @ rig)
+    along, known = unit.T @ rig, np.eye(rig.shape[1]) + rig.T @ rig
+    share = np.einsum("kr,rk->k", along, np.linalg.solve(known, along.T))
+    return np.asarray(share), 0.5 * float(np.linalg.slogdet(known)[1])
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:

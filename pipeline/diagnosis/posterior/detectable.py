@@ -1,4 +1,7 @@
-"""How large a cause must be to be found: to be likelier than the base model, with a stated power."""
+"""How large a cause must be to be found: to be likelier than the base model, with a stated power.
+
+So large beside a rig whose zero, length and camera are off by what they ordinarily are.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,9 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 
 from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction
+from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction, taken_by_rig
 from pipeline.diagnosis.observations.observation import Observation
+from pipeline.diagnosis.posterior.error_grid import MOVED
 from pipeline.diagnosis.posterior.evidence import log_gain
 from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.diagnosis.statistics.score import span
@@ -17,7 +21,9 @@ LOUDEST = 40.0
 """Standard deviations: what is not found at that size, ten times the plausible one being less, is found at none."""
 
 
-def sigma_needed(plausible: float, *, forms: int, causes: int, sign: int, power: float) -> float:
+def sigma_needed(
+    plausible: float, *, forms: int, causes: int, sign: int, power: float, rig: tuple[float, float] = (0.0, 0.0)
+) -> float:
     """Size of an effect (standard deviations) that makes one cause likelier than the base model with a power.
 
     Parameters
@@ -30,11 +36,16 @@ def sigma_needed(plausible: float, *, forms: int, causes: int, sign: int, power:
         0 where the amount may have either.
     power : float
         Probability at which it is so.
+    rig : (share, log)
+        What a rig that is off by what every rig is takes of the effect's square, and what its evidence pays
+        (`pipeline.diagnosis.fits.search.taken_by_rig`).
     """
     needed = np.log(SHARES[0][0] / SHARES[1][0] * forms * causes)
+    off = np.log(MOVED[0.0, 1.0] / MOVED[0.0, 0.0])
 
     def short(z: float) -> float:
-        return float(needed - log_gain(z, 1.0, plausible, abs(sign))[0])
+        taken = np.logaddexp(0.0, off + 0.5 * rig[0] * z * z - rig[1])
+        return float(needed + taken - log_gain(z, 1.0, plausible, abs(sign))[0])
 
     if short(LOUDEST) > 0.0:
         return np.inf
@@ -50,12 +61,14 @@ def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float)
     """
     terms, scores, kind = suspicion.terms, suspicion.scores, suspicion.causes[cause]
     plausible, own, found = kind.plausible(fitted.extension.facts), suspicion.of(cause), {}
-    for k in map(int, own):
+    taken, volume = taken_by_rig(scores.unit[:, own], fitted, suspicion)
+    for k, share in zip(map(int, own), map(float, taken), strict=True):
         variant, norm = terms[k].variant, float(scores.norm[k])
         if variant.trace != 1.0 and variant.power == 1.0:
             continue
         forms, causes = len(own), len(set(suspicion.owner.tolist()))
-        needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=kind.sign, power=power)
+        rig = (share, volume)
+        needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=kind.sign, power=power, rig=rig)
         at = TRACE * variant.trace * plausible
         amount = at * (needed / (norm * at)) ** (1.0 / variant.power) if norm > 0.0 else np.inf
         found[k] = float(amount) if amount <= POSSIBLE * plausible else np.inf
@@ -90,7 +103,9 @@ def detectable_amount(
     plausible = suspicion.causes[cause].plausible(fitted.extension.facts)
     forms, causes = len(suspicion.of(cause)), len(set(suspicion.owner.tolist()))
     sign = suspicion.causes[cause].sign
-    needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=sign, power=power)
+    share, volume = taken_by_rig(suspicion.scores.unit[:, [best]], fitted, suspicion)
+    rig = (float(share[0]), volume)
+    needed = sigma_needed(plausible * norm, forms=forms, causes=causes, sign=sign, power=power, rig=rig)
     amount, at = needed / norm, TRACE * plausible
     basis = span(fitted.jacobian)
     for _ in range(3):

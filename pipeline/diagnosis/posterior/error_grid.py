@@ -6,6 +6,7 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
     waves     errors of each photo along the cable, rough ones as below, none or up to the scatter of a section
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
+    rig       zero of displacement, length and lean of the camera as exact as told, or as rigs commonly have them
     shapes    something else in the shapes, a share of the length across the cable
     forces    something else in the forces, a share of the largest
 
@@ -20,7 +21,9 @@ In whitened rows the covariance is
     C = 1 + (slow^2 - 1) E + shapes^2 D       in the photos (E: slow errors and axes),
     C = 1 + hold^2 + forces^2 D'              for the means of the holds; what varies within a hold is as whitened,
 
-and displacements are further unknowns, known to ``moved``. Along the eigenvectors of D all other sizes cost a sum.
+and displacements are further unknowns, known to ``moved``, as are the forms of causes that every rig has a little of
+(`pipeline.diagnosis.causes.cause.Variant.ordinary`): too little to be named. Along the eigenvectors of D all other
+sizes cost a sum.
 Notation of the products: G grid points, o own columns, k added ones.
 """
 
@@ -44,7 +47,7 @@ Forms = Callable[[Array], Array]
 
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
-MOVED = {0.0: 0.6, 1e-5: 0.3, 5e-5: 0.1}
+MOVED = {(0.0, 0.0): 0.4, (0.0, 1.0): 0.25, (1e-5, 0.0): 0.25, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
 several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen."""
 
@@ -109,8 +112,8 @@ class Products:
         Probability of the error model, given whether there is something else.
     rest : (G,) bool
         Whether there is something else.
-    moved : (G,) m
-        Scatter of the displacements.
+    scales : (G, m + r)
+        Sizes of errors of the displacements (m) and of the rig.
     sizes : (G, 5)
         Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, `SHAPES` and `FORCES`.
     """
@@ -121,7 +124,7 @@ class Products:
     log_det: Array
     log_prior: Array
     rest: NDArray[np.bool_]
-    moved: Array
+    scales: Array
     sizes: NDArray[np.int_]
 
 
@@ -141,6 +144,8 @@ class ErrorGrid:
         Those of noise alone come first.
     displacements : (N, m)
         Whitened sensitivities to the displacements, per m.
+    rig : (N, r)
+        To what every rig has a little of, per standard deviation of it.
     """
 
     photos: NDArray[np.int_]
@@ -149,6 +154,12 @@ class ErrorGrid:
     log_det: Array
     kinds: tuple[Kind, ...]
     displacements: Array
+    rig: Array
+
+    @property
+    def beside(self) -> Array:
+        """Displacements and the rig (N, m + r)."""
+        return np.hstack([self.displacements, self.rig])
 
     @property
     def plain(self) -> ErrorGrid:
@@ -157,8 +168,9 @@ class ErrorGrid:
 
     def products(self, columns: Array, known: Array, added: Array) -> Products:
         """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k)."""
-        whole = np.hstack([columns, self.displacements[: len(columns)], added])
-        extra, count = self.displacements.shape[1], added.shape[1]
+        beside = self.beside[: len(columns)]
+        whole = np.hstack([columns, beside, added])
+        extra, count = beside.shape[1], added.shape[1]
         own, force = columns.shape[1] + extra, whole[self.forces]
         prior = np.zeros((own, own))
         prior[: own - extra, : own - extra] = known.T @ known
@@ -190,10 +202,10 @@ class ErrorGrid:
             log_det=np.concatenate(log_det),
             log_prior=np.concatenate(log_prior),
             rest=np.array([not kind.noise for kind in self.kinds])[positions[:, 1]],
-            moved=np.zeros(grid),
+            scales=np.zeros((grid, extra)),
             sizes=positions,
         )
-        return _with_displacements(found, extra) if extra else found
+        return _with_rig(found, self.displacements.shape[1], self.rig.shape[1])
 
     def something_else(self, position: NDArray[np.int_], rows: Array) -> Array:
         """What is likeliest of whitened rows (N,) to be something else, as large as an error model (5,) says."""
@@ -226,12 +238,13 @@ def _sums(rows: Array, own: int) -> Array:
     return np.concatenate([both[:, :own].ravel(), both[:, own:].ravel(), np.sum(rows[:, own:] ** 2, axis=0)])
 
 
-def _with_displacements(fixed: Products, extra: int) -> Products:
-    """The products with displacements that scatter by each of `MOVED`, in units of it."""
+def _with_rig(fixed: Products, displacements: int, rig: int) -> Products:
+    """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it."""
+    sizes = np.array([*MOVED])
+    extra, times = displacements + rig, len(sizes)
     count = fixed.own.shape[1] - extra
     known = np.diag(np.r_[np.zeros(count), np.ones(extra)])
-    scales, times = np.ones((len(MOVED), count + extra)), len(MOVED)
-    scales[:, count:] = np.array([*MOVED])[:, None]
+    scales = np.hstack([np.ones((times, count)), np.repeat(sizes, (displacements, rig), axis=1)])
     by, models = scales[:, None, :, None], times * len(fixed.log_det)
     return Products(
         own=(fixed.own * (by * scales[:, None, None]) + known).reshape(models, *fixed.own.shape[1:]),
@@ -240,12 +253,12 @@ def _with_displacements(fixed: Products, extra: int) -> Products:
         log_det=np.tile(fixed.log_det, times),
         log_prior=np.concatenate([fixed.log_prior + np.log(chance) for chance in MOVED.values()]),
         rest=np.tile(fixed.rest, times),
-        moved=np.repeat([*MOVED], len(fixed.log_det)),
+        scales=np.repeat(scales[:, count:], len(fixed.log_det), axis=0),
         sizes=np.tile(fixed.sizes, (times, 1)),
     )
 
 
-def error_grid(observation: Observation, facts: Facts, displacements: Array) -> ErrorGrid:
+def error_grid(observation: Observation, facts: Facts, displacements: Array, rig: Array) -> ErrorGrid:
     """The error models of an observation.
 
     Parameters
@@ -254,6 +267,8 @@ def error_grid(observation: Observation, facts: Facts, displacements: Array) -> 
     facts : Facts
     displacements : (N, m)
         Whitened sensitivities to displacements that may scatter, per m; ``m`` may be 0.
+    rig : (N, r)
+        To what every rig has a little of, per standard deviation of it; ``r`` may be 0.
     """
     rows, count = observation.rows, len(facts.branch)
     forces, photos = np.flatnonzero(rows.force), np.flatnonzero(~rows.force)
@@ -280,7 +295,7 @@ def error_grid(observation: Observation, facts: Facts, displacements: Array) -> 
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
         kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
-    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), displacements)
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), displacements, rig)
 
 
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:

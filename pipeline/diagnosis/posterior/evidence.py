@@ -47,12 +47,14 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 class Evidence(NamedTuple):
     """Log probability of the data, by the model alone (``plain``) and with something else besides (``rest``).
 
-    ``moved``: probability that displacements scatter beyond the log, without something else, and by how much if so (m).
+    Without something else: ``moved``: probability that displacements scatter beyond the log, and by how much if so (m);
+    ``rig``: probability that zero, length and camera are off by what they ordinarily are.
     """
 
     plain: float
     rest: float
     moved: tuple[float, float]
+    rig: float
 
 
 class WithColumn(NamedTuple):
@@ -106,8 +108,10 @@ def evidence(
     posterior = own + prior
     plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
     further = (_total(added[part] + prior[part, None]) for part in (~rest, rest))
-    moved = _moved(solved.products.moved[~rest], posterior[~rest])
-    return Evidence(float(plain), float(disturbed), moved), WithColumn(*further)
+    weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
+    moved = _moved(scales[:, 0], weight) if grid.displacements.shape[1] else (0.0, 0.0)
+    rig = float(weight @ (scales[:, -1] > 0.0)) if grid.rig.shape[1] else 0.0
+    return Evidence(float(plain), float(disturbed), moved, rig), WithColumn(*further)
 
 
 def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
@@ -117,7 +121,7 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     best = int(np.argmax(weight))
     size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
     move = solved.moves(solved.products.own[:, 1:, :1])[best, :, 0]
-    moved = grid.displacements[:data] @ (solved.products.moved[best] * move[size:])
+    moved = grid.beside[:data] @ (solved.products.scales[best] * move[size:])
     left = fitted.residual[:data] - fitted.jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)
 
@@ -154,8 +158,7 @@ def _total(logs: Array) -> Array:
     return log_sum(logs) if len(logs) else np.full(logs.shape[1:], -np.inf)
 
 
-def _moved(scatter: Array, log_weight: Array) -> tuple[float, float]:
-    weight = np.exp(log_weight - log_sum(log_weight))
+def _moved(scatter: Array, weight: Array) -> tuple[float, float]:
     chance = float(weight[scatter > 0.0].sum())
     return chance, float(np.sqrt(weight @ scatter**2 / chance)) if chance > 0.0 else 0.0
 

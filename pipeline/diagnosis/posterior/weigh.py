@@ -7,13 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.fits.displacements import displacement_columns
 from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.fits.search import Suspicion, ordinary
+from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Facts
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.evidence import Evidence, evidence
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+
+
+def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
+    """All error models of a test, about its base model."""
+    displacements = displacement_columns(observation, base)
+    return error_grid(observation, base.extension.facts, displacements, ordinary(suspicion))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from pipeline.result import LeftoverPart
 
 def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     """What is likeliest to be something else."""
-    observation, fitted = bench.observation, bench.base if conclusion.accepted is None else conclusion.accepted.fitted
+    observation, fitted = bench.observation, conclusion.fitted(bench)
     field = something_else(conclusion.grid, fitted)
     found = whereabouts(observation, field)
     step = bench.test.steps[found.step]

@@ -36,9 +36,18 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 
 
 def present(
-    bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, identified: Curve | None = None
+    bench: Workbench,
+    conclusion: Conclusion,
+    settings: DiagnosisSettings,
+    *,
+    identified: Curve | None = None,
+    shown: Fit | None = None,
 ) -> DiagnosisPart:
-    """Fill the part of the result; ``identified`` is f_EI before the diagnosis, which people compare with."""
+    """Fill the part of the result.
+
+    ``identified`` is f_EI before the diagnosis, which people compare with; ``shown`` what was concluded, beside a rig
+    as far off as every rig is, whose residuals are shown.
+    """
     accepted = conclusion.accepted
     gain = None if accepted is None else measured_gain(bench, accepted.fitted, settings)
     rows = table(bench, conclusion, settings, gain=gain)
@@ -78,6 +87,7 @@ def present(
         left=leftover.said,
     )
     photos, forces = left_out(bench)
+    before = bench.base if shown is None or accepted else shown
     spots = blind_spots(bench, seen, settings)
     return DiagnosisPart(
         verdict=word,
@@ -93,8 +103,8 @@ def present(
         extended_refuted=refuted,
         widening=wider if extended is None or refuted else None,
         leftover=leftover,
-        residuals_before=residual_map(bench.test, bench.observation, bench.base),
-        residuals_after=residual_map(bench.test, bench.observation, accepted.fitted) if accepted else None,
+        residuals_before=residual_map(bench.test, bench.observation, before),
+        residuals_after=residual_map(bench.test, bench.observation, shown or accepted.fitted) if accepted else None,
         twins=confusable(bench, conclusion),
         left_out_photos=photos,
         left_out_forces=forces,

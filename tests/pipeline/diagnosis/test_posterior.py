@@ -52,8 +52,7 @@ def test_products_are_those_of_dense_covariances(bench, grid):
     found = grid.products(own, known, added)
     for k in rng.choice(len(found.log_det), 12, replace=False):
         dense = covariance(grid, found.sizes[k])
-        scale = np.diag(np.r_[np.ones(3), np.full(grid.displacements.shape[1], found.moved[k])])
-        rows = np.hstack([own, grid.displacements[:count]]) @ scale
+        rows = np.hstack([own, np.hstack([grid.displacements, grid.rig])[:count] * found.scales[k]])
         expected = rows.T @ np.linalg.solve(dense, rows)
         expected[:3, :3] += known.T @ known
         expected[3:, 3:] += np.eye(len(expected) - 3)
@@ -75,7 +74,8 @@ def test_probabilities_of_error_models_sum_to_one(bench, grid):
 def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sign):
     """Ratio of two evidences, as the mean over prior sizes of an integral over the amount, by quadrature."""
     rng = np.random.default_rng(2)
-    plain = replace(grid.plain, displacements=np.zeros((len(bench.base.residual), 0)))
+    none = np.zeros((len(bench.base.residual), 0))
+    plain = replace(grid.plain, displacements=none, rig=none)
     term = next(t for t in bench.suspicion.terms if t.cause.sign == sign and bench.suspicion.scores.norm.max() > 0.0)
     k = bench.suspicion.terms.index(term)
     column, plausible = bench.suspicion.columns[:, k], term.cause.plausible(bench.facts)
@@ -101,7 +101,7 @@ def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sig
 def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
     """Two data sets under wide priors: the difference of evidences is that of dense normal log densities."""
     rows, J = bench.observation.rows.count, bench.base.jacobian
-    one = replace(grid.plain, displacements=np.zeros((len(J), 0)))
+    one = replace(grid.plain, displacements=np.zeros((len(J), 0)), rig=np.zeros((len(J), 0)))
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
     prior = J[rows:].T @ J[rows:] + weak.T @ weak
     spread, found, dense = J[:rows] @ np.linalg.solve(prior, J[:rows].T), [], []

@@ -1,0 +1,54 @@
+"""A rig that is off by what every rig is: zero of displacement, length and camera beside a fitted model.
+
+So much is among the errors of the data (`pipeline.diagnosis.posterior.error_grid`) and is named by nobody. Where it is
+likelier than an exact rig, residuals are shown beside it, and the reader is told its size.
+
+Code: ``rig/ordinary``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.diagnosis.fits.extension import Term
+from pipeline.diagnosis.fits.fit import Fit, fit_from
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.observations.observation import Observation
+from pipeline.messages import Message, word
+from pipeline.records import Finding, inferred
+
+
+def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspicion) -> Fit | None:
+    """A model fitted with what every rig has a little of, known to that; None where it has no equilibrium."""
+    extension = fitted.extension
+    present = {term.cause.name for term in extension.terms}
+    terms = tuple(
+        _known_to(term, term.variant.ordinary / term.cause.plausible(extension.facts))
+        for term in suspicion.terms
+        if term.variant.ordinary > 0.0 and term.cause.name not in present
+    )
+    wider = replace(extension, terms=(*extension.terms, *terms))
+    found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
+    return None if found.run.prediction is None else found
+
+
+def _known_to(term: Term, known: float) -> Term:
+    """The same form, its amount known beforehand to so many usual amounts."""
+    return Term(term.cause, replace(term.variant, known=known))
+
+
+SEEN = 2.0
+"""Standard deviations from zero at which an amount is told."""
+
+
+def told(found: Fit) -> tuple[Finding, ...]:
+    """What a rig is off by, as far as the data show it."""
+    parts = []
+    for k, term in enumerate(found.extension.terms):
+        amount, std = found.amount(k)
+        if np.isfinite(term.variant.known) and term.variant.ordinary > 0.0 and abs(amount) > SEEN * std:
+            size = (amount, std, term.cause.unit)
+            parts.append(Message("rig/ordinary.part", cause=word(term.cause.name), size=size))
+    return (inferred("rig/ordinary", parts=parts),) if parts else ()

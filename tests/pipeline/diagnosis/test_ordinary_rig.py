@@ -1,0 +1,48 @@
+"""A rig as laboratories have it: zero, length and camera a little off. Nothing is named then, and the reader is told."""
+
+import re
+
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.effects import LARGEST
+from fixtures.hidden import LOOP, SIX, Reading, hidden_test
+from pipeline.diagnosis.causes.camera import tilt_of
+from pipeline.diagnosis.diagnose import diagnose
+from pipeline.faults import faults_of_input
+from pipeline.settings.diagnosis import DiagnosisSettings
+
+LEAN = 0.12 * tilt_of(Cable().length)
+"""A quarter of a degree."""
+
+
+def diagnosed(protocol, seed, *, zero=-2.5e-5, **cable):
+    """The verdict, the names and the findings of a rig that is off as rigs are."""
+    reading = Reading(play=zero, length_error=1.5e-3, tilt=(LEAN, -LEAN))
+    test = hidden_test(Cable(**cable), protocol, largest=LARGEST, seed=seed, reading=reading)
+    part, findings, _ = diagnose(faults_of_input(test), None, DiagnosisSettings())
+    return part, {finding.code: finding.message for finding in findings}
+
+
+@pytest.mark.parametrize(("protocol", "seed"), [(SIX, 51), (LOOP, 52)], ids=["six", "loop"])
+def test_nothing_is_named_where_a_rig_is_off_as_rigs_are(protocol, seed):
+    part, told = diagnosed(protocol, seed)
+    assert part.verdict == "adequate" and not part.causes
+    size = re.search(r"displacement offset by −(\S+) ± (\S+)\sµm", told["rig/ordinary"])
+    assert size is not None
+    zero, std = map(float, size.groups())
+    assert abs(zero - 25.0) < 3.0 * std < 25.0
+
+
+def test_a_cause_is_named_beside_such_a_rig_and_the_rig_is_not():
+    part, told = diagnosed(LOOP, 53, bearing_friction=0.004)
+    assert part.verdict == "named" and [cause.name for cause in part.causes] == ["bearing_friction"]
+    assert part.causes[0].estimate == pytest.approx(0.004, rel=0.1)
+    assert "rig/ordinary" in told
+
+
+def test_a_zero_that_is_lost_is_named_on_such_a_rig():
+    part, _ = diagnosed(SIX, 54, zero=2.5e-4)
+    assert [cause.name for cause in part.causes] == ["displacement_offset"]
+    # the rest of the rig is off as well: its share of the zero is in the band
+    assert abs(part.causes[0].estimate - 2.5e-4) < 0.2 * 2.5e-4
