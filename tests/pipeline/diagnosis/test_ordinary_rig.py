@@ -1,4 +1,4 @@
-"""A rig as laboratories have it: zero, length and camera a little off. Nothing is named then, and the reader is told."""
+"""A rig as laboratories have it: zero, length and camera a little off. Nothing is named then, and the reader told."""
 
 import re
 
