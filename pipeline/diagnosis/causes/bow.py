@@ -12,11 +12,11 @@ bow is seen as sqrt(y^2 - h^2).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 
 SOFT = 8
@@ -29,17 +29,14 @@ NEAR = (0.1, 1.0)
 """Length over the distance of a near camera, least and most: below, no bow stands up far enough to be seen larger."""
 
 
-@dataclass(frozen=True)
-class OutOfPlaneBow:
+class OutOfPlaneBow(Cause):
     """``out_of_plane_bow``: the cable rises from the plane of the picture between the bearings."""
 
-    name: str = "out_of_plane_bow"
-    unit: str = "m"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "cable"
+    name = "out_of_plane_bow"
+    unit = "m"
+    sign = 1
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """A sixth of the bow: a lean of ten degrees."""

@@ -15,12 +15,12 @@ percent at 6 degrees, fifty times what a photo shows. A tilt that large has the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
@@ -123,50 +123,33 @@ def axes_off(errors: Array) -> Observer:
     return observer
 
 
-@dataclass(frozen=True)
-class ScaleError:
+class ScaleError(Cause):
     """``scale_error``: the stated px/mm is not the true one."""
 
-    name: str = "scale_error"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "camera"
+    name = "scale_error"
+    unit = "-"
+    seat = "camera"
 
     def plausible(self, facts: Facts) -> float:
         """One percent: a scale read from a ruler one cable radius off the plane."""
         return 0.01
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Everything the camera sees shrinks by ``1 + amount``."""
         return model.observed(scaled(amount))
 
 
-@dataclass(frozen=True)
-class LensDistortion:
+class LensDistortion(Cause):
     """``lens_distortion``: radial distortion left in the photos."""
 
-    name: str = "lens_distortion"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "camera"
+    name = "lens_distortion"
+    unit = "-"
+    limited = True
+    seat = "camera"
 
     def plausible(self, facts: Facts) -> float:
         """One percent at half the diagonal: a common zoom lens."""
         return DISTORTED
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Points move out by ``amount`` times the cube of their distance from the centre."""
@@ -183,17 +166,14 @@ LEAN = 0.1
 """Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
 
 
-@dataclass(frozen=True)
-class CameraTilt:
+class CameraTilt(Cause):
     """``camera_tilt``: the camera does not look straight down."""
 
-    name: str = "camera_tilt"
-    unit: str = "1/m"
-    sign: int = 0
-    combines: bool = True
-    additive: bool = False
-    limited: bool = True
-    seat: str = "camera"
+    name = "camera_tilt"
+    unit = "1/m"
+    combines = True
+    limited = True
+    seat = "camera"
 
     def plausible(self, facts: Facts) -> float:
         """Two degrees seen from twice the cable's length."""

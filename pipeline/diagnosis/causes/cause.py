@@ -6,8 +6,9 @@ cause, such as the place of a soft spot or a relaxation time. ``amount = 0`` lea
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -85,7 +86,8 @@ class Variant:
 PLAIN = (Variant(),)
 
 
-class Cause(Protocol):
+@dataclass(frozen=True)
+class Cause(ABC):
     """A candidate for what the simulation gets wrong.
 
     Attributes
@@ -94,6 +96,9 @@ class Cause(Protocol):
         Of the contract's table.
     unit : str
         Of the amount.
+    seat : str
+        Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first
+        kind only.
     sign : int
         1 if the amount cannot be negative, 0 if it can.
     combines : bool
@@ -103,44 +108,24 @@ class Cause(Protocol):
     limited : bool
         Whether many times the plausible amount cannot be. A number typed wrongly, a zero never set, a bearing that has
         seized, a heavy or patched cable may be off by any amount.
-    seat : str
-        Where it sits: ``cable``, ``rig``, ``load cell`` or ``camera``. Turning the cable end for end turns the first
-        kind only.
     """
 
-    @property
-    def name(self) -> str:
-        """Of the contract's table."""
+    name: ClassVar[str]
+    unit: ClassVar[str]
+    seat: ClassVar[str]
+    sign: ClassVar[int] = 0
+    combines: ClassVar[bool] = False
+    additive: ClassVar[bool] = False
+    limited: ClassVar[bool] = False
 
-    @property
-    def unit(self) -> str:
-        """Of the amount."""
-
-    @property
-    def sign(self) -> int:
-        """1 if the amount cannot be negative."""
-
-    @property
-    def combines(self) -> bool:
-        """Whether forms may act together."""
-
-    @property
-    def additive(self) -> bool:
-        """Whether their amounts add up."""
-
-    @property
-    def limited(self) -> bool:
-        """Whether many times the plausible amount cannot be."""
-
-    @property
-    def seat(self) -> str:
-        """Where it sits."""
-
+    @abstractmethod
     def plausible(self, facts: Facts) -> float:
         """Size (positive, in `unit`) that would surprise nobody on such a rig."""
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Forms to be tried; empty where the data cannot show the cause at all."""
+        """Forms to be tried, one unless there are several; empty where the data cannot show the cause at all."""
+        return PLAIN
 
+    @abstractmethod
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The model with the cause in it."""

@@ -11,12 +11,12 @@ Where nothing but the cable resists, moments multiplied alike multiply the force
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import Variant
+from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from rod.section import InternalFriction
 
@@ -26,17 +26,13 @@ LAW = "nonlinear_stiffness"
 """Name of the cause that is no second one beside another: a further control point of the law is a finer base."""
 
 
-@dataclass(frozen=True)
-class NonlinearStiffness:
+class NonlinearStiffness(Cause):
     """``nonlinear_stiffness``: the bending stiffness depends on curvature in another way than the model's."""
 
-    name: str = LAW
-    unit: str = "N m^2"
-    sign: int = 0
-    combines: bool = True
-    additive: bool = False
-    limited: bool = False
-    seat: str = "cable"
+    name = LAW
+    unit = "N m^2"
+    combines = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent of the stiffness."""
@@ -51,17 +47,16 @@ class NonlinearStiffness:
         return model
 
 
-@dataclass(frozen=True)
-class Hysteresis:
+class Hysteresis(Cause):
     """``hysteresis``: friction between the wires."""
 
-    name: str = "hysteresis"
-    unit: str = "N m"
-    sign: int = 1
-    combines: bool = True
-    additive: bool = True
-    limited: bool = True
-    seat: str = "cable"
+    name = "hysteresis"
+    unit = "N m"
+    sign = 1
+    combines = True
+    additive = True
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """A tenth of the largest moment."""
@@ -100,17 +95,14 @@ FORMS = (
 """How K0 grows: where the cable bends, by ``at`` 0 and 1; or by the largest bend anywhere."""
 
 
-@dataclass(frozen=True)
-class PlasticSet:
+class PlasticSet(Cause):
     """``plastic_set``: K0 grows with the largest curvature reached."""
 
-    name: str = "plastic_set"
-    unit: str = "1/m per 1/m"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "cable"
+    name = "plastic_set"
+    unit = "1/m per 1/m"
+    sign = 1
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """A twentieth of the curvature stays."""
@@ -142,17 +134,13 @@ class PlasticSet:
         return replace(model, bending=grows)
 
 
-@dataclass(frozen=True)
-class StiffnessDrift:
+class StiffnessDrift(Cause):
     """``stiffness_drift``: the stiffness changes from step to step."""
 
-    name: str = "stiffness_drift"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "cable"
+    name = "stiffness_drift"
+    unit = "-"
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent over the test: a plastic sheath that warms up by one or two kelvin."""

@@ -11,12 +11,12 @@ Relaxation belongs to the cable, but as it scales moments everywhere alike it ch
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import PLAIN, Variant
+from pipeline.diagnosis.causes.cause import PLAIN, Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
@@ -37,67 +37,45 @@ def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:
     return observer
 
 
-@dataclass(frozen=True)
-class ForceOffset:
+class ForceOffset(Cause):
     """``force_offset``: the load cell was not zeroed."""
 
-    name: str = "force_offset"
-    unit: str = "N"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "load cell"
+    name = "force_offset"
+    unit = "N"
+    seat = "load cell"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force."""
         return 0.02 * facts.force_scale
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to every reading."""
         return model.observed(shown(lambda force, time, begin: force + amount))
 
 
-@dataclass(frozen=True)
-class ForceGain:
+class ForceGain(Cause):
     """``force_gain``: the load cell's calibration is off."""
 
-    name: str = "force_gain"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "load cell"
+    name = "force_gain"
+    unit = "-"
+    seat = "load cell"
 
     def plausible(self, facts: Facts) -> float:
         """One percent: a load cell a few years after its calibration."""
         return 0.01
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply every reading by ``1 + amount``."""
         return model.observed(shown(lambda force, time, begin: force * (1.0 + amount)))
 
 
-@dataclass(frozen=True)
-class ForceDrift:
+class ForceDrift(Cause):
     """``force_drift``: the load cell drifts with time."""
 
-    name: str = "force_drift"
-    unit: str = "N/s"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "load cell"
+    name = "force_drift"
+    unit = "N/s"
+    limited = True
+    seat = "load cell"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force over the test."""
@@ -119,17 +97,14 @@ def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
     return float(fitted_amount * (1.0 - np.exp(-np.median(intervals) / variant.at)))
 
 
-@dataclass(frozen=True)
-class Relaxation:
+class Relaxation(Cause):
     """``relaxation``: the force decays while a step is held."""
 
-    name: str = "relaxation"
-    unit: str = "-"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "cable"
+    name = "relaxation"
+    unit = "-"
+    sign = 1
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """Five percent."""

@@ -14,7 +14,7 @@ would drown a true cause in chance; they take the place of the forms once the ca
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,17 +197,14 @@ def position_of(model: Model) -> Array:
     return np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
 
 
-@dataclass(frozen=True)
-class PreCurvatureVarying:
+class PreCurvatureVarying(Cause):
     """``pre_curvature_varying``: the cable is bent at rest, but not uniformly."""
 
-    name: str = "pre_curvature_varying"
-    unit: str = "1/m"
-    sign: int = 0
-    combines: bool = True
-    additive: bool = False
-    limited: bool = True
-    seat: str = "cable"
+    name = "pre_curvature_varying"
+    unit = "1/m"
+    combines = True
+    limited = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """A change of direction of a tenth of a radian over the cable."""
@@ -223,17 +220,13 @@ class PreCurvatureVarying:
         return replace(model, bending=replace(model.bending, pre_curvature=rest))
 
 
-@dataclass(frozen=True)
-class StiffnessVarying:
+class StiffnessVarying(Cause):
     """``stiffness_varying``: the cable is not equally stiff everywhere."""
 
-    name: str = "stiffness_varying"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = True
-    additive: bool = False
-    limited: bool = False
-    seat: str = "cable"
+    name = "stiffness_varying"
+    unit = "-"
+    combines = True
+    seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
         """A tenth."""

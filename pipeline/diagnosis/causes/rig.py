@@ -11,28 +11,24 @@ in_plane_load        dead load along and across the chord, N/m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import PLAIN, Cause, Variant
+from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
 """Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""
 
 
-@dataclass(frozen=True)
-class BearingFriction:
+class BearingFriction(Cause):
     """``bearing_friction``: Coulomb moment in each bearing."""
 
-    name: str = "bearing_friction"
-    unit: str = "N m"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "rig"
+    name = "bearing_friction"
+    unit = "N m"
+    sign = 1
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """Three percent of the largest moment."""
@@ -71,25 +67,17 @@ def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:
     return tuple(Variant("differing from step to step", at=float(k), known=known) for k in facts.pushed)
 
 
-@dataclass(frozen=True)
-class BearingStiffness:
-    """``bearing_stiffness``: rotational spring in each bearing."""
+class BearingStiffness(Cause):
+    """``bearing_stiffness``: rotational spring in each bearing, both alike."""
 
-    name: str = "bearing_stiffness"
-    unit: str = "N m/rad"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "rig"
+    name = "bearing_stiffness"
+    unit = "N m/rad"
+    sign = 1
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """A twentieth of the cable's own stiffness EI/L."""
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form: both bearings alike."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the spring ``amount``."""
@@ -99,17 +87,14 @@ class BearingStiffness:
         return replace(model, bending=replace(bending, left=left, right=right))
 
 
-@dataclass(frozen=True)
-class RigidEnds:
+class RigidEnds(Cause):
     """``rigid_ends``: stiff pieces between bearing axis and free cable."""
 
-    name: str = "rigid_ends"
-    unit: str = "m"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "rig"
+    name = "rigid_ends"
+    unit = "m"
+    sign = 1
+    limited = True
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the length."""
@@ -129,25 +114,18 @@ class RigidEnds:
         return replace(model, bending=replace(bending, left=left, right=right))
 
 
-@dataclass(frozen=True)
-class RigCompliance:
+class RigCompliance(Cause):
     """``rig_compliance``: the frame yields."""
 
-    name: str = "rig_compliance"
-    unit: str = "m/N"
-    sign: int = 1
-    combines: bool = False
-    additive: bool = False
-    limited: bool = True
-    seat: str = "rig"
+    name = "rig_compliance"
+    unit = "m/N"
+    sign = 1
+    limited = True
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the travel lost at the largest force."""
         return 0.02 * facts.travel / facts.force_scale
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return PLAIN
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let the rig yield by ``amount`` per force."""
@@ -162,17 +140,12 @@ MEASURED = 1e-3
 """Of a length: a cable is cut and measured with a steel rule, 0.3 mm of 300."""
 
 
-@dataclass(frozen=True)
-class DisplacementOffset:
+class DisplacementOffset(Cause):
     """``displacement_offset``: the zero of the displacement is wrong."""
 
-    name: str = "displacement_offset"
-    unit: str = "m"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "rig"
+    name = "displacement_offset"
+    unit = "m"
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the travel."""
@@ -191,17 +164,12 @@ class DisplacementOffset:
         return replace(model, shift=model.shift + amount * moved)
 
 
-@dataclass(frozen=True)
-class LengthError:
+class LengthError(Cause):
     """``length_error``: the stated length is not the cable's."""
 
-    name: str = "length_error"
-    unit: str = "-"
-    sign: int = 0
-    combines: bool = False
-    additive: bool = False
-    limited: bool = False
-    seat: str = "rig"
+    name = "length_error"
+    unit = "-"
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """One percent."""
@@ -217,17 +185,13 @@ class LengthError:
         return replace(model, bending=replace(model.bending, length=length))
 
 
-@dataclass(frozen=True)
-class InPlaneLoad:
+class InPlaneLoad(Cause):
     """``in_plane_load``: distributed load in the plane."""
 
-    name: str = "in_plane_load"
-    unit: str = "N/m"
-    sign: int = 0
-    combines: bool = True
-    additive: bool = False
-    limited: bool = False
-    seat: str = "rig"
+    name = "in_plane_load"
+    unit = "N/m"
+    combines = True
+    seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force, spread over the length."""
