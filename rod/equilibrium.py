@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -33,6 +33,8 @@ from rod.section import Memory, Section
 __all__ = ["Branch", "Equilibrium", "Outcome", "solve"]
 
 Branch = Literal["natural", "opposite", "up", "down", "jump"]
+
+BRANCHES = get_args(Branch)
 
 #: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
 NEAR = 0.8
@@ -140,7 +142,14 @@ def solve(
     Returns
     -------
     Equilibrium
+
+    Raises
+    ------
+    ValueError
+        For another branch.
     """
+    if branch not in BRANCHES:
+        raise ValueError(f"branch {branch!r}: one of {', '.join(BRANCHES)}")
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         angles, R = rod.mounted.angles, hold.reaction(np.zeros(2))
