@@ -222,7 +222,7 @@ class Characteristic:
         u, u0, D = self._arguments(K, K0)
         if self.abscissa == "excess":
             return -self.tangent(K, K0)
-        return -self.f(u if self.reading == "secant" else u0) + np.zeros_like(D)
+        return np.full_like(D, -self.f(u if self.reading == "secant" else u0))
 
     def _arguments(self, K: ArrayLike, K0: ArrayLike) -> tuple[Array, Array, Array]:
         """Abscissae of the state and of rest, and the excess K - K0."""

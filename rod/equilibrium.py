@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -33,6 +33,8 @@ from rod.section import Memory, Section
 __all__ = ["Branch", "Equilibrium", "Outcome", "solve"]
 
 Branch = Literal["natural", "opposite", "up", "down", "jump"]
+
+BRANCHES = get_args(Branch)
 
 #: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
 NEAR = 0.8
@@ -130,7 +132,8 @@ def solve(
     memory : Memory or None
         At the start of the step; None for the mounted cable.
     start : Equilibrium or None
-        Warm start, of the same number of elements; None to come from the force-free shape.
+        Warm start, of the same number of elements; None to come from the force-free shape. It saves time and chooses no
+        shape, but for the branch ``jump``: where it may lead to one of far more energy, that path is followed.
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see the module.
     patient : bool
@@ -139,7 +142,14 @@ def solve(
     Returns
     -------
     Equilibrium
+
+    Raises
+    ------
+    ValueError
+        For another branch.
     """
+    if branch not in BRANCHES:
+        raise ValueError(f"branch {branch!r}: one of {', '.join(BRANCHES)}")
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         angles, R = rod.mounted.angles, hold.reaction(np.zeros(2))
@@ -156,23 +166,21 @@ def solve(
 
 
 def _attempts(system: System, first: Start | None, branch: Branch, *, patient: bool) -> Iterator[Trial]:
-    """Ways to the equilibrium: the path from the force-free shape and the warm start, the path from that, others.
-
-    The start comes first, and saves the path, on the side to which a cable leans. On the other side, and in a coil,
-    there are stable shapes of far more energy than the one its force-free shape leads to, and the start may be such.
-    """
+    """Ways to the equilibrium: the path from the force-free shape and the warm start, the path from that, others."""
     rod, most = system.rod, PATH_STEPS if patient else HASTY
     side = bow_side(rod, branch)
-    # Where only the path can tell the side, a warm start keeps the one it has.
+    # A cable that has jumped keeps the side it came to.
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
-    leaning, certain = rod.leaning
-    coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
-    trusted = not (coiled or (certain and side == -leaning))
+    trusted = branch == "jump" or _leads(rod, side)
     warm = None if first is None else _near(system, first)
+    if warm and _wound(system, warm):
+        first = warm = None
     if warm and trusted:
         yield judged(system, warm, kept)
     lost = judged(system, followed(system, side=side or 1, most=most), side if branch != "natural" else 0)
     yield lost
+    if branch == "natural" and lost.outcome in (Outcome.TURNING_POINT, Outcome.BIFURCATION):
+        return
     if warm and not trusted:
         yield judged(system, warm, kept)
     if lost.outcome is Outcome.LIMIT_POINT:
@@ -184,10 +192,16 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     if not patient:
         return
     if first is not None:
-        yield judged(system, followed(system, first, side=side or 1), kept)
-    if branch == "natural":
-        return
-    if branch != "jump":
+        continued = followed(system, first, side=side or 1)
+        if not _wound(system, continued):
+            yield judged(system, continued, kept)
+    if branch != "natural":
+        yield from _elsewhere(system, lost, side)
+
+
+def _elsewhere(system: System, lost: Trial, side: int) -> Iterator[Trial]:
+    """Equilibria to which no path leads: on the side of a straight cable, and where the lost one comes to rest."""
+    if side:
         yield judged(system, _from_straight(system, side), side)
     for beside in tilted(system, lost):
         yield judged(system, descended(system, beside), side)
@@ -203,10 +217,32 @@ def bow_side(rod: Rod, branch: Branch) -> int:
     return side if certain and branch != "jump" else 0
 
 
+def _leads(rod: Rod, side: int) -> bool:
+    """Whether a start on this side of a cable is where the path from its force-free shape leads, and saves the path.
+
+    On the other side, in a coil, and where the path alone can tell the side (0), there are stable shapes of far more
+    energy than the one its force-free shape leads to, and a start may be such.
+    """
+    leaning, certain = rod.leaning
+    coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
+    return side != 0 and not coiled and not (certain and side == -leaning)
+
+
 def _near(system: System, first: Start) -> Trial:
     """Newton's method from a start, if it ends near."""
     warm = newton(system, first)
     return warm if np.abs(warm.angles - first.angles).max() <= NEAR else warm._replace(outcome=Outcome.STALLED)
+
+
+def _wound(system: System, trial: Trial) -> bool:
+    """Whether a cable that was pressed together pulls: its start was wound up in a loop, which holds far more energy.
+
+    From the force-free shape on energy grows while the bearings approach, so they are pushed apart. Loads, friction and
+    set may pull as well: then the path from the force-free shape costs a little more and ends at the same.
+    """
+    if not trial.found or trial.R[0] <= 0.0 or system.hold.tip is not None:
+        return False
+    return float(system.rod.edges @ np.cos(trial.angles)) < system.rod.mounted.chord
 
 
 def _from_straight(system: System, side: int) -> Trial:

@@ -92,18 +92,21 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
     Raises
     ------
     ValueError
-        If it is none of these, a table whose bends do not increase, or a moment that does not vanish at rest.
+        If it is none of these, EI not positive, bends that do not increase, or a moment that does not vanish at rest.
     """
     if hasattr(given, "bound"):
         return cast(MomentCurve, given)  # a Protocol cannot be asked for at run time without its cost
     if not callable(given):
-        values = np.asarray(given, float)
-        if values.ndim == 0:
+        try:
+            values = np.asarray(given, float)
+        except (TypeError, ValueError):
+            values = np.zeros(0)
+        if values.ndim == 0 and 0.0 < values < np.inf:
             return Characteristic.constant(float(values))
         if values.ndim != 2 or values.shape[1] != 2 or values.shape[0] < 2 or not np.all(np.diff(values[:, 0]) > 0.0):
             raise ValueError(
-                f"a law is a number (EI), a function of the bend, or rows of bend and moment with increasing bend; got "
-                f"an array of shape {values.shape}: sort the rows, and give two columns"
+                "a law is a positive number (EI, N m^2), a function of the bend, or rows of bend (1/m) and moment "
+                f"(N m), sorted by bend; got {str(given)[:60]}"
             )
         given = _table(values)
     # finest about rest, where laws bend most; an even number of points, so that none is 0

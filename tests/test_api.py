@@ -130,6 +130,8 @@ def test_what_was_not_measured_cannot_be_plotted(named):
     for plot in (cablebend.plot_characteristic, cablebend.plot_forces, cablebend.plot_residuals):
         with pytest.raises(ValueError, match=r"a has no \w+ to plot"):
             plot(failed)
+        with pytest.raises(ValueError, match=r"a hat keine \w+ zum Zeichnen"):
+            plot(failed, settings=ReportSettings(language="de"))
     with pytest.raises(ValueError, match="steps with one: 0"):
         cablebend.plot_photo(named, 99)
 

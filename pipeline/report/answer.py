@@ -132,7 +132,7 @@ WIDE = 0.5
 
 
 def _agreement(result: Result, words: Words) -> str:
-    """Difference of the two ways against what their bands allow."""
+    """Difference of the two ways against what their errors lead to."""
     part, found = result.agreement, trusted(result)
     if part is None or part.rms_relative is None or not {"inverse", "balance"} <= found.keys():
         return words("agree_none")
@@ -146,7 +146,7 @@ def _agreement(result: Result, words: Words) -> str:
     if part.compatible and expected > WIDE:
         key = "agree_wide"
     text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
-    return f"{words('before_extension')} {text}" if "extended" in found else text
+    return f"{text} {words('before_extension')}" if "extended" in found else text
 
 
 MISFIT = 3.0

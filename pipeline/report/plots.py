@@ -12,6 +12,7 @@ from collections.abc import Callable
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.messages import Message
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Area, style
 from pipeline.report.words import Words
@@ -37,7 +38,7 @@ def plot_characteristic(result: Result, *, settings: ReportSettings | None = Non
     """
     settings, words = _how(settings)
     if not curves(result):
-        raise ValueError(f"{result.specimen.id} has no characteristic to plot")
+        raise _refused(words, Message("misuse.no-curve", name=result.specimen.id))
     return _figure(lambda area: figures.draw_characteristic(area, result, words, settings), (420.0, 310.0))
 
 
@@ -45,7 +46,7 @@ def plot_forces(result: Result, *, settings: ReportSettings | None = None) -> Fi
     """Draw measured and simulated forces over the displacement; parameters as `plot_characteristic`."""
     settings, words = _how(settings)
     if not result.steps:
-        raise ValueError(f"{result.specimen.id} has no forces to plot")
+        raise _refused(words, Message("misuse.no-forces", name=result.specimen.id))
     return _figure(lambda area: figures.draw_forces(area, result, words, settings), (400.0, 350.0))
 
 
@@ -54,7 +55,7 @@ def plot_residuals(result: Result, *, settings: ReportSettings | None = None) ->
     settings, words = _how(settings)
     residuals = maps.answer_map(result)
     if residuals is None:
-        raise ValueError(f"{result.specimen.id} has no residuals to plot")
+        raise _refused(words, Message("misuse.no-residuals", name=result.specimen.id))
     size = (400.0, maps.map_height(residuals))
     return _figure(lambda area: maps.draw_map(area, residuals, words), size)
 
@@ -70,8 +71,8 @@ def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = N
     _, words = _how(settings)
     photo = next((one for one in result.photos if one.step == step and one.preview is not None), None)
     if photo is None or photo.preview is None:
-        steps = ", ".join(str(one.step) for one in result.photos if one.preview is not None) or "none"
-        raise ValueError(f"no picture of step {step}; steps with one: {steps}")
+        pictured = ", ".join(str(one.step) for one in result.photos if one.preview is not None) or "-"
+        raise _refused(words, Message("misuse.no-picture", name=result.specimen.id, step=step, pictured=pictured))
     width = 500.0
     height = photos.PICTURE_HEAD + width * photo.preview.height / photo.preview.width
     return _figure(lambda area: photos.draw_photo(area, photo, words), (width, height))
@@ -80,6 +81,11 @@ def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = N
 def _how(settings: ReportSettings | None) -> tuple[ReportSettings, Words]:
     chosen = settings or ReportSettings()
     return chosen, Words(chosen.language)
+
+
+def _refused(words: Words, said: Message) -> ValueError:
+    """The error in the language of the figure."""
+    return ValueError(words.said(said).text)
 
 
 def _figure(draw: Callable[[Area], Axes], size: tuple[float, float]) -> Figure:

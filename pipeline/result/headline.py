@@ -1,6 +1,6 @@
 """The answer of a result in words: one sentence for the first screen, and a headline with what the diagnosis says.
 
-A fault of the data comes before all numbers.
+A fault of the data comes before all numbers; numbers that are not usable are in no sentence.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from pipeline.result.whole import Result
 
 
 def opening(result: Result) -> Message:
-    """f_EI at both ends of the visited range and K0, after a fault of the data; or why there is none."""
+    """f_EI at both ends of the visited range and K0, after a fault of the data; or why there is none to be used."""
     name, answer = result.specimen.id, result.answer
     if answer.curve is None:
         return _unmeasured(result)
+    if not answer.usable:
+        return Message("sentences", sentences=[Message("opening.unusable", id=name, reason=_brief(answer.said))])
     fault = leading(result.findings)
     lead = [] if fault is None else [_brief(fault.said)]
-    if not answer.usable:
-        lead = [Message("opening.unusable", id=name, reason=_brief(answer.said))]
     curve = answer.curve
     rest = Message("opening.rest", K0_per_m=(curve.pre_curvature, curve.pre_curvature_std))
     return Message("sentences", sentences=[*lead, _range(name, curve), rest])
@@ -31,7 +31,7 @@ def headline(result: Result) -> Message:
     """The answer in one sentence, whether the ways agree, and what the diagnosis says."""
     curve, agreement, diagnosis = result.answer.curve, result.agreement, result.diagnosis
     said = [opening(result)]
-    if curve is None:
+    if curve is None or not result.answer.usable:
         return said[0]
     # both ways lack a cause that was found and is in the answer
     if agreement is not None and agreement.compatible is not None and curve.method != "extended":

@@ -8,7 +8,7 @@ import pytest
 
 from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
-from rod.equilibrium import Outcome, solve
+from rod.equilibrium import Equilibrium, Outcome, solve
 from rod.laws import StickSlip
 from rod.newton import Start, newton
 from rod.reduction import System
@@ -116,6 +116,38 @@ def test_a_warm_start_on_another_stable_shape_is_not_kept_where_the_force_free_o
     assert solve(test.rod, hold, start=held, branch="down").force == pytest.approx(cold[1].force, rel=1e-9)
 
 
+def test_a_start_wound_up_in_a_loop_is_dropped() -> None:
+    """A loop between free bearings is a stable equilibrium too: of a cable pressed together, it pulls with 0.5 kN."""
+    test = BendingTest(0.2, LINEAR, -2.0, elements=60)
+    hold = test.hold("chords", 0.95 * test.zero_chord)
+    cold, system = solve(test.rod, hold), System(test.rod, hold, test.rod.virgin)
+    share = (np.arange(62) + 0.5) / 62
+    loop = newton(system, Start(2.0 * np.cos(np.pi * share) - 2.0 * np.pi * share, np.zeros(2)))
+    assert loop.found
+    assert system.excess_negatives(loop.balance) == 0
+    assert -loop.R[0] < -500.0
+    warm = solve(test.rod, hold, start=replace(cold, angles=loop.angles, right_reaction=loop.R))
+    exact = uniform_equilibrium(LINEAR, length=0.2, chord=hold.chord, pre_curvature=2.0)  # of the mirrored cable
+    assert warm.good
+    assert warm.force == pytest.approx(exact.force, rel=1e-3)  # 60 elements
+
+
+def energy(step: Equilibrium) -> float:
+    potential = Potential(step.rod, step.before)
+    return potential.value(potential.unknowns(step.angles, step.x, step.y))
+
+
+def test_a_start_on_the_other_side_is_not_natural_where_a_cable_is_bent_both_ways() -> None:
+    test = BendingTest(0.2, LINEAR, lambda t: 0.5 + 5.0 * np.sin(2.0 * np.pi * t), elements=40)
+    hold = test.hold("chords", 0.12)
+    down = solve(test.rod, hold, branch="down")
+    assert down.y[20] < 0.0
+    natural = solve(test.rod, hold, start=down)
+    assert natural.good
+    assert natural.y[20] > 0.0
+    assert energy(natural) < 0.95 * energy(down)
+
+
 def arch(load: float) -> BendingTest:
     """A shallow two-hinged arch between fixed bearings, pressed down by a distributed load, N/m."""
     return BendingTest(0.2, LINEAR, 2.0, load=(0.0, -load))
@@ -136,6 +168,11 @@ def test_shape_after_the_snap_is_found_when_asked_for() -> None:
     down = simulate(arch(20.0), chords=[arch(20.0).zero_chord], branch="down")[0]
     assert down.good
     assert down.y[50] < 0.0
+    # no start makes it the natural one: the equilibria from the force-free shape on end before
+    test = replace(arch(20.0), pre_curvature=lambda t: 2.0 * np.sin(np.pi * t) - 1e-3)
+    snapped = simulate(test, chords=[test.zero_chord], branch="down")[0]
+    assert snapped.good
+    assert simulate(test, chords=[test.zero_chord], starts=[snapped])[0].outcome is Outcome.BIFURCATION
 
 
 @pytest.mark.parametrize("K0", [5.0, 8.0])

@@ -75,8 +75,11 @@ def test_a_number_is_a_stiffness_and_a_curve_stays_itself():
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        ({"law": [[0.0, 1.0, 2.0]], "chord": 0.1}, "two columns"),
-        ({"law": [(1.0, 1.0), (0.0, 0.0)], "chord": 0.1}, "sort the rows"),
+        ({"law": [[0.0, 1.0, 2.0]], "chord": 0.1}, "rows of bend .* and moment"),
+        ({"law": [(1.0, 1.0), (0.0, 0.0)], "chord": 0.1}, "sorted by bend"),
+        ({"law": -5e-3, "chord": 0.1}, "positive number .* got -0.005"),
+        ({"law": "steel", "chord": 0.1}, "got steel"),
+        ({"law": 1.0, "chord": 0.1, "branch": "left"}, "one of natural, opposite, up, down, jump"),
         ({"law": np.cosh, "chord": 0.1}, "vanish at bend 0"),
         ({"law": 1.0}, "exactly one of displacement"),
         ({"law": 1.0, "chord": 0.1, "force": 1.0}, "exactly one of displacement"),

@@ -144,6 +144,12 @@ def test_with_imposed_chords(name: str) -> None:
     assert worst_error(test, name, vary, h, lambda t, s: simulate(t, chords=chords, starts=s)) < 1e-6
 
 
+@pytest.mark.parametrize("name", ["pre_curvature", "load_y"])
+def test_of_a_rod_as_soft_across_as_along(name: str) -> None:
+    vary, h = VARIATIONS[name]
+    assert worst_error(replace(EVERYTHING, axial_stiffness=30.0, shear_stiffness=30.0), name, vary, h, displaced) < 1e-6
+
+
 @pytest.mark.parametrize("zero", ["length", "loaded", 0.198])
 @pytest.mark.parametrize("name", ["length", "pre_curvature", "load_y"])
 def test_zero_of_displacement_takes_part(name: str, zero: str | float) -> None:
