@@ -349,7 +349,7 @@ def test_two_thousand_rows_are_laid_out_a_hundred_at_a_time(show, site):
 def test_rows_follow_as_the_reader_scrolls(show, site):
     driver = show(f"{site}/large/index.html")
     driver.execute_script("const f = document.getElementById('specimens'); f.scrollTop = f.scrollHeight")
-    WebDriverWait(driver, 5).until(lambda d: len(visible_names(d)) == 200)
+    WebDriverWait(driver, 20).until(lambda d: len(visible_names(d)) == 200)
     assert one(driver, "#shown").text == f"{ROWS} of {ROWS} shown."
 
 

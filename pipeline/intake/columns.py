@@ -126,9 +126,10 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
     Columns given by number are for logs without a header: there the first row with numbers at these places is found.
     """
     found: dict[str, list[int]] = {}
-    bases = [_role(cell) for cell in header]
-    for less_sure in (_role_beside_symbol, _role_of_component):
-        roles = zip(bases, map(less_sure, header), strict=True)
+    readings = [_readings(cell) for cell in header]
+    bases = [surest for surest, *_ in readings]
+    for less_sure in (1, 2):
+        roles = zip(bases, (reading[less_sure] for reading in readings), strict=True)
         bases = [base or (role if role not in bases else None) for base, role in roles]
     for role in ROLES:
         if role in spec.columns:
@@ -145,24 +146,25 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
     return found if {"force", "displacement"} & found.keys() else {}
 
 
-def _role(cell: str) -> str | None:
-    """Role of a header cell by its name; a T in degrees is no time, and an s in mm is a way."""
+def _readings(cell: str) -> tuple[str | None, str | None, str | None]:
+    """Role of a header cell by its name, by what stands before a symbol, and as a component of a force."""
+    if not any(map(str.isalpha, cell)):
+        return None, None, None  # most of a log are numbers
     name, unit = _split_unit(cell)
+    symbol = SYMBOL.fullmatch(name)
+    return (
+        _role(cell, name, unit),
+        ROLE_OF.get(_plain(symbol["base"])) if symbol else None,
+        "force" if COMPONENT.fullmatch(name) else None,
+    )
+
+
+def _role(cell: str, name: str, unit: str) -> str | None:
+    """Role of a header cell by its name; a T in degrees is no time, and an s in mm is a way."""
     if name == "s" and unit in UNITS["displacement"]:
         return "displacement"
     role = ROLE_OF.get(_plain(cell)) or ROLE_OF.get(_plain(name))
     return None if role == "time" and unit.casefold() in TEMPERATURES else role
-
-
-def _role_beside_symbol(cell: str) -> str | None:
-    """Role of a header cell whose name has a symbol of one or two letters behind it."""
-    found = SYMBOL.fullmatch(_split_unit(cell)[0])
-    return ROLE_OF.get(_plain(found["base"])) if found else None
-
-
-def _role_of_component(cell: str) -> str | None:
-    """Force for a header cell that names one component of it."""
-    return "force" if COMPONENT.fullmatch(_split_unit(cell)[0]) else None
 
 
 def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:

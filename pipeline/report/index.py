@@ -169,19 +169,23 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
         statuses=[state for state in (*STATUSES, "unusable") if state in shown],
         pooled=pooled,
         data=DATA,
+        curves=CURVES,
         size=SHAPE_SIZE,
         palette=palette_css(),
         css=asset("page.css") + asset("index.css"),
         js=asset("page.js") + asset("index.js"),
     )  # fmt: skip
-    before, _, after = page.rpartition(DATA)  # a name may hold anything, and names stand before
+    before, _, after = page.rpartition(CURVES)  # a name may hold anything, and names stand before
+    before, _, between = before.rpartition(DATA)
     yield before
     yield from _data(rows, pooled, unit, words, settings)
+    yield between
+    yield from _list_of(_curve(row, unit) for row in rows)
     yield after
 
 
-DATA = "\N{OBJECT REPLACEMENT CHARACTER}data\N{OBJECT REPLACEMENT CHARACTER}"
-"""Stands in the page where the data go."""
+DATA, CURVES = (f"\N{OBJECT REPLACEMENT CHARACTER}{i}\N{OBJECT REPLACEMENT CHARACTER}" for i in ("data", "curves"))
+"""Stand in the page where the data go. Curves are half of them and wait until some are to be drawn."""
 
 
 def _verdict(row: IndexRow) -> str:
@@ -222,7 +226,7 @@ def _causes(row: IndexRow, words: Words) -> str:
 def _data(
     rows: list[IndexRow], pooled: list[Repeats], unit: Unit, words: Words, settings: ReportSettings
 ) -> Iterator[str]:
-    """The data of the page as JSON: first what belongs to all rows, then curves and cells of every row."""
+    """The data of the page as JSON: first what belongs to all rows, then the cells of every row."""
     whole = {
         "axes": [words("axis_kappa"), words("axis_stiffness", unit=unit.symbol)],
         "decimal": words.decimal,
@@ -236,20 +240,20 @@ def _data(
         "verdicts": {verdict: "–" if verdict == "none" else words(f"verdict_{verdict}") for verdict in _said(rows)},
         "pooled": [_figure(entry, unit) for entry in pooled if entry.alt],
     }
-    yield _json(whole)[:-1] + ',"rows":['
-    yield from _separated(_curve(row, unit) for row in rows)
-    yield '],"cells":['
-    yield from _separated(_json(_cells(row, unit, words)) for row in rows)
-    yield "]}"
+    yield _json(whole)[:-1] + ',"cells":'
+    yield from _list_of(_json(_cells(row, unit, words)) for row in rows)
+    yield "}"
 
 
 def _said(rows: list[IndexRow]) -> list[str]:
     return sorted({_verdict(row) for row in rows})
 
 
-def _separated(pieces: Iterable[str]) -> Iterator[str]:
+def _list_of(pieces: Iterable[str]) -> Iterator[str]:
+    yield "["
     for number, piece in enumerate(pieces):
         yield f",{piece}" if number else piece
+    yield "]"
 
 
 def _json(value: Any) -> str:

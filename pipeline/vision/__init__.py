@@ -1,9 +1,5 @@
 """From photos to arc-length-parametrised centerlines with curvature and true error bars.
 
-`trace_series` measures all photos of a specimen, `trace_photo` a single one without scale.
+`series.trace_series` measures all photos of a specimen, `single.trace_photo` a single one without scale. Nothing is
+imported here: who only reads a photo needs no fit.
 """
-
-from pipeline.vision.series import trace_series
-from pipeline.vision.single import trace_photo
-
-__all__ = ["trace_photo", "trace_series"]

@@ -1,7 +1,7 @@
 """A run and a report cut off before each of their operations on files, by a kill and by a power cut.
 
-``python -m tests.pipeline.cut_batches run|report killed|power|reordered FOLDER`` prints how many operations there were.
-After each cut every result must be the old one or the new one, whole, and the same command must finish.
+``python -m tests.pipeline.cut_batches run|report FOLDER`` prints how many operations there were, once for each way of
+cutting. After each cut every result must be the old one or the new one, whole, and the same command must finish.
 """
 
 import argparse
@@ -19,6 +19,9 @@ from pipeline.result import to_json
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, run_cheaply, stored, write_specimens
 from tests.pipeline.power_cut import run_until
+
+WAYS = ("killed", "power", "reordered")
+"""See `power_cut`."""
 
 
 def drawing(edition: str) -> Stages:
@@ -107,21 +110,21 @@ def main() -> None:
     """Make a small batch, cut it off everywhere, print the number of operations."""
     parser = argparse.ArgumentParser()
     parser.add_argument("action", choices=["run", "report"])
-    parser.add_argument("how", choices=["killed", "power", "reordered"])
     parser.add_argument("folder", type=Path)
     given = parser.parse_args()
     batch, before, here = (given.folder / name for name in ("batch", "before", "here"))
     write_specimens(batch, ["a", "b"])
     run(batch, here, "first")
     here.rename(before)
-    if given.action == "report":
-        count = cut_everywhere(lambda out: report(batch, out, "second"), given.how, before, here, set())
-    else:
+    if given.action == "run":
         log = batch / "a/force.csv"
         log.write_text(log.read_text().replace("2.301", "2.302"))
         shutil.rmtree(before / "b")
-        count = cut_everywhere(lambda out: run(batch, out, "second"), given.how, before, here, {"b"})
-    sys.stdout.write(f"{count}\n")
+    act, new = (run, {"b"}) if given.action == "run" else (report, set())
+    for how in WAYS:
+        count = cut_everywhere(lambda out: act(batch, out, "second"), how, before, here, new)
+        sys.stdout.write(f"{how} {count}\n")
+        shutil.rmtree(here)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,10 @@
 (() => {
-  const data = JSON.parse(document.getElementById("data").textContent), decimal = data.decimal, say = data.words;
-  const find = (id) => document.getElementById(id), frame = find("specimens"), table = frame.querySelector("table");
+  const find = (id) => document.getElementById(id), read = (id) => JSON.parse(find(id).textContent);
+  const data = read("data"), decimal = data.decimal, say = data.words;
+  // Half of all data: read when the first curve is drawn.
+  let stored;
+  const curve = (index) => { stored ??= read("curves"); return stored[index]; };
+  const frame = find("specimens"), table = frame.querySelector("table");
   // Cells as `_cells` in pipeline/report/index.py writes them.
   const [NAME, HREF, TYPE, STATE, VERDICT, LOW, , HIGH, , K0, , RMS, , USED, PHOTOS, TROUBLES, REASON, LANGUAGE, SHAPES, CAUSES] = Array(20).keys();
   // Words are searched, numbers are not: who types 42 wants cable-42, not every stiffness with a 42 in it.
@@ -143,7 +147,7 @@
     place.replaceChildren();
     if (!chosen.length) return;
     const curves = chosen.slice(0, LIMIT).map((row, i) => {
-      const [k, v, std] = data.rows[row.index], look = { colour: colours[i % colours.length], dash: dashes[Math.floor(i / colours.length) % dashes.length] };
+      const [k, v, std] = curve(row.index), look = { colour: colours[i % colours.length], dash: dashes[Math.floor(i / colours.length) % dashes.length] };
       return { k, v, std, opacity: 0.14, width: 2, name: "curve", text: row.cells[NAME], ...look };
     });
     const key = curves.map(({ text, colour, dash }) => ({ text, colour, dash }));
@@ -156,7 +160,7 @@
   find("clear").addEventListener("click", () => tick(rows, false));
 
   const mean = (place, { alt, members, kappa, mean, std, scatter }) => {
-    const single = members.map((index) => ({ k: data.rows[index][0], v: data.rows[index][1], colour: "var(--muted)", width: 0.7, opacity: 0.6, name: "single" }));
+    const single = members.map(curve).map(([k, v]) => ({ k, v, colour: "var(--muted)", width: 0.7, opacity: 0.6, name: "single" }));
     const blue = "var(--inverse)", bands = [{ k: kappa, v: mean, std: scatter, colour: blue, opacity: 0.14 }, { k: kappa, v: mean, std, colour: blue, opacity: 0.3 }];
     const key = [{ text: say.pooled_single, colour: "var(--muted)" }, { text: say.pooled_scatter, colour: blue, opacity: 0.14 }, { text: say.pooled_mean, colour: blue, opacity: 0.3 }];
     plot(place, alt, bands, [...single, { k: kappa, v: mean, colour: blue, width: 2.2, name: "mean" }], key);

@@ -12,13 +12,13 @@ which misses the curve by kappa' t^3 / 6, below 1e-6 px for any cable. The cover
 half plane: sharp, the exact area (`half_plane`); or seen through a lens, the normal integral (`soft_edge`). The lens
 must act before the pixels do: a sharp picture blurred afterwards moves an edge by up to 0.02 px with its place in the
 pixel, because the skewness f (1 - f) (1 - 2 f) of a partly covered pixel survives the blur. The colour is sampled on
-3 x 3 points a pixel and weighted with what each of their cells covers.
+3 x 3 points a pixel and weighted with what each of their cells covers; deep inside a sheath of one colour two do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from math import ceil, sqrt
 
@@ -142,60 +142,103 @@ class _Nodes:
     v: Array
 
 
+@dataclass(frozen=True)
+class _Frame:
+    """Pixels (n,) as their nearest node sees them: along the tangent and the normal, what a pixel changes of that.
+
+    ``t``, ``n`` (n,) m; ``t_grad``, ``n_grad`` (2, n) m per pixel's width and height; ``s``, ``kappa`` of the node;
+    ``end`` whether an end of the cable is near.
+    """
+
+    t: Array
+    n: Array
+    t_grad: Array
+    n_grad: Array
+    s: Array
+    kappa: Array
+    end: NDArray[np.bool_]
+
+    def only(self, those: NDArray[np.bool_]) -> _Frame:
+        """Some of the pixels."""
+        return _Frame(*(getattr(self, item.name)[..., those] for item in fields(self)))
+
+    def offset(self, t: Array, n: Array) -> Array:
+        """Signed distance of points from the osculating circle."""
+        bend = 2 * n - self.kappa * (t**2 + n**2)
+        return np.asarray(bend / (1.0 + np.sqrt(np.maximum(1.0 - self.kappa * bend, 0.0))))
+
+
 def strand_layer(strand: Strand, camera: Camera, light: Light, channels: int, *, blur_px: float = 0.0) -> Layer:
     """Layer of a cable on the picture of ``camera``, lit by ``light``, its edges blurred by a lens of ``blur_px``."""
-    nodes = _nodes(strand, camera)
-    index, u, v, i = _near(nodes, camera, 0.5 * strand.diameter_m)
+    nodes, radius = _nodes(strand, camera), 0.5 * strand.diameter_m
+    index, u, v, i = _near(nodes, camera, radius)
     alpha, colour = np.zeros(index.size), np.zeros((index.size, channels))
     for first in range(0, index.size, TOGETHER):
-        part = slice(first, first + TOGETHER)
-        alpha[part], colour[part] = _covered(
-            strand, nodes, camera, light, (u[part], v[part], i[part]), channels, blur_px=blur_px
-        )
+        part = np.arange(first, min(first + TOGETHER, index.size))
+        frame = _frame(nodes, camera, u[part], v[part], i[part])
+        depth = radius - np.abs(frame.n) - 2.0 * np.hypot(*frame.n_grad)
+        inside = (depth > CLEAR * max(blur_px, 1.0) * np.hypot(*frame.n_grad)) & ~frame.end & strand.sheath.plain
+        alpha[part[inside]] = SAMPLES**2
+        colour[part[inside]] = _filled(strand, frame.only(inside), light, channels)
+        rest = frame.only(~inside)
+        alpha[part[~inside]], colour[part[~inside]] = _covered(strand, nodes, camera, light, rest, channels, blur_px)
     seen = alpha > 1e-7
     colour = colour[seen] / alpha[seen, None]
     return Layer(index[seen], np.minimum(alpha[seen] / SAMPLES**2, 1.0), colour)
 
 
-def _covered(
-    strand: Strand,
-    nodes: _Nodes,
-    camera: Camera,
-    light: Light,
-    pixels: tuple[Array, Array, NDArray[np.intp]],
-    channels: int,
-    *,
-    blur_px: float,
-) -> tuple[Array, Array]:
-    """Covered cells (n,) of pixels (u, v, nearest node), and the sum of their colours (n, channels)."""
-    u, v, i = pixels
-    radius = 0.5 * strand.diameter_m
+def _frame(nodes: _Nodes, camera: Camera, u: Array, v: Array, i: NDArray[np.intp]) -> _Frame:
+    """Pixels (u, v) with their nearest nodes."""
     X, Y = camera.plane(u, v)
     jac = _jacobian(camera, u, v)
     c, q = np.cos(nodes.tangent[i]), np.sin(nodes.tangent[i])
-    t = (X - nodes.X[i]) * c + (Y - nodes.Y[i]) * q
-    n = (X - nodes.X[i]) * -q + (Y - nodes.Y[i]) * c
-    t_grad = np.stack([c * jac[0, 0] + q * jac[1, 0], c * jac[0, 1] + q * jac[1, 1]])
-    n_grad = np.stack([-q * jac[0, 0] + c * jac[1, 0], -q * jac[0, 1] + c * jac[1, 1]])
-    normal = n_grad / np.hypot(*n_grad)
-    s, kappa, ends = nodes.s[i], nodes.kappa[i], np.flatnonzero((i < 3) | (i >= nodes.s.size - 3))
+    return _Frame(
+        t=(X - nodes.X[i]) * c + (Y - nodes.Y[i]) * q,
+        n=(X - nodes.X[i]) * -q + (Y - nodes.Y[i]) * c,
+        t_grad=np.stack([c * jac[0, 0] + q * jac[1, 0], c * jac[0, 1] + q * jac[1, 1]]),
+        n_grad=np.stack([-q * jac[0, 0] + c * jac[1, 0], -q * jac[0, 1] + c * jac[1, 1]]),
+        s=nodes.s[i],
+        kappa=nodes.kappa[i],
+        end=(i < 3) | (i >= nodes.s.size - 3),
+    )
+
+
+def _filled(strand: Strand, frame: _Frame, light: Light, channels: int) -> Array:
+    """Sum of the colours (n, channels) of pixels deep inside a sheath of one colour.
+
+    Brightness changes across the cable alone: two points with the variance of all samples stand for them.
+    """
+    radius, slope = 0.5 * strand.diameter_m, np.hypot(*frame.n_grad)
+    apart, total = slope * sqrt((SAMPLES**2 - 1.0) / 12.0) / SAMPLES, np.zeros((frame.n.size, channels))
+    for side in (-1.0, 1.0):
+        across = frame.offset(frame.t, frame.n + side * apart) / radius
+        total += _shade(strand.sheath, light, across, across, frame.n_grad / slope, channels)
+    return 0.5 * SAMPLES**2 * total
+
+
+def _covered(
+    strand: Strand, nodes: _Nodes, camera: Camera, light: Light, frame: _Frame, channels: int, blur_px: float
+) -> tuple[Array, Array]:
+    """Covered cells (n,) of pixels, and the sum of their colours (n, channels)."""
+    radius, ends = 0.5 * strand.diameter_m, np.flatnonzero(frame.end)
+    normal = frame.n_grad / np.hypot(*frame.n_grad)
     # A blurred curved border moves toward its centre by kappa sigma^2 / 2, as in curve shortening.
-    inward = 0.5 * kappa * (blur_px**2 + 1.0 / 12.0) / camera.px_per_m**2 if blur_px else 0.0
+    inward = 0.5 * frame.kappa * (blur_px**2 + 1.0 / 12.0) / camera.px_per_m**2 if blur_px else 0.0
     inside = partial(soft_edge, blur_px=blur_px) if blur_px else half_plane
     # the farther border shows beside the nearer one only where a cable is hardly wider than what blurs it
     thin = radius * camera.px_per_m < CLEAR * max(blur_px, 1.0)
     marked = ends.size or not strand.sheath.plain  # else it does not matter where along the cable a pixel lies
-    alpha, colour, tip = np.zeros(i.size), np.zeros((i.size, channels)), t_grad[:, ends]
+    alpha, colour, tip = np.zeros(frame.n.size), np.zeros((frame.n.size, channels)), frame.t_grad[:, ends]
     steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
     for du in steps:
         for dv in steps:
-            tk, nk = t + t_grad[0] * du + t_grad[1] * dv, n + n_grad[0] * du + n_grad[1] * dv
-            bend = 2 * nk - kappa * (tk**2 + nk**2)
-            offset = bend / (1.0 + np.sqrt(np.maximum(1.0 - kappa * bend, 0.0))) - inward
-            along = s + tk / (1.0 - kappa * nk) if marked else s
-            cover = inside(radius - np.abs(offset), n_grad, SAMPLES)
+            tk = frame.t + frame.t_grad[0] * du + frame.t_grad[1] * dv
+            nk = frame.n + frame.n_grad[0] * du + frame.n_grad[1] * dv
+            offset = frame.offset(tk, nk) - inward
+            along = frame.s + tk / (1.0 - frame.kappa * nk) if marked else frame.s
+            cover = inside(radius - np.abs(offset), frame.n_grad, SAMPLES)
             if thin:
-                cover += inside(radius + np.abs(offset), n_grad, SAMPLES) - 1.0
+                cover += inside(radius + np.abs(offset), frame.n_grad, SAMPLES) - 1.0
             if ends.size:
                 cover[ends] *= inside(along[ends] - nodes.s[0], tip, SAMPLES)
                 cover[ends] *= inside(nodes.s[-1] - along[ends], tip, SAMPLES)

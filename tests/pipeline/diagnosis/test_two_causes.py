@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, Protocol, Reading, hidden_test
@@ -26,30 +27,42 @@ def test_a_search_whose_effort_is_spent_begins_nothing():
     assert not Effort().spent
 
 
-def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time():
-    """Effort is counted in Newton steps: how busy the machine is decides nothing."""
+@pytest.fixture(scope="module")
+def lens_and_relaxation():
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
-    test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=Reading(lens=2e-3, relaxation=(0.03, 7.0)))
+    reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
+    return hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
+
+
+def counted(test, settings):
+    """What is diagnosed, the codes of its findings, and the Newton steps that took."""
+    before = newton_steps()
+    part, findings, _ = diagnose(faults_of_input(test), None, settings)
+    return part, [finding.code for finding in findings], newton_steps() - before
+
+
+@pytest.fixture(scope="module")
+def searched(lens_and_relaxation):
+    return counted(lens_and_relaxation, SETTINGS)
+
+
+def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time(lens_and_relaxation, searched):
+    """Effort is counted in Newton steps: how busy the machine is decides nothing."""
     hasty = SETTINGS.model_copy(update={"search_newton_steps": 1})
     spent = []
     for _ in range(2):
-        before = newton_steps()
-        _, findings, _ = diagnose(faults_of_input(test), None, hasty)
-        spent.append(newton_steps() - before)
-        assert [f.code for f in findings].count("diagnosis/search-ended") == 1
+        _, codes, steps = counted(lens_and_relaxation, hasty)
+        spent.append(steps)
+        assert codes.count("diagnosis/search-ended") == 1
     assert spent[0] == spent[1] > 100  # four equilibria of some three steps each, in tens of fits
-    before = newton_steps()
-    _, findings, _ = diagnose(faults_of_input(test), None, SETTINGS)
-    assert newton_steps() - before > spent[0]
-    assert "diagnosis/search-ended" not in [f.code for f in findings]
+    _, codes, steps = searched
+    assert steps > spent[0]
+    assert "diagnosis/search-ended" not in codes
 
 
-def test_a_lens_beside_a_force_that_decays_is_no_wrong_scale():
+def test_a_lens_beside_a_force_that_decays_is_no_wrong_scale(searched):
     """Which moves the same points."""
-    steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
-    reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
-    test = hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
-    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
+    part, _, _ = searched
     assert part.verdict == "two_causes", part.headline
     assert {cause.name for cause in part.causes} == {"lens_distortion", "relaxation"}, part.headline
 

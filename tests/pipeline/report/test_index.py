@@ -74,7 +74,7 @@ def test_page_links_every_report_and_escapes_names(batch, tmp_path):
     assert 'href="a/report.html"' in page
     assert 'href="b/report.html"' not in page
     assert "<img" not in page
-    assert page.count("<script") == 2
+    assert page.count("<script") == 3
     assert "the log is empty" in page
 
 
@@ -114,9 +114,9 @@ def test_empty_batch_gives_an_empty_index(tmp_path):
 
 def test_overlay_data_are_the_curves(batch, tmp_path):
     page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
-    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
-    assert data["rows"][3] is None
-    kappa, value, std = data["rows"][0]
+    curves = json.loads(re.search(r'id="curves">(.*?)</script>', page)[1])
+    assert curves[3] is None
+    kappa, value, std = curves[0]
     assert len(kappa) == len(value) == len(std) == POINTS
     assert value[0] == pytest.approx(1e3 * batch[0].inverse.curve.tangent_Nm2[0], rel=1e-3)  # four digits
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.records import Centerline, PhotoHints, Rejected
-from pipeline.vision import trace_photo
+from pipeline.vision.single import trace_photo
 
 SIZE, WIDTH = (420, 800), 14
 

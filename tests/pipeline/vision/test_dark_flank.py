@@ -14,7 +14,7 @@ from pipeline.vision.series import trace_series
 
 def traced(specimen, folder, photos):
     """The first centerlines of a specimen, and the distances (px) of each from the cable that was photographed."""
-    write(specimen, folder)
+    write(specimen, folder, photos)
     settings, given = Settings(), read_specimen(folder, Settings().intake)
     traces = trace_series(replace(given, steps=given.steps[:photos]), settings.vision)
     camera, off = specimen.bench.camera, []

@@ -10,8 +10,8 @@ from pipeline.records import Centerline, Rejected, RigSpec
 from pipeline.vision import series as series_module
 from pipeline.vision import shots as shots_module
 from pipeline.vision import single as single_module
-from pipeline.vision import trace_series
 from pipeline.vision.guard import jointly
+from pipeline.vision.series import trace_series
 from tests.pipeline.vision.test_series import FLAT, SETTINGS, lines, series
 
 

@@ -18,12 +18,13 @@ from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejec
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import shots as shots_module
-from pipeline.vision import trace_photo, trace_series
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, Thing, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.series import trace_series
+from pipeline.vision.single import trace_photo
 
 SETTINGS = VisionSettings()
 # the covers of these scenes lie in the plane: seen from so far away, any height does

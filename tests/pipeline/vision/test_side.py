@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision import trace_series
 from pipeline.vision.centerline.side import on_one_side, reflected
 from pipeline.vision.render import Camera, Curve
+from pipeline.vision.series import trace_series
 from tests.pipeline.vision.test_series import DIAMETER, LENGTH, SCALE, series
 
 SETTINGS = VisionSettings()

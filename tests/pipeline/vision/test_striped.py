@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.records import Centerline, Rejected
-from pipeline.vision import trace_photo
+from pipeline.vision.single import trace_photo
 
 TABLE, WHITE, BLUE = (150, 165, 175), (225, 225, 225), (160, 80, 40)
 PAPER, GREEN, YELLOW = (235, 238, 238), (60, 120, 50), (90, 215, 225)
