@@ -27,6 +27,7 @@ from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.balance import BalanceGraph
 from rod.compliance_law import refreshed
 from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
@@ -86,6 +87,7 @@ def prepare(
     settings: DiagnosisSettings,
     *,
     causes: Sequence[Cause] = SUSPECTS,
+    graph: BalanceGraph | None = None,
 ) -> Workbench | Message:
     """Fit the base model and score all causes.
 
@@ -95,6 +97,8 @@ def prepare(
         The test and what of it is not to be used.
     settings : DiagnosisSettings
     causes : sequence of Cause
+    graph : BalanceGraph or None
+        What the balance equations say of the test, which the fit starts from; found here if not given.
 
     Returns
     -------
@@ -104,7 +108,7 @@ def prepare(
     test = faults.test
     facts = facts_of(test)
     observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
-    base = start(test, facts, elements=settings.grid, exact=settings.displacement_std)
+    base = start(test, facts, elements=settings.grid, exact=settings.displacement_std, graph=graph)
     fitted = _first_fit(observation, base, facts)
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
