@@ -6,6 +6,7 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import SIX, THREE, hidden_test
+from fixtures.laws.measured import Trial as LawTrial
 from fixtures.photographed.specimen import Order, make, write
 from fixtures.photographed.trial import answer
 from fixtures.trials import Trial, made
@@ -51,6 +52,16 @@ def test_covers_above_the_cable_are_no_cause(protocol):
     test = parted_axes(hidden_test(Cable(), protocol, largest=LARGEST, seed=9), 3e-3, (0.08, 0.06))
     part, _, _ = diagnose(faults_of_input(replace(test, axis_parallax_std=4e-3, camera_foot_std=0.05)), None, SETTINGS)
     assert part.verdict == "adequate", part.headline
+
+
+@pytest.mark.parametrize("steps", [3, 7])
+def test_a_law_with_an_early_knee_is_begun_on_the_side_where_its_cable_is_bent(steps):
+    """Without a photo at rest a law that is soft below K0 and stiff above does nearly the same from the other side."""
+    trial = LawTrial("knee-5", 705, steps)
+    bench = workbench.prepare(faults_of_input(trial.measured()[0]), SETTINGS)
+    found = bench.base.extension.base.pre_curvature(bench.base.vector)
+    # a hundredth of the curvatures met is what three steps tell
+    assert found == pytest.approx(trial.cable.law.K0, abs=0.01 * trial.cable.law.reach)
 
 
 def test_every_cause_leaves_a_trace_beside_a_base_model_at_its_limits():
