@@ -205,13 +205,20 @@ class CameraTilt(Cause):
         return (*plain, *steep)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """The scale falls by ``amount`` per metre along (``at`` 0) or across (``at`` 1) the chord."""
+        """The scale falls by ``amount`` per metre along (``at`` 0) or across (``at`` 1) the chord.
+
+        Beside a tilt in the other direction the picture is sheared too: turned by both, a point that lies off along the
+        chord has sunk by the first turn when the second one moves it across (product of both rotations).
+        """
         across = variant.at > 0.5
         # a refit may step anywhere: beyond 70 degrees the camera looks along the table
-        shorter = float(np.sqrt(1.0 - min(abs(amount) * variant.width, STEEPEST) ** 2))
+        sine = float(np.clip(amount * variant.width, -STEEPEST, STEEPEST))
+        shorter, sheared = float(np.sqrt(1.0 - sine**2)), -sine * model.lean[0 if across else 1]
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:
-            shrink = 1.0 + amount * (y if across else x)
-            return x * (1.0 if across else shorter) / shrink, y * (shorter if across else 1.0) / shrink
+            if across:
+                return x / (1.0 + amount * y), (y * shorter + x * sheared) / (1.0 + amount * y)
+            return (x * shorter + y * sheared) / (1.0 + amount * x), y / (1.0 + amount * x)
 
-        return model.observed(seen_through(move))
+        lean = model.lean[0] + (not across) * sine, model.lean[1] + across * sine
+        return replace(model.observed(seen_through(move)), lean=lean)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
+from scipy.spatial.transform import Rotation
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
@@ -182,3 +184,24 @@ def test_several_forms_that_add_up_to_one_spot_are_told_as_it(bench, name, amoun
     assert size == pytest.approx(amount, rel=0.1)
     assert stiffer == pytest.approx(0.0, abs=0.01)
     assert form_between(model, model) is None
+
+
+@pytest.mark.parametrize("sines", [(0.06, 0.07), (-0.06, 0.07), (0.03, -0.1)])
+@pytest.mark.parametrize("along_first", [True, False])
+def test_two_tilts_are_one_turn_of_the_plane_before_a_pinhole(bench, sines, along_first):
+    """Against one rotation in space about an oblique axis: chord and distances between places are those it shows."""
+    facts, model, here = bench
+    distance, cause = 0.4, BY_NAME["camera_tilt"]
+    forms = [replace(v, width=distance) for v in cause.variants(facts) if v.width > 0.0][::2]
+    for form, sine in list(zip(forms, sines, strict=True))[:: 1 if along_first else -1]:
+        model = cause.apply(model, sine / distance, form, facts)
+    seen = run(model, facts).prediction
+    axis = np.array([sines[1], -sines[0], 0.0])
+    turn = Rotation.from_rotvec(axis / np.linalg.norm(axis) * np.arcsin(np.linalg.norm(sines)))
+    for k, centre in enumerate(facts.picture_centre):
+        flat = np.column_stack([here.prediction.x[k] - centre[0], here.prediction.y[k] - centre[1]])
+        x, y, depth = turn.apply(np.column_stack([flat, np.zeros(len(flat))])).T
+        true = np.column_stack([x, y]) / (1.0 + depth / distance)[:, None]
+        shown = np.column_stack([seen.x[k], seen.y[k]])
+        # third powers of the tilts are left; one tilt after the other without the shear is off by ten times as much
+        assert pdist(shown) == pytest.approx(pdist(true), abs=2e-4 * np.ptp(flat))
