@@ -203,5 +203,5 @@ def test_two_tilts_are_one_turn_of_the_plane_before_a_pinhole(bench, sines, alon
         x, y, depth = turn.apply(np.column_stack([flat, np.zeros(len(flat))])).T
         true = np.column_stack([x, y]) / (1.0 + depth / distance)[:, None]
         shown = np.column_stack([seen.x[k], seen.y[k]])
-        # third powers of the tilts are left; one tilt after the other without the shear is off by two to four times that
+        # third powers of the tilts are left; without the shear two to four times as much
         assert pdist(shown) == pytest.approx(pdist(true), abs=2e-4 * np.ptp(flat))
