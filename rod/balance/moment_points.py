@@ -297,7 +297,8 @@ def residual(
     } | {name: -blur * data.axis_std * column[:, None] for name, column in zip(AXES, axes.T, strict=True)}
     noise = np.hstack([*by_source.values(), TURN * data.by_turn])
     covariance = noise @ noise.T
-    covariance[np.diag_indices_from(covariance)] += (ROUNDED * data.length) ** 2
+    rounding = len(covariance) * np.finfo(float).eps * float(covariance.diagonal().max())
+    covariance[np.diag_indices_from(covariance)] += max((ROUNDED * data.length) ** 2, rounding)
     factor = np.linalg.cholesky(covariance)
 
     def whitened(columns: Array) -> Array:

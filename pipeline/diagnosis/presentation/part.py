@@ -59,7 +59,7 @@ def present(
             for error in bench.test.common_force_errors
         ]
         errors += _begun_unseen(accepted.fitted)
-        again = identified_again(bench.observation, accepted.fitted, force_errors=errors)
+        again = identified_again(bench.observation, shown or accepted.fitted, force_errors=errors)
     extended = None if again is None else extended_curve(again, settings)
     causes = named_causes(bench, conclusion, again, extended)
     word = verdict(

@@ -7,6 +7,7 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import LOOP, SIX, Reading, hidden_test
+from fixtures.trials import f_error
 from pipeline.diagnosis.causes.camera import tilt_of
 from pipeline.diagnosis.diagnose import diagnose
 from pipeline.faults import faults_of_input
@@ -39,6 +40,9 @@ def test_a_cause_is_named_beside_such_a_rig_and_the_rig_is_not():
     assert part.verdict == "named" and [cause.name for cause in part.causes] == ["bearing_friction"]
     assert part.causes[0].estimate == pytest.approx(0.004, rel=0.1)
     assert "rig/ordinary" in told
+    off, covered = f_error(part.extended, Cable(bearing_friction=0.004))
+    # f_EI is that of the model with the rig in it: exact to what a rig's length of a tenth of a per cent leaves
+    assert off < 0.01 and covered > 0.9
 
 
 def test_a_zero_that_is_lost_is_named_on_such_a_rig():
