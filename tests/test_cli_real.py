@@ -26,7 +26,7 @@ def measured(tmp_path_factory):
     own = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert own.returncode == 0, own.stderr
     subprocess.run(
-        [sys.executable, "-m", "pipeline", "run", ".", "-o", here / "worker", "--workers", "1", "--timeout", "600"],
+        [sys.executable, "-m", "pipeline", "run", ".", "-o", here / "worker", "--workers", "2", "--timeout", "600"],
         cwd=SPECIMEN,
         env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "77", "TZ": "Asia/Tokyo", "LC_ALL": "C"},
         check=True,

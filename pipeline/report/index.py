@@ -165,7 +165,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
         count=words("index_count", total=len(rows), **count),
         unusable=words("index_unusable", count=unusable) if unusable else "",
         verdicts=sorted({_verdict(row) for row in rows}),
-        types=sorted({row.type for row in rows if row.type}),
+        types=sorted({row.type for row in rows if row.type}, key=natural_key),
         statuses=[state for state in (*STATUSES, "unusable") if state in shown],
         pooled=pooled,
         data=DATA,
