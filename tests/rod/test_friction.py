@@ -9,6 +9,7 @@ from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
 from rod.laws import StickSlip
 from rod.section import InternalFriction, Memory, Section
+from rod.support import Support
 from tests.rod.energies import section_potential
 
 LAW = StickSlip(6e-3, 2.5e-3, 4.0)
@@ -147,3 +148,13 @@ def test_groups_of_elements_add_up() -> None:
     both = history(section(replace(early, beside=late)), path)
     plain = 1e-3 * (path - 2.0)
     assert np.allclose(both, history(section(early), path) + history(section(late), path) - plain, atol=1e-15)
+
+
+def test_friction_that_differs_from_step_to_step_is_the_moment_at_the_bearings() -> None:
+    """Coulomb: a bearing that turns on resists by its whole friction; the last amount stays, none is negative."""
+    rubbing = Support(friction_moment=2e-4)
+    test = BendingTest(0.2, 5e-3, 2.0, left=rubbing, right=rubbing, friction_by_step=np.array([3e-4, -1e-4, -5e-4]))
+    steps = simulate(test, [4e-3, 8e-3, 12e-3, 16e-3])
+    for step, held in zip(steps, (5e-4, 1e-4, 0.0, 0.0), strict=True):
+        assert step.good
+        assert np.abs(step.moment[[0, -1]]) == pytest.approx(held, rel=1e-6, abs=1e-9)
