@@ -69,7 +69,7 @@ INSIDE = {
         ("fit",),
         ("search", "extended", "maps"),
         ("workbench",),
-        ("identified_again", "heldout", "force_breaks", "outlier", "displacements"),
+        ("identified_again", "heldout", "force_breaks", "outlier", "displacements", "ordinary"),
     ],
     "pipeline.diagnosis.posterior": [
         ("explanation", "error_grid", "words"),

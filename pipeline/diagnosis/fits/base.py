@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.camera import DISTORTED, axes_off, scaled, tilt_of
-from pipeline.diagnosis.fits.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_balanced
+from pipeline.diagnosis.fits.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_balanced, as_photographed
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer
 from rod.balance import BalanceGraph, balance
 from rod.bending_test import BendingTest
@@ -217,8 +217,8 @@ def start(
     """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
-    The law is one of any form, beginning with that of the balance equations (``graph``), or a spline of ``points``. A
-    displacement that is known to ``exact`` (m) or better has no error of its own.
+    The law is one of any form, or a spline of ``points``; where the moments show none, it begins with that of the
+    balance equations (``graph``). A displacement that is known to ``exact`` (m) or better has no error of its own.
 
     Raises
     ------
@@ -243,7 +243,11 @@ def start(
     seen = None
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
-        shown = as_balanced(graph or balance(test), unit=stiffness)
+        shown = as_photographed(m, K, unit=stiffness)
+        if shown is None:
+            # from the other side of straight a law with an early knee is never found; else the line will do
+            balanced = as_balanced(graph or balance(test), unit=stiffness)
+            shown = balanced if balanced is not None and balanced[2] * rest < 0.0 else None
         if shown is not None:
             law, coefficients, bend = shown
             seen = np.r_[coefficients, bend]

@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from rod.balance import BalanceGraph
 from rod.characteristic import Characteristic, ParametricCurve
@@ -124,18 +125,61 @@ class FewPoints:
         return np.zeros((0, self.size))
 
 
-KNOWN = 0.3
-"""Standard deviation of a coefficient of a law that a start is laid along: knees count, waves of noise do not."""
-
 LAYINGS = 2
-"""Times that the abscissa is laid along a law given."""
+"""Times that the abscissa of a start is laid along its law."""
+
+BINS = 40
+"""Of the moments that photos show: each holds the curvatures of some dozens of sections."""
+
+SURE = 0.3
+"""Standard deviation of log f_EI as photos show it by the moment P y alone."""
 
 
-def as_balanced(graph: BalanceGraph, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
-    """The law, its coefficients (p,) and K0 (1/m) by the balance equations, without any simulation; None without one.
+def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
+    """The law that photos show by the moment P y, without any simulation: K(m) rises, whatever its form.
 
     A law with an early knee, beside K0 by a straight line through all curvatures, would be sought from the other side
     of the true K0 and never found.
+
+    Parameters
+    ----------
+    moment, curvature : (n,) N m, 1/m
+        Of all sections of all photos.
+    unit : N m^2
+        Of the coefficients.
+
+    Returns
+    -------
+    (law, coefficients (p,), K0 in 1/m), or None where the moments show no law.
+    """
+    order = np.argsort(moment)
+    bins = [part for part in np.array_split(order, BINS) if part.size]
+    m, K = (np.array([np.mean(row[part]) for part in bins]) for row in (moment, curvature))
+    K = isotonic_regression(K).x
+    low = m < m[0] + 0.1 * (m[-1] - m[0])
+    low[:3] = True
+    slope, rest = np.polyfit(m[low], K[low], 1)
+    bend = np.append(0.0, K - rest)
+    rises = np.append(True, np.diff(np.maximum.accumulate(bend)) > 1e-4 * np.ptp(bend))
+    bend, m = bend[rises], np.append(0.0, m)[rises]
+    if not (slope > 0.0 and bend.size > 3 and np.all(np.diff(m) > 0.0)):
+        return None
+    law = AnyLaw(moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS))
+    for _ in range(LAYINGS):
+        rows = law.basis.at(0.5 * (bend[1:] + bend[:-1])) / SURE
+        log_f = np.log(np.diff(m) / np.diff(bend) / unit) / SURE
+        prior = law.prior()
+        found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
+        rise = law.basis.law(found)
+        law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
+    return law, law.basis.projected(rise), float(rest)
+
+
+def as_balanced(graph: BalanceGraph, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
+    """The same by the balance equations, where the moments alone show none; None without a law.
+
+    They know the noise, so they see an early knee in what scatters too much to rise; of a cable that is not uniform
+    they know less.
 
     Parameters
     ----------
@@ -153,7 +197,7 @@ def as_balanced(graph: BalanceGraph, *, unit: float) -> tuple[AnyLaw, Array, flo
     law, coefficients = following(np.append(tangent[0], tangent), np.append(0.0, bend), unit=unit)
     for _ in range(LAYINGS):
         rise = law.basis.law(coefficients)
-        law = AnyLaw(refreshed(rise, KNOWN**2 * np.eye(law.size), 0.0, float(bend[-1])))
+        law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
         coefficients = law.basis.projected(rise)
     return law, coefficients, graph.law.pre_curvature
 
