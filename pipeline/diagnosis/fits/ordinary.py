@@ -1,7 +1,8 @@
 """A rig that is off by what every rig is: zero of displacement, length and camera beside a fitted model.
 
 So much is among the errors of the data (`pipeline.diagnosis.posterior.error_grid`) and is named by nobody. Where it is
-likelier than an exact rig, residuals are shown beside it, and the reader is told its size.
+likelier than an exact rig, residuals and f_EI of a model with causes are those beside it, and the reader is
+told its size.
 
 Code: ``rig/ordinary``.
 """
@@ -25,18 +26,13 @@ def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspic
     extension = fitted.extension
     present = {term.cause.name for term in extension.terms}
     terms = tuple(
-        _known_to(term, term.variant.ordinary / term.cause.plausible(extension.facts))
+        Term(term.cause, replace(form, known=form.ordinary / term.cause.plausible(extension.facts)))
         for term in suspicion.terms
-        if term.variant.ordinary > 0.0 and term.cause.name not in present
+        if (form := term.variant).ordinary > 0.0 and term.cause.name not in present
     )
     wider = replace(extension, terms=(*extension.terms, *terms))
     found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
     return None if found.run.prediction is None else found
-
-
-def _known_to(term: Term, known: float) -> Term:
-    """The same form, its amount known beforehand to so many usual amounts."""
-    return Term(term.cause, replace(term.variant, known=known))
 
 
 SEEN = 2.0
