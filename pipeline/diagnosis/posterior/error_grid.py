@@ -50,8 +50,8 @@ HOLD = {0.0: 0.7, 1.0: 0.3}
 MOVED = {(0.0, 0.0): 0.4, (0.0, 1.0): 0.25, (1e-5, 0.0): 0.25, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
 several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen. `MOVED`:
-scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1); all of it together,
-for a rig that is exact in all but one is rarer than one that nobody aligned."""
+scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
+together: one that is exact in all but one thing is rarer than one that nobody aligned."""
 
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
