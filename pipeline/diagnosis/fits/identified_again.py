@@ -183,14 +183,15 @@ def _data_rows(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
     value = np.r_[weight * fitted.residual[:count], fitted.residual[count:known]]
     columns = np.hstack([fitted.jacobian, beside])
     J = -np.vstack([weight[:, None] * columns[:count], columns[count:known]])
-    sizes = []
-    for term in fitted.extension.terms:
-        sizes.append(min(FORGOTTEN, term.variant.known) * term.cause.plausible(facts))
-        sizes.extend(term.variant.scale(name) for name in term.variant.tuned)
-    sizes.extend(np.ones(beside.shape[1]))
-    weak = np.diag(1.0 / np.array(sizes))
-    rest = np.hstack([np.zeros((len(sizes), len(base.names))), weak])
-    return np.r_[value, np.zeros(len(sizes))], np.vstack([J, rest])
+    sizes, seen_from = [], []  # of an amount its zero, of a place or a time where it was found
+    for term, at in zip(fitted.extension.terms, fitted.extension.amounts_at, strict=True):
+        tuned = [term.variant.scale(name) for name in term.variant.tuned]
+        sizes += [min(FORGOTTEN, term.variant.known) * term.cause.plausible(facts), *tuned]
+        seen_from += [fitted.vector[at], *np.zeros(len(tuned))]
+    sizes += [1.0] * beside.shape[1]
+    seen_from += [0.0] * beside.shape[1]
+    weak = np.hstack([np.zeros((len(sizes), len(base.names))), np.diag(1.0 / np.array(sizes))])
+    return np.r_[value, np.array(seen_from) / np.array(sizes)], np.vstack([J, weak])
 
 
 def _weights(observation: Observation, fitted: Fit) -> Array:

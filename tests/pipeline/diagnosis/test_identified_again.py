@@ -5,12 +5,13 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.effects import SPOT, profile
-from fixtures.hidden import LOOP, SIX, Protocol, hidden_test
+from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.memory import BoucWen, Slipping
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.identified_again import identified_again
+from pipeline.diagnosis.fits.ordinary import beside_ordinary_rig
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -59,3 +60,16 @@ def test_the_size_of_a_loop_allows_for_other_forms():
     size, std = sizes["hysteresis"]
     assert abs(size - friction.half_width) < 2.0 * std and std < 0.15 * size
     assert z < 2.0
+
+
+def test_what_is_known_of_a_rig_stays_known():
+    """Without a photo at rest the zero is known to 20 um beforehand, and to no more: no step on the way adds to it."""
+    protocol = Protocol(SIX.shares[1:], SIX.branches[1:])
+    reading = Reading(length_error=2e-3, play=1e-5)
+    test = hidden_test(Cable(), protocol, largest=0.03, seed=18, reading=reading)
+    bench = prepare(faults_of_input(test), SETTINGS)
+    rig = beside_ordinary_rig(bench.observation, bench.base, bench.suspicion)
+    again = identified_again(bench.observation, rig).fitted
+    for term in range(len(rig.extension.terms)):
+        amount, std = rig.amount(term)
+        assert abs(again.amount(term)[0] - amount) < std
