@@ -46,7 +46,8 @@ class Evidence:
     edges : ratio
         Median over the blocks of the weaker edge's step in standard deviations of the ground's.
     unsteady : ratio
-        Scatter of the width, waves averaged, over what camera and edges explain; about 1 or less on a cable.
+        Scatter of the width, waves averaged, over what camera and edges explain; about 1 or less on a cable. Infinite
+        where nothing was weighed.
     crossed : (u, v) px or None
         Where what is beside the strip on both sides looks like the strip itself.
     """
@@ -59,8 +60,9 @@ class Evidence:
 
     @property
     def figures(self) -> dict[str, float]:
-        """The numbers that a refusal tells."""
-        return {"edges_over_noise": self.edges, "seen": self.seen, "width_unsteady": self.unsteady}
+        """The numbers that a refusal tells; none of a strip too short to be weighed."""
+        figures = {"edges_over_noise": self.edges, "seen": self.seen, "width_unsteady": self.unsteady}
+        return figures if np.isfinite(self.unsteady) else {}
 
     @property
     def likeness(self) -> float:
@@ -207,7 +209,9 @@ def _crossed(
 def unlike_a_cable(evidence: Evidence) -> Message:
     """Why a strip is refused: the figure that is farthest from that of a cable."""
     edges, steady = evidence.edges / 6.0, 1.0 / max(evidence.unsteady, 1.0)
-    if evidence.edges < _FIRM or edges <= min(evidence.seen, steady):
+    if not evidence.figures:
+        key = "photo/contrast.no-edges"
+    elif evidence.edges < _FIRM or edges <= min(evidence.seen, steady):
         key = "photo/contrast.weak-edge"
     else:
         key = "photo/outline.one-edge" if evidence.seen <= steady else "photo/outline.unsteady"
