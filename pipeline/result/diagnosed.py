@@ -18,7 +18,9 @@ class CauseForm(Part):
     std: Number = Field(description="of the amount, in the cause's unit")
     at: Number = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s or direction")
     width: Number = Field(
-        0.0, description="of a spot, in shares of the length; of what a steep camera foreshortens its distance, m"
+        0.0,
+        description="of a spot, in shares of the length; of a steep tilt the square of the camera's distance, m^2, "
+        "negative where the rig is cut from the side of its picture",
     )
     tuned: list[str] = Field([], description="which of `at` and `width` were fitted")
     factor: list[Floats] = Field(

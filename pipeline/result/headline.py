@@ -52,7 +52,8 @@ def _unmeasured(result: Result) -> Message:
 
 def _range(name: str, curve: Visited) -> Message:
     (low, first, first_std), (high, last, last_std) = curve.ends()
-    beyond = abs(last - first) > 2.0 * math.hypot(first_std, last_std)
+    # a law is positive and its errors are relative ones: 1.3 +- 0.8 is far from 0.035 +- 0.002
+    beyond = abs(math.log(last / first)) > 2.0 * math.hypot(first_std / first, last_std / last)
     return Message(
         "opening.constant" if not beyond else "opening.falls" if last < first else "opening.rises",
         id=name,

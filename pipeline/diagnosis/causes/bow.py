@@ -29,6 +29,11 @@ NEAR = (0.1, 1.0)
 """Length over the distance of a near camera, least and most: below, no bow stands up far enough to be seen larger."""
 
 
+GROWTH = (0.0, 2.0)
+"""Power of the bow with which the height goes, least and most: a height in proportion to the travel goes with its
+square."""
+
+
 class OutOfPlaneBow(Cause):
     """``out_of_plane_bow``: the cable rises from the plane of the picture between the bearings."""
 
@@ -49,10 +54,10 @@ class OutOfPlaneBow(Cause):
         where nothing but the height shrinks the bow: a near camera tells of their product first.
         """
         low, high = NEAR
-        near = Variant(width=0.5 * (low + high), tuned=("at", "width"), width_range=NEAR)
+        near = Variant(width=0.5 * (low + high), tuned=("at", "width"), at_range=GROWTH, width_range=NEAR)
         views = (
             # what is foreshortened grows with the square of the height
-            Variant(tuned=("at",), trace=4.0, power=2.0),
+            Variant(tuned=("at",), at_range=GROWTH, trace=4.0, power=2.0),
             near,
             replace(near, width=-near.width, width_range=(-high, -low)),
         )

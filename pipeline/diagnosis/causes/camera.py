@@ -8,8 +8,10 @@ chord frame is laid through the moved bearings, so chord and shape change togeth
     lens_distortion  p -> p (1 + k1 |p|^2 / R^2)            R: half the picture's diagonal on the plane
     camera_tilt      p -> p / (1 + g . p)                   g: perspective terms along and across the chord, 1/m
 
-A tilt phi seen from the distance D has g = sin(phi) / D, and foreshortens its own direction by cos(phi) as well: half a
-percent at 6 degrees, fifty times what a photo shows. A tilt that large has the distance as a second number.
+A tilt phi seen from the distance D has g = sin(phi) / D, and changes lengths by the square of phi as well, half a
+percent at 6 degrees, fifty times what a photo shows. A tilt that large has D^2 as a second number, positive where the
+camera is turned about the rig, cos(phi) along the tilt; negative where it leans where it stands and the rig is cut from
+the side of its picture, 1 / cos(phi)^2 along the tilt and 1 / cos(phi) across it.
 """
 
 from __future__ import annotations
@@ -24,14 +26,14 @@ from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
-DISTANCES = (1.0, 3.0, 15.0)
-"""Camera to cable in lengths: nearest (all of it is hardly seen), usual, and farthest (a tilt is none from there)."""
+USUAL, FAR = 3.0, 6.0
+"""Camera to cable in lengths: usual, and farthest: a long lens, before which a tilt is hardly seen otherwise."""
 
 STEEP = 4.0
 """Multiple of the usual amount at which the trace of a steep tilt is computed: nearly its plausible size."""
 
-STEEPEST = 0.95
-"""Sine of the largest tilt."""
+STEEPEST = 0.3
+"""Sine of the largest tilt: beyond 17 degrees anybody sees it."""
 
 DISTORTED = 0.01
 """Radial distortion at half the picture's diagonal by a common zoom lens."""
@@ -180,26 +182,25 @@ class CameraTilt(Cause):
         return tilt_of(facts.length)
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Tilt along and across the chord, each without and with what it foreshortens, seen from ``width`` (m)."""
-        lean = LEAN * tilt_of(facts.length)
+        """Tilt along and across the chord, by perspective alone and steep, with the signed D^2 as ``width``, m^2."""
+        lean, square = LEAN * tilt_of(facts.length), facts.length**2
         plain = (
             Variant("along the chord", at=0.0, ordinary=lean),
             Variant("across the chord", at=1.0, ordinary=lean),
         )
-        labels = ("along the chord, and foreshortened", "across the chord, and foreshortened")
         steep = tuple(
             replace(
                 form,
-                label=label,
+                label=f"{form.label}, steep",
                 ordinary=0.0,
-                width=DISTANCES[1] * facts.length,
+                width=USUAL**2 * square,
                 tuned=("width",),
-                width_range=(DISTANCES[0] * facts.length, DISTANCES[-1] * facts.length),
-                setting="foreshortened",
+                width_range=(-(FAR**2) * square, FAR**2 * square),
+                setting="steep",
                 trace=trace,
             )
-            for form, label in zip(plain, labels, strict=True)
-            # what is foreshortened does not change its sign with the tilt, so neither trace tells of the other
+            for form in plain
+            # what grows with the square of the tilt does not change its sign, so neither trace tells of the other
             for trace in (STEEP, -STEEP)
         )
         return (*plain, *steep)
@@ -211,14 +212,14 @@ class CameraTilt(Cause):
         chord has sunk by the first turn when the second one moves it across (product of both rotations).
         """
         across = variant.at > 0.5
-        # a refit may step anywhere: beyond 70 degrees the camera looks along the table
-        sine = float(np.clip(amount * variant.width, -STEEPEST, STEEPEST))
-        shorter, sheared = float(np.sqrt(1.0 - sine**2)), -sine * model.lean[0 if across else 1]
+        sine = float(np.clip(amount * np.sqrt(abs(variant.width)), -STEEPEST, STEEPEST))
+        shorter, both = float(np.sqrt(1.0 - sine**2)), sine * model.lean[0 if across else 1]
+        own, other, sheared = (shorter, 1.0, -both) if variant.width >= 0.0 else (shorter**-2, 1.0 / shorter, both)
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:
             if across:
-                return x / (1.0 + amount * y), (y * shorter + x * sheared) / (1.0 + amount * y)
-            return (x * shorter + y * sheared) / (1.0 + amount * x), y / (1.0 + amount * x)
+                return x * other / (1.0 + amount * y), (y * own + x * sheared) / (1.0 + amount * y)
+            return (x * own + y * sheared) / (1.0 + amount * x), y * other / (1.0 + amount * x)
 
         lean = model.lean[0] + (not across) * sine, model.lean[1] + across * sine
         return replace(model.observed(seen_through(move)), lean=lean)

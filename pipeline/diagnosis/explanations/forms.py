@@ -18,7 +18,7 @@ from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
-from pipeline.diagnosis.fits.search import suspect
+from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.score import descending
 
@@ -68,8 +68,8 @@ def with_more_forms(
         # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
         for eligible in (fresh, fitting):
             if _loudest(more.statistic, eligible) ** 2 >= least:
-                loudest = int(descending(more.statistic * eligible)[0])
-                added = fit_terms(observation, fitted, more, (loudest,))
+                fits = (fit_terms(observation, fitted, more, (start,)) for start in _starts(more, eligible))
+                added = min((one for one in fits if one is not None), key=lambda one: one.chi2, default=None)
             if added is not None and fitted.chi2 - added.chi2 >= least:
                 break
         if added is None or fitted.chi2 - added.chi2 < least:
@@ -88,6 +88,17 @@ def may_join(term: Term, fitted: Fit, setting: str) -> bool:
         return False
     present = [(other.cause, other.variant.as_usual) for other in fitted.extension.terms]
     return term.variant.has_place or (term.cause, term.variant.as_usual) not in present
+
+
+def _starts(more: Suspicion, eligible: NDArray[np.bool_]) -> list[int]:
+    """The loudest form, and the loudest of the same name whose trace is taken at another amount.
+
+    A trace that grows with the square of the amount tells nothing of its sign.
+    """
+    ranked = [int(k) for k in descending(more.statistic * eligible) if eligible[k]]
+    first = more.terms[ranked[0]].variant
+    alike = [k for k in ranked if replace(more.terms[k].variant, trace=first.trace) == first]
+    return alike[:2]
 
 
 def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> float:

@@ -65,10 +65,12 @@ def refitted_pairs(
     return found
 
 
-def beside_best(bench: Workbench, best: Explanation, second: Suspicion) -> list[Explanation]:
-    """The best single cause with each of the two that score most beside it."""
+def beside_best(bench: Workbench, best: Explanation, second: Suspicion, *, likely: bool) -> list[Explanation]:
+    """The best single cause with each of the two that score most beside it, or with all others if not ``likely``."""
+    near = candidates(second)[:2]
+    every = candidates(second, margin=1.0, most=len(second.causes))
     found = []
-    for cause in candidates(second)[:2]:
+    for cause in near if likely else [cause for cause in every if cause not in near]:
         direction = second.best(cause)
         if cause == best.causes[0] or direction is None:
             continue

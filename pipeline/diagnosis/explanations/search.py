@@ -109,13 +109,15 @@ class Search:
         hopeless = bench.base.chi2 if best is None else best.fitted.chi2
         found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
         if best is not None and second is not None:
-            found += beside_best(bench, best, second)
+            found += beside_best(bench, best, second, likely=True)
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         self.add(list(self._pruned(found)))
-        likelier = self.posterior.total(count=2) > sum(SHARES[2])
-        if not likelier and best is not None and len(best.fitted.extension.terms) == 1:
+        believed = self.posterior
+        if believed.word == "rest" and best is not None and second is not None:
+            found += self.add(beside_best(bench, best, second, likely=False))
+        elif believed.total(count=2) < sum(SHARES[2]):
             return
         forms = with_all_forms(bench, found)
         new = [one for one in forms if one not in found]

@@ -77,9 +77,12 @@ def identified_again(
     for _ in range(LAYINGS):
         extension, vector = laid_along(found)
         there = _at(observation, replace(found, extension=extension), vector)
-        if there is None:
+        mean = None if there is None else _at_mean(observation, there)
+        # a mean is off by a standard deviation of each unknown at most; farther off, what is linear is no guide (two
+        # spots in one place)
+        if mean is None or mean.chi2 > fitted.chi2 + extension.size:
             break
-        found = _at_mean(observation, there)
+        found = mean
     covariance = _averaged(observation, found).covariance
     for errors in force_errors:
         moved = _moved_by_forces(observation, found, covariance, errors)

@@ -47,7 +47,7 @@ Forms = Callable[[Array], Array]
 
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
-MOVED = {(0.0, 0.0): 0.4, (0.0, 1.0): 0.25, (1e-5, 0.0): 0.25, (5e-5, 0.0): 0.1}
+MOVED = {(0.0, 0.0): 0.1, (0.0, 1.0): 0.6, (1e-5, 0.0): 0.2, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
 several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen. `MOVED`:
 scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it

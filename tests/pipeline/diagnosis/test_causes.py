@@ -188,20 +188,27 @@ def test_several_forms_that_add_up_to_one_spot_are_told_as_it(bench, name, amoun
 
 @pytest.mark.parametrize("sines", [(0.06, 0.07), (-0.06, 0.07), (0.03, -0.1)])
 @pytest.mark.parametrize("along_first", [True, False])
-def test_two_tilts_are_one_turn_of_the_plane_before_a_pinhole(bench, sines, along_first):
-    """Against one rotation in space about an oblique axis: chord and distances between places are those it shows."""
+@pytest.mark.parametrize("way", ["foreshortened", "stretched"])
+def test_two_tilts_are_one_turn_before_a_pinhole(bench, sines, along_first, way):
+    """Against one rotation in space about an oblique axis: chord and distances between places are those it shows.
+
+    Of the plane about the picture's middle, or of the camera where it stands, the middle then brought back.
+    """
     facts, model, here = bench
     distance, cause = 0.4, BY_NAME["camera_tilt"]
-    forms = [replace(v, width=distance) for v in cause.variants(facts) if v.width > 0.0][::2]
+    forms = [v for v in cause.variants(facts) if v.setting][::2]
     for form, sine in list(zip(forms, sines, strict=True))[:: 1 if along_first else -1]:
+        form = replace(form, width=distance**2 * (1.0 if way == "foreshortened" else -1.0))
         model = cause.apply(model, sine / distance, form, facts)
     seen = run(model, facts).prediction
     axis = np.array([sines[1], -sines[0], 0.0])
     turn = Rotation.from_rotvec(axis / np.linalg.norm(axis) * np.arcsin(np.linalg.norm(sines)))
+    stands = [0.0, 0.0, distance if way == "stretched" else 0.0]
     for k, centre in enumerate(facts.picture_centre):
         flat = np.column_stack([here.prediction.x[k] - centre[0], here.prediction.y[k] - centre[1]])
-        x, y, depth = turn.apply(np.column_stack([flat, np.zeros(len(flat))])).T
-        true = np.column_stack([x, y]) / (1.0 + depth / distance)[:, None]
+        points = turn.apply(np.column_stack([flat, np.zeros(len(flat))]) + stands) + [0.0, 0.0, distance - stands[2]]
+        middle = turn.apply(stands) + [0.0, 0.0, distance - stands[2]]
+        true = distance * (points[:, :2] / points[:, 2:] - middle[:2] / middle[2])
         shown = np.column_stack([seen.x[k], seen.y[k]])
         # third powers of the tilts are left; without the shear two to four times as much
         assert pdist(shown) == pytest.approx(pdist(true), abs=2e-4 * np.ptp(flat))
