@@ -92,10 +92,15 @@ def identified_again(
 
 def _at_mean(observation: Observation, start: Fit) -> Fit:
     """The model at the mean over all priors of its law, by whole steps as in `rod.inverse.fit`."""
-    here = start
+    here, held = start, np.zeros(start.extension.size, dtype=bool)
     for _ in range(MOVES):
-        posterior = _averaged(observation, here)
+        posterior = _averaged(observation, here, held=held)
         move = posterior.mean - here.vector
+        # cut at the end of its range, one number would leave all others where they belong beside another
+        outside = here.extension.brought_inside(posterior.mean) != posterior.mean
+        if np.any(outside & ~held):
+            held |= outside
+            continue
         if np.all(np.abs(move) <= SETTLED * np.sqrt(np.diag(posterior.covariance))):
             break
         law = here.extension.base.law
@@ -167,14 +172,20 @@ def _other_forms(observation: Observation, fitted: Fit) -> tuple[list[str], Arra
     return names, np.hstack(columns)
 
 
-def _averaged(observation: Observation, fitted: Fit, *, beside: Array | None = None) -> Posterior:
+def _averaged(
+    observation: Observation, fitted: Fit, *, beside: Array | None = None, held: NDArray[np.bool_] | None = None
+) -> Posterior:
     """Posterior over all priors of the law's form, from the linearisation of a fit.
 
-    ``beside`` (N, j) are traces of further unknowns, each of standard deviation one and mean zero.
+    ``beside`` (N, j) are traces of further unknowns, each of standard deviation one and mean zero; ``held`` (p,) says
+    which numbers of causes stay where they are.
     """
     law = fitted.extension.base.law
     assert isinstance(law, AnyLaw)
     value, J = _data_rows(observation, fitted, np.zeros((len(fitted.residual), 0)) if beside is None else beside)
+    if held is not None:
+        J[:, np.flatnonzero(held)] = 0.0
+        J, value = np.vstack([J, np.eye(len(held), J.shape[1])[held]]), np.r_[value, np.zeros(held.sum())]
     return averaged(value, J, np.r_[fitted.vector, np.zeros(J.shape[1] - len(fitted.vector))], priors(law.basis))
 
 
