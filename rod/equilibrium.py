@@ -173,7 +173,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
     trusted = branch == "jump" or _leads(rod, side)
     warm = None if first is None else _near(system, first)
-    if warm and _wound(system, warm):
+    if warm and _wound(system, warm, swung=branch != "jump"):
         first = warm = None
     if warm and trusted:
         yield judged(system, warm, kept)
@@ -234,15 +234,18 @@ def _near(system: System, first: Start) -> Trial:
     return warm if np.abs(warm.angles - first.angles).max() <= NEAR else warm._replace(outcome=Outcome.STALLED)
 
 
-def _wound(system: System, trial: Trial) -> bool:
-    """Whether a cable that was pressed together pulls: its start was wound up in a loop, which holds far more energy.
+def _wound(system: System, trial: Trial, *, swung: bool = True) -> bool:
+    """Whether a start led to a cable that is wound up in a loop, or (``swung``) has swung round to the other side.
 
-    From the force-free shape on energy grows while the bearings approach, so they are pushed apart. Loads, friction and
-    set may pull as well: then the path from the force-free shape costs a little more and ends at the same.
+    From the force-free shape on energy grows while the bearings approach, so they are pushed apart: a cable that was
+    pressed together and pulls is in a loop, which holds far more energy. Under a force it swings round where its
+    bearings meet, and comes to rest at another energy. Loads, friction and set may pull as well, and the path may lead
+    beyond the meeting: then the path from the force-free shape costs a little more and ends at the same.
     """
-    if not trial.found or trial.R[0] <= 0.0 or system.hold.tip is not None:
+    if not trial.found or system.hold.tip is not None:
         return False
-    return float(system.rod.edges @ np.cos(trial.angles)) < system.rod.mounted.chord
+    chord = float(system.rod.edges @ np.cos(trial.angles))
+    return (swung and chord <= 0.0) or (trial.R[0] > 0.0 and chord < system.rod.mounted.chord)
 
 
 def _from_straight(system: System, side: int) -> Trial:
