@@ -133,7 +133,8 @@ def solve(
         At the start of the step; None for the mounted cable.
     start : Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape. It saves time and chooses no
-        shape, but for the branch ``jump``: where it may lead to one of far more energy, that path is followed.
+        shape, but for the branch ``jump``: where it may lead to one of more energy, that path is followed, so that no
+        CONVERGED result of a start has more energy than the one without (tests try random stable shapes as starts).
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see the module.
     patient : bool
@@ -171,7 +172,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     side = bow_side(rod, branch)
     # A cable that has jumped keeps the side it came to.
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
-    trusted = branch == "jump" or _leads(rod, side)
+    trusted = branch == "jump" or (system.hold.tip is None and _leads(rod, side))
     warm = None if first is None else _near(system, first)
     if warm and _wound(system, warm, swung=branch != "jump"):
         first = warm = None
@@ -185,7 +186,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         yield judged(system, warm, kept)
     if lost.outcome is Outcome.LIMIT_POINT:
         # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
-        if patient and warm and warm.found and system.excess_negatives(warm.balance):
+        if patient and warm and warm.found and warm.negatives:
             for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
                 yield judged(system, descended(system, beside), kept)
         return
@@ -221,7 +222,7 @@ def _leads(rod: Rod, side: int) -> bool:
     """Whether a start on this side of a cable is where the path from its force-free shape leads, and saves the path.
 
     On the other side, in a coil, and where the path alone can tell the side (0), there are stable shapes of far more
-    energy than the one its force-free shape leads to, and a start may be such.
+    energy than the one its force-free shape leads to, and a start may be such. So may any of a cable whose end is free.
     """
     leaning, certain = rod.leaning
     coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
@@ -235,17 +236,17 @@ def _near(system: System, first: Start) -> Trial:
 
 
 def _wound(system: System, trial: Trial, *, swung: bool = True) -> bool:
-    """Whether a start led to a cable that is wound up in a loop, or (``swung``) has swung round to the other side.
+    """Whether a start led to a cable that is wound up, or (``swung``) has swung round to the other side.
 
-    From the force-free shape on energy grows while the bearings approach, so they are pushed apart: a cable that was
-    pressed together and pulls is in a loop, which holds far more energy. Under a force it swings round where its
-    bearings meet, and comes to rest at another energy. Loads, friction and set may pull as well, and the path may lead
-    beyond the meeting: then the path from the force-free shape costs a little more and ends at the same.
+    Wound up, an edge has turned by more than half a turn from the force-free shape: in a loop, or against the spring of
+    a bearing, it holds far more energy. Under a force a cable swings round where its bearings meet, and comes to rest
+    at another energy. Where the path from the force-free shape does lead that far it costs a little more and ends at
+    the same.
     """
     if not trial.found or system.hold.tip is not None:
         return False
-    chord = float(system.rod.edges @ np.cos(trial.angles))
-    return (swung and chord <= 0.0) or (trial.R[0] > 0.0 and chord < system.rod.mounted.chord)
+    turned = np.abs(trial.angles - system.rod.mounted.angles).max()
+    return bool(turned > np.pi or (swung and system.rod.edges @ trial.balance.edge.direction[1] <= 0.0))
 
 
 def _from_straight(system: System, side: int) -> Trial:
