@@ -172,7 +172,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     side = bow_side(rod, branch)
     # A cable that has jumped keeps the side it came to.
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
-    trusted = branch == "jump" or (system.hold.tip is None and _leads(rod, side))
+    trusted = branch == "jump" or _leads(rod, side)
     warm = None if first is None else _near(system, first)
     if warm and _wound(system, warm, swung=branch != "jump"):
         first = warm = None
@@ -222,7 +222,7 @@ def _leads(rod: Rod, side: int) -> bool:
     """Whether a start on this side of a cable is where the path from its force-free shape leads, and saves the path.
 
     On the other side, in a coil, and where the path alone can tell the side (0), there are stable shapes of far more
-    energy than the one its force-free shape leads to, and a start may be such. So may any of a cable whose end is free.
+    energy than the one its force-free shape leads to, and a start may be such.
     """
     leaning, certain = rod.leaning
     coiled = abs(float(rod.mounted.angles[0] - rod.mounted.angles[-1])) >= np.pi
@@ -239,11 +239,11 @@ def _wound(system: System, trial: Trial, *, swung: bool = True) -> bool:
     """Whether a start led to a cable that is wound up, or (``swung``) has swung round to the other side.
 
     Wound up, an edge has turned by more than half a turn from the force-free shape: in a loop, or against the spring of
-    a bearing, it holds far more energy. Under a force a cable swings round where its bearings meet, and comes to rest
-    at another energy. Where the path from the force-free shape does lead that far it costs a little more and ends at
+    a bearing, it holds far more energy. Under a force a cable swings round where its ends meet, and comes to rest at
+    another energy. Where the path from the force-free shape does lead that far it costs a little more and ends at
     the same.
     """
-    if not trial.found or system.hold.tip is not None:
+    if not trial.found:
         return False
     turned = np.abs(trial.angles - system.rod.mounted.angles).max()
     return bool(turned > np.pi or (swung and system.rod.edges @ trial.balance.edge.direction[1] <= 0.0))
