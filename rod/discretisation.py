@@ -98,6 +98,16 @@ class Rod:
         return 0.5 * (np.concatenate(([0.0], inner)) + np.concatenate((inner, [0.0])))
 
     @cached_property
+    def inverse_weights(self) -> Array:
+        """One over `weights`, (n + 1,) 1/m."""
+        return 1.0 / self.weights
+
+    @cached_property
+    def signed_edges(self) -> Array:
+        """Edge lengths and their negatives, (2, n + 2) m."""
+        return np.array((self.edges, -self.edges))
+
+    @cached_property
     def arc_lengths(self) -> Array:
         """Arc length at the vertices, the axes and the joints, (n + 3,) m."""
         return np.concatenate(([0.0], np.cumsum(self.edges)))
@@ -186,9 +196,14 @@ class Rod:
         angles = self.mounted.angles
         return Memory(relaxed, reached, float(angles[0]), float(angles[-1]))
 
+    @cached_property
+    def _levers(self) -> Array:
+        """How much the mean height, relative to the length, grows with the sine of each edge's angle, (n + 2,)."""
+        return self.edges * (self.length - self.arc_lengths[:-1]) / self.length**2
+
     def bow(self, angles: Array) -> float:
         """Mean height of a shape over its chord, relative to the length: positive if it bows toward +y."""
-        return float((self.edges * (self.length - self.arc_lengths[:-1])) @ np.sin(angles)) / self.length**2
+        return float(self._levers @ np.sin(angles))
 
     def curvature(self, angles: Array) -> Array:
         """Curvature at the joints, (n + 1,) 1/m."""

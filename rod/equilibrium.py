@@ -133,7 +133,8 @@ def solve(
         At the start of the step; None for the mounted cable.
     start : Equilibrium or None
         Warm start, of the same number of elements; None to come from the force-free shape. It saves time and chooses no
-        shape, but for the branch ``jump``: where it may lead to one of far more energy, that path is followed.
+        shape, but for the branch ``jump``: where it may lead to one of more energy, that path is followed, so that no
+        CONVERGED result of a start has more energy than the one without (tests try random stable shapes as starts).
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see the module.
     patient : bool
@@ -173,7 +174,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
     trusted = branch == "jump" or _leads(rod, side)
     warm = None if first is None else _near(system, first)
-    if warm and _wound(system, warm):
+    if warm and _wound(system, warm, swung=branch != "jump"):
         first = warm = None
     if warm and trusted:
         yield judged(system, warm, kept)
@@ -185,7 +186,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
         yield judged(system, warm, kept)
     if lost.outcome is Outcome.LIMIT_POINT:
         # A joint on the falling part of its law, the end joint at rest say, tips over to a rising part if there is.
-        if patient and warm and warm.found and system.excess_negatives(warm.balance):
+        if patient and warm and warm.found and warm.negatives:
             for beside in tilted(system, warm, rod.length_beyond - 0.5 * rod.length):
                 yield judged(system, descended(system, beside), kept)
         return
@@ -234,15 +235,18 @@ def _near(system: System, first: Start) -> Trial:
     return warm if np.abs(warm.angles - first.angles).max() <= NEAR else warm._replace(outcome=Outcome.STALLED)
 
 
-def _wound(system: System, trial: Trial) -> bool:
-    """Whether a cable that was pressed together pulls: its start was wound up in a loop, which holds far more energy.
+def _wound(system: System, trial: Trial, *, swung: bool = True) -> bool:
+    """Whether a start led to a cable that is wound up, or (``swung``) has swung round to the other side.
 
-    From the force-free shape on energy grows while the bearings approach, so they are pushed apart. Loads, friction and
-    set may pull as well: then the path from the force-free shape costs a little more and ends at the same.
+    Wound up, an edge has turned by more than half a turn from the force-free shape: in a loop, or against the spring of
+    a bearing, it holds far more energy. Under a force a cable swings round where its ends meet, and comes to rest at
+    another energy. Where the path from the force-free shape does lead that far it costs a little more and ends at
+    the same.
     """
-    if not trial.found or trial.R[0] <= 0.0 or system.hold.tip is not None:
+    if not trial.found:
         return False
-    return float(system.rod.edges @ np.cos(trial.angles)) < system.rod.mounted.chord
+    turned = np.abs(trial.angles - system.rod.mounted.angles).max()
+    return bool(turned > np.pi or (swung and system.rod.edges @ trial.balance.edge.direction[1] <= 0.0))
 
 
 def _from_straight(system: System, side: int) -> Trial:

@@ -81,13 +81,18 @@ class Start(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """A state, its residuals, the steps of Newton's method that led there, and how that ended."""
+    """A state, its residuals, the steps of Newton's method that led there, and how that ended.
+
+    ``negatives``: directions in which it is unstable, if counted on the way: on the Hessian of the last step, which
+    turned no edge by more than the tolerance.
+    """
 
     angles: Array
     R: Array
     balance: Balance
     steps: int
     outcome: Outcome
+    negatives: int | None = None
 
     @property
     def found(self) -> bool:
@@ -101,7 +106,8 @@ def newton(system: System, start: Start) -> Trial:
     balance = system.balance(angles, R)
     norm = system.misfit(balance)
     for count in range(1, ITERATIONS + 1):
-        dalpha, dR = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])
+        here = system.eliminated(balance, -balance.gradient[:, None], -balance.gap[:, None])
+        dalpha, dR = system.solution(here)
         step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))
         if not isfinite(step):
             return Trial(angles, R, balance, count, Outcome.STALLED)
@@ -118,7 +124,7 @@ def newton(system: System, start: Start) -> Trial:
         if not isfinite(norm):
             break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
-            return Trial(angles, R, balance, count, Outcome.CONVERGED)
+            return Trial(angles, R, balance, count, Outcome.CONVERGED, system.negatives(here))
     return Trial(angles, R, balance, count, Outcome.STALLED)
 
 
@@ -143,8 +149,9 @@ def descended(system: System, start: Start) -> Trial:
     for count in range(1, DESCENT_STEPS + 1):
         balance = system.balance(angles, R)
         shifted = balance._replace(diagonal=balance.diagonal + shift * mass)
-        dalpha, dR = system.solve(shifted, -balance.gradient[:, None], -balance.gap[:, None])
-        step = float(np.abs(dalpha).max()) if system.excess_negatives(shifted) == 0 else np.inf
+        here = system.eliminated(shifted, -balance.gradient[:, None], -balance.gap[:, None])
+        dalpha, dR = system.solution(here)
+        step = float(np.abs(dalpha).max()) if system.negatives(here) == 0 else np.inf
         if not step <= DESCENT_LIMIT:
             shift = 4.0 * max(shift, 0.1)
             continue
@@ -178,13 +185,13 @@ def judged(system: System, trial: Trial, side: int) -> Trial:
     if not trial.found:
         return trial
     outcome = Outcome.CONVERGED
-    K = trial.balance.K
+    K, negatives = trial.balance.K, trial.negatives
     middle = K.copy()
     middle[1:] = 0.5 * (K[1:] + K[:-1])
     between = system.section(middle)[1]
     if min(float(trial.balance.tangent.min()), float(between.min())) <= 0.0:
         outcome = Outcome.LIMIT_POINT
-    elif system.excess_negatives(trial.balance) != 0:
+    elif (system.excess_negatives(trial.balance) if negatives is None else negatives) != 0:
         outcome = Outcome.UNSTABLE
     elif side and side * system.rod.bow(trial.angles) < -1e-12:  # a straight cable bows to either side by rounding
         outcome = Outcome.WRONG_BRANCH

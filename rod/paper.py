@@ -3,8 +3,8 @@
 * `table_one`: forces and curvature ranges of Table 1 for both readings and both zeros of displacement, and the shapes
   with that of the initial rod, which is already slightly bent (Fig. 3).
 * `virtual_inverse`: Eq. (7) on Table 1's data with its evolution: control points and characteristic (Fig. 4), forces
-  and curvatures (Fig. 5). Data and fit share the grid, as in
-  the paper: it shows that the parameters can be identified, and validates nothing.
+  and curvatures (Fig. 5). Data and fit share the grid, as in the paper: it shows that the parameters can be identified,
+  and validates nothing.
 * `forced_straight`: the same data fitted with K0 = 0 (Fig. 6), by the forces alone (Eq. (6)), which are met with wrong
   values, and with the curvatures (Eq. (7)): negative stiffness at low curvature. Displacement is counted from where the
   true cable was mounted, for the machine knows that and not the model's K0. Where the paper speaks of small deviations,

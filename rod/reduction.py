@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import idamax
-from scipy.linalg.lapack import dgesv, dgtsv, dpttrf, dstebz, dsyev
+from scipy.linalg.lapack import dgesv, dgtsv, dptsv, dstebz, dsyev
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
@@ -105,6 +105,20 @@ class Balance(NamedTuple):
     edge: EdgeState
 
 
+class Eliminated(NamedTuple):
+    """The bordered system with the angles eliminated: the stiffened H has solved border and right-hand sides.
+
+    ``solved`` (n + 2, k + 1 + p); ``schur`` (k + 1, k + 1), scaled, and ``low`` (k + 1, p) for the k imposed components
+    and the spring; ``definite``: whether the stiffened H is positive definite.
+    """
+
+    balance: Balance
+    solved: Array
+    schur: Array
+    low: Array
+    definite: bool
+
+
 class System:
     """Residuals and Newton steps of one rod, hold and memory; built once per equilibrium, immutable afterwards."""
 
@@ -113,8 +127,8 @@ class System:
         self.moment_scale = rod.stiffness_scale / rod.length
         self.force_scale = rod.stiffness_scale / rod.length**2
         self._response = rod.section.response(memory)
-        self._inverse_weights, self._load_beyond = 1.0 / rod.weights, rod.load_beyond
-        self._signed_edges = np.array((rod.edges, -rod.edges))
+        self._inverse_weights, self._load_beyond = rod.inverse_weights, rod.load_beyond
+        self._edges, self._signed_edges = rod.edges, rod.signed_edges
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
         self._even_softness = np.array(((self._axial * rod.length, 0.0), (0.0, self._axial * rod.length)))
@@ -178,11 +192,11 @@ class System:
         diagonal[:-1] += stiffness
         diagonal[1:] += stiffness
         off, border = -stiffness, self.border(edge)
-        gap = self._gap(edge, border, R)
+        gap = self._gap(edge, R)
         self._hold_ends(angles, gradient, diagonal, off, border)
         return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent, edge)
 
-    def _gap(self, edge: EdgeState, border: Array, R: Array) -> Array:
+    def _gap(self, edge: EdgeState, R: Array) -> Array:
         """Imposed minus actual position of the right axis, (2,) m; 0 where it is not imposed."""
         if self._difference != 0.0:
             x, y = (self.directions(edge) @ self.rod.edges).tolist()
@@ -190,8 +204,8 @@ class System:
             force = self.rod.length * R
             if self._load_beyond is not None:
                 force += self._load_beyond @ self.rod.edges
-            (along, across), (rise, back) = (self._axial * force).tolist(), np.add.reduce(border, 1).tolist()
-            x, y = along - back, across + rise
+            (along, across), (rise, run) = (self._axial * force).tolist(), (edge.direction @ self._edges).tolist()
+            x, y = along + run, across + rise
         hold = self.hold
         lacking = 0.0 if hold.chord is None else hold.chord - hold.compliance * float(R[0]) - x
         return np.array((lacking, -y if hold.tip is None else 0.0))
@@ -278,22 +292,30 @@ class System:
         dalpha : (n + 2, p) rad, dR : (2, p) N
             Not a number if the matrix is singular.
         """
-        solved, schur, low = self._eliminated(balance, rhs)
+        return self.solution(self.eliminated(balance, rhs, gap))
+
+    def solution(self, eliminated: Eliminated) -> tuple[Array, Array]:
+        """What `solve` returns, from the eliminated system."""
+        _, solved, schur, low, _ = eliminated
         k = len(schur) - 1
-        low[:k] += gap[self._imposed]
         _, _, multipliers, info = dgesv(schur, self._scale * low)
         multipliers = self._scale * multipliers if info == 0 else np.full_like(low, np.nan)
-        dR = np.zeros(gap.shape)
+        dR = np.zeros((2, low.shape[1]))
         dR[self._imposed] = multipliers[:k]
         return (solved.T[k + 1 :] - multipliers.T @ solved.T[: k + 1]).T, dR
 
     def excess_negatives(self, balance: Balance) -> int:
         """Negative eigenvalues of the Hessian of Eq. (4) under the imposed positions: 0 proves a minimum."""
-        _, schur, _ = self._eliminated(balance, np.empty((balance.gradient.size, 0)))
+        return self.negatives(self.eliminated(balance, np.empty((balance.gradient.size, 0)), np.empty((2, 0))))
+
+    def negatives(self, eliminated: Eliminated) -> int:
+        """What `excess_negatives` returns, from the eliminated system."""
+        balance, schur = eliminated.balance, eliminated.schur
         if not np.isfinite(schur).all():
             return 1
         below = int(np.count_nonzero(dsyev(schur, compute_v=0)[0] < 0.0))
-        return negative_pivots(self._stiffened(balance), balance.off) + below + 1 - len(schur)
+        above = 0 if eliminated.definite else negative_pivots(self._stiffened(balance), balance.off)
+        return above + below + 1 - len(schur)
 
     def _stiffened(self, balance: Balance) -> Array:
         """Diagonal of H with the spring on its middle edge, (n + 2,)."""
@@ -301,29 +323,32 @@ class System:
         diagonal[self._middle] += self._spring
         return diagonal
 
-    def _eliminated(self, balance: Balance, rhs: Array) -> tuple[Array, Array, Array]:
-        """Border and ``rhs`` solved by the stiffened H, the scaled Schur complement, minus border times solved rhs."""
+    def eliminated(self, balance: Balance, rhs: Array, gap: Array) -> Eliminated:
+        """The angles eliminated, for right-hand sides ``rhs`` (n + 2, p) N m and ``gap`` (2, p) m."""
         imposed = self._imposed
         k = 2 - imposed.start
         columns = np.zeros((k + 1 + rhs.shape[1], rhs.shape[0]))
         columns[:k] = balance.border[imposed]
         columns[k, self._middle] = -self._spring
         columns[k + 1 :] = rhs.T
-        *_, solved, info = dgtsv(balance.off, self._stiffened(balance), balance.off, columns.T)
-        if info != 0:
-            solved = np.full_like(solved, np.nan)
+        diagonal = self._stiffened(balance)
+        _, _, solved, info = dptsv(diagonal, balance.off, columns.T)
+        definite = info == 0
+        if not definite:
+            *_, solved, info = dgtsv(balance.off, diagonal, balance.off, columns.T)
+            if info != 0:
+                solved = np.full_like(solved, np.nan)
         product = -(columns[: k + 1] @ solved)
         schur, low = product[:, : k + 1], product[:, k + 1 :]
+        low[:k] += gap[imposed]
         schur[:k, :k] -= balance.softness[imposed, imposed]
         if self.hold.compliance:
             schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
-        return solved, schur * self._scales, low
+        return Eliminated(balance, solved, schur * self._scales, low, definite)
 
 
 def negative_pivots(diagonal: Array, off: Array) -> int:
     """Number of negative eigenvalues of a symmetric tridiagonal matrix, by the signs of its pivots (Sturm)."""
-    if dpttrf(diagonal, off)[2] == 0:  # Cholesky's factors exist: none
-        return 0
     bound = 4.0 * float(np.abs(diagonal).max() + np.abs(off).max())  # Gershgorin: no eigenvalue lies below minus this
     return int(dstebz(diagonal, off, 1, -bound, 0.0, 1, 1, bound, "E")[0])

@@ -35,18 +35,19 @@ def documented_codes() -> dict[str, tuple[str, str, str, str]]:
 
 @dataclass(frozen=True)
 class Said:
-    """A sentence of another room as the reader gets it, and the language it is in."""
+    """A sentence of another room as the reader gets it, and its language; ``named`` if it starts with a given name."""
 
     text: str
     language: str
+    named: bool = False
 
     def __str__(self) -> str:
         return self.text
 
     @property
     def sentence(self) -> str:
-        """The text as a sentence of its own: a capital at its start, unless it starts with a file or a symbol."""
-        return sentence(self.text)
+        """The text as a sentence of its own: a capital at its start, unless that is a name, a file or a symbol."""
+        return self.text if self.named else sentence(self.text)
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,9 @@ class Words:
 
     def said(self, said: Message) -> Said:
         """A message in this language, as far as it is known in it."""
-        return Said(said.said(self.language), "en" if said.english else self.language)
+        text = said.said(self.language)
+        named = any(text.startswith(f"{said.values.get(key) or text} ") for key in ("id", "name", "a"))
+        return Said(text, "en" if said.english else self.language, named)
 
     def about(self, cause: str) -> tuple[str, str]:
         """What a cause is and what to do about it at the rig; empty for one that the catalogue does not have."""

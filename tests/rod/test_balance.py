@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
-from rod.balance.moment_points import moment_points, pointwise_graph
+from rod.balance.moment_points import _between, moment_points, pointwise_graph
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import Fading, StickSlip, bent_by_bvp, equilibrium, force_free
 from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, stretched
@@ -223,3 +223,8 @@ def test_points_are_where_they_were_measured_wherever_the_smooth_curve_begins():
         for given in (shape, moved)
     )
     assert np.abs(one.offset - two.offset)[:-1].max() < 1e-6
+
+
+def test_what_lies_between_two_nodes_is_interpolated() -> None:
+    nodes, values, s = np.array([0.0, 0.03, 0.05, 0.2]), np.array([1.0, -2.0, 4.0, 3.0]), np.linspace(-0.05, 0.25, 61)
+    assert _between(s, nodes) @ values == pytest.approx(np.interp(s, nodes, values), abs=1e-12)

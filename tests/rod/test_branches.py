@@ -8,14 +8,15 @@ import pytest
 
 from rod.bending_test import BendingTest, simulate, table_1
 from rod.characteristic import Characteristic
-from rod.equilibrium import Equilibrium, Outcome, solve
+from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
-from rod.newton import Start, newton
-from rod.reduction import System
-from rod.support import CLAMP, Support
+from rod.newton import Start, descended, newton
+from rod.reduction import Hold, System
+from rod.support import CLAMP, FREE, Support
 from tests.rod.elastica import natural_chord, uniform_equilibrium
 from tests.rod.minimum import is_minimum
 from tests.rod.potential_energy import Potential
+from tests.rod.test_literature import energy
 
 LINEAR = Characteristic.constant(5e-3)
 LAW = StickSlip(6e-3, 2.5e-3, 4.0)
@@ -132,9 +133,34 @@ def test_a_start_wound_up_in_a_loop_is_dropped() -> None:
     assert warm.force == pytest.approx(exact.force, rel=1e-3)  # 60 elements
 
 
-def energy(step: Equilibrium) -> float:
-    potential = Potential(step.rod, step.before)
-    return potential.value(potential.unknowns(step.angles, step.x, step.y))
+@pytest.mark.parametrize("control", ["chord", "force", "tip"])
+def test_no_start_leads_to_more_energy_than_none(control: str) -> None:
+    """Stable shapes found downhill from random ones, as starts: what converges has the energy of the cold solution."""
+    rng, stable = np.random.default_rng(26), 0
+    ends = {"tip": [{"left": CLAMP, "right": FREE}]}
+    others = [{}, {"left": CLAMP}, {"right": CLAMP}, {"left": CLAMP, "right": CLAMP}, {"left": Support(stiffness=0.02)}]
+    for case in range(10):
+        held = ends.get(control, others)
+        K0, load = (
+            float(rng.choice([0.0, 0.5, 2.0, 5.0, -3.0, 25.0])),
+            tuple(rng.choice([0.0, 1.0]) * rng.normal(size=2)),
+        )
+        test = BendingTest(0.2, LAW, K0, load=load, elements=30, **held[case % len(held)])
+        chord, force, tip = test.zero_chord * rng.uniform(0.1, 0.99), rng.uniform(-0.5, 2.0), rng.normal(size=2)
+        hold = {"chord": Hold(chord=chord), "force": Hold(force=force), "tip": Hold(tip=tuple(tip))}[control]
+        cold, system = solve(test.rod, hold), System(test.rod, hold, test.rod.virgin)
+        for _ in range(4):
+            s = np.linspace(0.0, 1.0, test.rod.edges.size)
+            waves = sum(rng.normal() * 3.0 / k * np.cos(k * np.pi * s) for k in (1, 2, 3))
+            rest = descended(system, Start(waves + rng.integers(-1, 2) * 2.0 * np.pi * s, rng.normal(size=2)))
+            if not rest.found:
+                continue
+            stable += 1
+            warm = solve(test.rod, hold, start=replace(cold, angles=rest.angles, right_reaction=rest.R))
+            assert warm.outcome is cold.outcome
+            if warm.good:
+                assert energy(warm) == pytest.approx(energy(cold), abs=1e-6 * LAW.EI0 / 0.2)
+    assert stable > 20
 
 
 def test_a_start_on_the_other_side_is_not_natural_where_a_cable_is_bent_both_ways() -> None:

@@ -1,9 +1,14 @@
 """Truth from books and closed forms for every support, load and control, cold and warm, limits and jumps included.
 
-Sources: Mattiasson, Int. J. Num. Meth. Eng. 17 (1981) 145, Table I; Bisshopp and Drucker, Quart. Appl. Math. 3 (1945)
-272; Timoshenko and Gere, Theory of Elastic Stability (1961), Arts. 2.1, 2.4 and Table 2-4; Greenhill, Proc. Camb. Phil.
-Soc. 4 (1881) 65; Castigliano's theorem. Where no table exists, scipy's collocation solver, which knows neither edges
-nor joints.
+    Mattiasson, Int. J. Num. Meth. Eng. 17 (1981), pp. 145-153, Table 1: cantilever, force across its tip
+    Bisshopp and Drucker, Quart. Appl. Math. 3 (1945), pp. 272-275: the same by elliptic integrals
+    Greenhill, Proc. Camb. Phil. Soc. 4 (1881), pp. 65-73: column under its own weight, 7.837
+    Timoshenko and Gere, Theory of Elastic Stability, 2nd ed. (1961), Table 2-4 (elastica), Arts. 2.1, 2.3, 2.4, 2.7
+    Castigliano's theorem
+
+Pages of articles are those of the whole article, as others cite it. The book could not be seen for this: its table and
+articles stand without page, and each row of Table 2-4 is held against the elliptic integral that it was computed from.
+Where no table exists, scipy's collocation solver, which knows neither edges nor joints.
 """
 
 from dataclasses import replace

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.messages import Message
 from pipeline.report.words import TABLE, Words
 
 SOURCES = [p for p in Path(TABLE).parents[1].rglob("*") if p.suffix in (".py", ".html")]
@@ -58,3 +59,9 @@ def test_unknown_key_is_not_passed_over():
 def test_tails_of_probability_are_not_claimed():
     assert Words().probability(1e-30) == "< 0.0001"
     assert Words("de").probability(0.432, name="p") == "p = 0,43"
+
+
+def test_a_specimen_is_called_as_it_is_written():
+    refused = Message("opening.failed", id="plain", reason="no photo")
+    assert Words().said(refused).sentence.startswith("plain was not measured")
+    assert Words().said(Message("text", text="plain words begin a sentence")).sentence.startswith("Plain words")
