@@ -32,7 +32,7 @@ import string
 import tomllib
 import unicodedata
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -66,13 +66,11 @@ class Message:
 
     key: str
     values: dict[str, Any]
-    _made: dict[str, tuple[str, ...]] = field(repr=False, compare=False)
 
     def __init__(self, key: str, /, **values: object) -> None:
         object.__setattr__(self, "key", key)
         given = values if key == "text" else {name: _plain(value) for name, value in values.items()}
         object.__setattr__(self, "values", given)
-        object.__setattr__(self, "_made", {})
 
     def __hash__(self) -> int:
         return hash((self.key, str(self.values)))
@@ -99,11 +97,13 @@ class Message:
         """What is wrong and, where the catalogue has it, what to do."""
         if self.key == "text":
             return (str(self.values["text"]),)
-        if language not in self._made:  # `read` has made the English already, and tables and pages ask for it again
+        # `read` has made the English already, and tables and pages ask for it again; no field: it is not stored
+        made: dict[str, tuple[str, ...]] = self.__dict__.setdefault("made", {})
+        if language not in made:
             known, gaps = catalogue(language), _Gaps(language)
             texts = known[self.key] if language != "en" or self.key in known else _outcomes()[self.key]
-            self._made[language] = tuple(gaps.filled(text, self.values) for text in texts)
-        return self._made[language]
+            made[language] = tuple(gaps.filled(text, self.values) for text in texts)
+        return made[language]
 
     def stored(self) -> dict[str, Any]:
         """The message as plain values for JSON."""

@@ -189,6 +189,7 @@ def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_re
         row = index_row(result, ReportSettings())
         again = from_entry(json.loads(json.dumps(as_entry(row))))
         assert as_entry(again) == as_entry(row)
+        assert all(set(as_entry(again)[said] or ()) <= {"key", "values"} for said in ("fault", "reason"))
 
 
 def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
