@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -144,7 +145,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         worst="" if worst is None else worst.code,
         reason=None if worst is None else worst.said,
         shapes=_shapes(result),
-        curve=None if curve is None else _thinned(curve, POINTS),
+        curve=None if curve is None else thinned(curve, POINTS),
     )
 
 
@@ -157,16 +158,21 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
 POINTS = 24
 """Of a characteristic kept in the index; a spline of few control points needs no more."""
 
+FAINT = 1e-3
+"""Of the largest standard deviation: directions of the covariance below it, most of them, change no digit shown."""
 
-def _thinned(curve: Visited, points: int) -> RowCurve:
+
+def thinned(curve: Visited, points: int) -> RowCurve:
     """The curve interpolated to so many points."""
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
     columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
+    along, size, _ = np.linalg.svd(np.column_stack([np.zeros((points, 0)), *columns]), full_matrices=False)
+    shown = size > FAINT * size.max(initial=0.0)
     return RowCurve(
         kappa=grid,
         tangent=np.interp(grid, curve.kappa, curve.tangent),
         tangent_std=np.interp(grid, curve.kappa, curve.tangent_std),
-        factor=np.column_stack([np.zeros((points, 0)), *columns]),
+        factor=along[:, shown] * size[shown],
     )
 
 
@@ -251,7 +257,10 @@ def _message(stored: Any) -> Message | None:
 
 def _numbers(values: Any, count: int) -> tuple[Any, ...]:
     """Finite numbers, so many of them."""
-    return tuple(_table(values, count).tolist())
+    numbers = tuple(map(float, values))
+    if len(numbers) != count or not all(map(isfinite, numbers)):
+        raise ValueError("numbers that are not finite, or too few or many")
+    return numbers
 
 
 def _table(values: Any, *shape: int) -> Array:

@@ -68,8 +68,8 @@ class WithColumn(NamedTuple):
 class _Solved:
     """What the fit's own unknowns are for every error model.
 
-    ``flat`` (G,): log p flat in the amounts. ``half`` (G, p, p): W with W' W = H^-1; ``pull`` (G, p): W b.
-    ``amounts``: those of the vector that no prior row states. ``move`` (G, a) of these and ``covariance`` (G, a, a).
+    ``flat`` (G, d): log p flat in the amounts. ``half`` (G, p, p): W with W' W = H^-1; ``pull`` (G, p, d): W b.
+    ``amounts``: those of the vector that no prior row states. ``move`` (G, d, a) of these and ``covariance`` (G, a, a).
     """
 
     products: Products
@@ -80,47 +80,56 @@ class _Solved:
     move: Array
     covariance: Array
 
-    def moves(self, by: Array) -> Array:
-        """H^-1 of columns (G, p, k) of products."""
-        return np.asarray(self.half.swapaxes(1, 2) @ (self.half @ by))
-
 
 def evidence(
     grid: ErrorGrid, fitted: Fit, terms: Sequence[Term] = (), columns: Array | None = None
 ) -> tuple[Evidence, WithColumn]:
-    """Evidence of a fit, and of the fit with each of some further columns.
+    """Evidence of a fit, and of the fit with each of some further columns; see `evidences`."""
+    return evidences(grid, fitted, fitted.residual[:, None], terms, columns)[0]
+
+
+def evidences(
+    grid: ErrorGrid, fitted: Fit, residuals: Array, terms: Sequence[Term] = (), columns: Array | None = None
+) -> list[tuple[Evidence, WithColumn]]:
+    """Evidence of one linear model for several residuals, and of it with each of some further columns.
 
     Parameters
     ----------
     grid : ErrorGrid
     fitted : Fit
+        The model; its own residual counts for nothing.
+    residuals : (N, d)
+        Whitened, prior rows last.
     terms : (k,) of Term
         What the columns are.
     columns : (N, k) or None
         Whitened traces per unit of amount.
     """
-    count = len(fitted.residual)
-    more = np.zeros((count, 0)) if columns is None else columns
-    solved = _solved(grid, fitted, more)
+    more = np.zeros((len(residuals), 0)) if columns is None else columns
+    solved = _solved(grid, fitted, more, residuals)
     own = solved.flat + _amounts(fitted, solved)
-    added = own[:, None] + _column_gain(fitted, terms, solved)
+    added = own[..., None] + _column_gain(fitted, terms, solved)
     prior, rest = solved.products.log_prior, solved.products.rest
-    posterior = own + prior
+    posterior = own + prior[:, None]
     plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
-    further = (_total(added[part] + prior[part, None]) for part in (~rest, rest))
+    further = [_total(added[part] + prior[part, None, None]) for part in (~rest, rest)]
     weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
-    moved = _moved(scales[:, 0], weight) if grid.displacements.shape[1] else (0.0, 0.0)
-    rig = float(weight @ (scales[:, -1] > 0.0)) if grid.rig.shape[1] else 0.0
-    return Evidence(float(plain), float(disturbed), moved, rig), WithColumn(*further)
+    found = []
+    for k, one in enumerate(weight.T):
+        moved = _moved(scales[:, 0], one) if grid.displacements.shape[1] else (0.0, 0.0)
+        rig = float(one @ (scales[:, -1] > 0.0)) if grid.rig.shape[1] else 0.0
+        own_evidence = Evidence(float(plain[k]), float(disturbed[k]), moved, rig)
+        found.append((own_evidence, WithColumn(*(part[k] for part in further))))
+    return found
 
 
 def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
-    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)))
-    weight = np.where(solved.products.rest, solved.flat + solved.products.log_prior, -np.inf)
+    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    weight = np.where(solved.products.rest, solved.flat[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
-    move = solved.moves(solved.products.own[:, 1:, :1])[best, :, 0]
+    move = solved.half[best].T @ solved.pull[best, :, 0]
     moved = grid.beside[:data] @ (solved.products.scales[best] * move[size:])
     left = fitted.residual[:data] - fitted.jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)
@@ -146,11 +155,11 @@ class Moments(NamedTuple):
 
 def moments(grid: ErrorGrid, fitted: Fit) -> Moments:
     """Mean and covariance of a fit's unknowns under every error model."""
-    solved, size = _solved(grid, fitted, np.zeros((len(fitted.residual), 0))), fitted.extension.size
-    weight = solved.flat + _amounts(fitted, solved) + solved.products.log_prior
-    b, unit = solved.products.own[:, 1:, :1], np.eye(solved.half.shape[1])[:, :size]
-    found = solved.moves(np.concatenate([b, np.broadcast_to(unit, (len(b), *unit.shape))], axis=2))[:, :size]
-    return Moments(weight, found[..., 0], found[..., 1:], solved.products.rest)
+    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    weight = (solved.flat + _amounts(fitted, solved))[:, 0] + solved.products.log_prior
+    own = solved.half[:, :, : fitted.extension.size]
+    turned = own.swapaxes(1, 2)
+    return Moments(weight, (turned @ solved.pull)[..., 0], turned @ own, solved.products.rest)
 
 
 def _total(logs: Array) -> Array:
@@ -163,18 +172,18 @@ def _moved(scatter: Array, weight: Array) -> tuple[float, float]:
     return chance, float(np.sqrt(weight @ scatter**2 / chance)) if chance > 0.0 else 0.0
 
 
-def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
-    """The fit's unknowns, columns in the order r, J, displacements."""
-    size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
-    value, jacobian = fitted.residual, fitted.jacobian
+def _solved(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> _Solved:
+    """The fit's unknowns, columns in the order residuals (N, d), J, displacements."""
+    data, several = len(grid.photos) + len(grid.forces), residuals.shape[1]
+    columns = np.hstack([residuals, fitted.jacobian])
     places, mid, std = _places(fitted)
-    first = len(value) - data
-    known = np.zeros((first + len(places), 1 + size))
-    known[:first] = np.column_stack([value[data:], jacobian[data:]])
+    first = len(columns) - data
+    known = np.zeros((first + len(places), columns.shape[1]))
+    known[:first] = columns[data:]
     for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=first):
-        known[row, [0, 1 + at]] = (middle - fitted.vector[at]) / width, 1.0 / width
-    products = grid.products(np.column_stack([value, jacobian])[:data], known, more[:data])
-    H, b = products.own[:, 1:, 1:], products.own[:, 1:, 0]
+        known[row, :several], known[row, several + at] = (middle - fitted.vector[at]) / width, 1.0 / width
+    products = grid.products(columns[:data], known, more[:data])
+    H, b = products.own[:, several:, several:], products.own[:, several:, :several]
     shown = np.einsum("gii->gi", H)
     scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
     unit = 1.0 / scale
@@ -183,13 +192,14 @@ def _solved(grid: ErrorGrid, fitted: Fit, more: Array) -> _Solved:
     amounts = _unknown(fitted)
     root = np.asarray(np.linalg.cholesky(H), dtype=np.float64)
     half = _inverse(root) * unit[:, None]
-    pull = (half @ b[..., None])[..., 0]
+    pull = half @ b
     own = half[:, :, amounts]
     log_det = 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
     normal = 0.5 * len(amounts) * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
-    flat = normal - 0.5 * (products.own[:, 0, 0] - np.sum(pull**2, axis=1) + products.log_det + log_det)
-    move, covariance = np.einsum("gpa,gp->ga", own, pull), own.swapaxes(1, 2) @ own
+    squares = np.einsum("gdd->gd", products.own[:, :several, :several]) - np.sum(pull**2, axis=1)
+    flat = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
+    move, covariance = pull.swapaxes(1, 2) @ own, own.swapaxes(1, 2) @ own
     return _Solved(products, flat, half, pull, amounts, move, covariance)
 
 
@@ -229,14 +239,14 @@ def _log_known(fitted: Fit) -> list[float]:
 
 
 def _amounts(fitted: Fit, solved: _Solved) -> Array:
-    """Log of the factor (G,) by which the prior of the fit's own amounts changes p."""
-    extension, total = fitted.extension, np.zeros(len(solved.flat))
+    """Log of the factor (G, d) by which the prior of the fit's own amounts changes p."""
+    extension, total = fitted.extension, np.zeros(solved.flat.shape)
     owner = [extension.terms[extension.amounts_at.index(at)].cause for at in solved.amounts]
     value = fitted.vector[solved.amounts] + solved.move
     for cause in {cause.name: cause for cause in owner}.values():
         at = [k for k, other in enumerate(owner) if other is cause]
-        covariance = solved.covariance[:, at, :][:, :, at]
-        total += _size_unknown(value[:, at], covariance, cause.plausible(extension.facts), cause.sign)
+        covariance = solved.covariance[:, None, at][..., at]
+        total += _size_unknown(value[..., at], covariance, cause.plausible(extension.facts), cause.sign)
     return total
 
 
@@ -249,7 +259,7 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
     if value.shape[-1] == 1:
         return _one_size_unknown(value[..., 0], covariance[..., 0, 0], sizes, sign)
     wide = covariance[..., None, :, :] + sizes[:, None, None] * np.eye(value.shape[-1])
-    there = np.linalg.solve(wide, np.broadcast_to(value[..., None, :, None], (*wide.shape[:-1], 1)))[..., 0]
+    there = np.linalg.solve(wide, value[..., None, :, None])[..., 0]
     log = -0.5 * (np.sum(value[..., None, :] * there, axis=-1) + np.linalg.slogdet(2.0 * np.pi * wide)[1])
     if sign:
         mean = sizes[:, None] * there
@@ -260,28 +270,28 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
 
 
 def _column_gain(fitted: Fit, terms: Sequence[Term], solved: _Solved) -> Array:
-    """Log of the factor (G, k) by which each further column changes p."""
-    square, half = solved.products.square, solved.half @ solved.products.cross[:, 1:]
-    precision = np.maximum(square - np.einsum("gik,gik->gk", half, half), INVISIBLE * square + 1e-300)
-    score = solved.products.cross[:, 0] - (solved.pull[:, None] @ half)[:, 0]
-    amount, facts = score / precision, fitted.extension.facts
-    gains = [
-        log_gain(amount[:, k], 1.0 / precision[:, k], term.cause.plausible(facts), term.cause.sign)
-        for k, term in enumerate(terms)
-    ]
-    return np.column_stack(gains) if gains else np.zeros(score.shape)
+    """Log of the factor (G, d, k) by which each further column changes p."""
+    square, cross, several = solved.products.square, solved.products.cross, solved.flat.shape[1]
+    half = solved.half @ cross[:, several:]
+    precision = np.maximum(square - np.einsum("gik,gik->gk", half, half), INVISIBLE * square + 1e-300)[:, None]
+    amount = (cross[:, :several] - solved.pull.swapaxes(1, 2) @ half) / precision
+    facts, gains = fitted.extension.facts, np.zeros(amount.shape)
+    for k, term in enumerate(terms):
+        plausible = term.cause.plausible(facts)
+        gains[..., k] = log_gain(amount[..., k], 1.0 / precision[..., k], plausible, term.cause.sign)
+    return gains
 
 
 def log_gain(amount: Array | float, variance: Array | float, plausible: float, sign: int) -> Array:
-    """Log of the factor (G,) by which a cause of a flat estimate and its variance (G,) changes p."""
+    """Log of the factor by which a cause of a flat estimate and its variance, of one shape, changes p."""
     value, wide = np.atleast_1d(amount), np.atleast_1d(variance)
     flat = 0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
     return np.asarray(flat + _one_size_unknown(value, wide, (SIZES * plausible) ** 2, sign))
 
 
 def _one_size_unknown(value: Array, variance: Array, sizes: Array, sign: int) -> Array:
-    """The same for a single amount: value and variance (G,)."""
-    sizes = sizes[:, None]
+    """The same for a single amount: value and variance of one shape."""
+    sizes = sizes.reshape(-1, *[1] * value.ndim)
     wide = variance + sizes
     log = -0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
     if sign:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.displacements import displacement_columns
@@ -13,9 +14,11 @@ from pipeline.diagnosis.fits.search import Suspicion, ordinary
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
-from pipeline.diagnosis.posterior.evidence import Evidence, evidence
+from pipeline.diagnosis.posterior.evidence import Evidence, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+
+Array = NDArray[np.float64]
 
 
 def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
@@ -43,14 +46,21 @@ def weighed(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion | None = None) ->
     """Evidence of a fit, and of every cause beside it that ``suspicion``, the scores about it, has forms of."""
     if suspicion is None or not suspicion.terms:
         return Weighed(evidence(grid, fitted)[0], {})
-    own, added = evidence(grid, fitted, suspicion.terms, suspicion.columns)
-    further = {}
-    for cause in range(len(suspicion.causes)):
-        forms = suspicion.of(cause)
-        if forms.size:
-            plain, rest = (float(np.logaddexp.reduce(values[forms]) - np.log(forms.size)) for values in added)
-            further[cause] = plain, rest
-    return Weighed(own, further)
+    return weighed_draws(grid, fitted, suspicion, fitted.residual[:, None])[0]
+
+
+def weighed_draws(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion, residuals: Array) -> list[Weighed]:
+    """The same for several residuals (N, d) in the place of the fit's own."""
+    found = []
+    for own, added in evidences(grid, fitted, residuals, suspicion.terms, suspicion.columns):
+        further = {}
+        for cause in range(len(suspicion.causes)):
+            forms = suspicion.of(cause)
+            if forms.size:
+                plain, rest = (float(np.logaddexp.reduce(values[forms]) - np.log(forms.size)) for values in added)
+                further[cause] = plain, rest
+        found.append(Weighed(own, further))
+    return found
 
 
 def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:

@@ -15,7 +15,7 @@ from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW
-from pipeline.diagnosis.posterior.evidence import SIZES, evidence
+from pipeline.diagnosis.posterior.evidence import SIZES, evidence, evidences
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.posterior.words import verdict
@@ -96,6 +96,17 @@ def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sig
         density *= 2.0 * (fine >= 0.0)
     expected = np.trapezoid(np.exp(log_ratio) * density, fine)
     assert added.plain[0] - own.plain == pytest.approx(np.log(expected), abs=0.02)
+
+
+def test_several_residuals_of_one_model_are_weighed_as_each_alone(bench, grid):
+    terms, columns = bench.suspicion.terms[::9], bench.suspicion.columns[:, ::9]
+    drawn = np.zeros((len(bench.base.residual), 3))
+    drawn[: bench.observation.rows.count] = np.random.default_rng(6).normal(size=(bench.observation.rows.count, 3))
+    together = evidences(grid, bench.base, drawn, terms, columns)
+    for residual, found in zip(drawn.T, together, strict=True):
+        alone = evidence(grid, replace(bench.base, residual=residual), terms, columns)
+        assert np.hstack(found[0]) == pytest.approx(np.hstack(alone[0]), rel=1e-9)
+        assert np.array(found[1]) == pytest.approx(np.array(alone[1]), rel=1e-9)
 
 
 def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
