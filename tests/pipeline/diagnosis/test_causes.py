@@ -203,11 +203,12 @@ def test_two_tilts_are_one_turn_before_a_pinhole(bench, sines, along_first, way)
     seen = run(model, facts).prediction
     axis = np.array([sines[1], -sines[0], 0.0])
     turn = Rotation.from_rotvec(axis / np.linalg.norm(axis) * np.arcsin(np.linalg.norm(sines)))
-    stands = [0.0, 0.0, distance if way == "stretched" else 0.0]
+    stands = np.array([0.0, 0.0, distance if way == "stretched" else 0.0])
+    back = np.array([0.0, 0.0, distance]) - stands
     for k, centre in enumerate(facts.picture_centre):
         flat = np.column_stack([here.prediction.x[k] - centre[0], here.prediction.y[k] - centre[1]])
-        points = turn.apply(np.column_stack([flat, np.zeros(len(flat))]) + stands) + [0.0, 0.0, distance - stands[2]]
-        middle = turn.apply(stands) + [0.0, 0.0, distance - stands[2]]
+        points = turn.apply(np.column_stack([flat, np.zeros(len(flat))]) + stands) + back
+        middle = turn.apply(stands) + back
         true = distance * (points[:, :2] / points[:, 2:] - middle[:2] / middle[2])
         shown = np.column_stack([seen.x[k], seen.y[k]])
         # third powers of the tilts are left; without the shear two to four times as much
