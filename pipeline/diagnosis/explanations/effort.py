@@ -1,8 +1,8 @@
 """How long a search for causes may go on.
 
 Foreign data, or forms no catalogue has, leave every pair far above the noise: searches went on for minutes and found
-nothing better. What is given up first is what the right names need least: exchanges of causes, then pairs far down the
-linear list. Single causes and the two best pairs are fitted in any case. The reader is told (`diagnose`).
+nothing better. What is given up first is what the right names need least: further forms and pairs far down the lists.
+Single causes and the best pairs are fitted in any case. The reader is told (`diagnose`).
 """
 
 from __future__ import annotations

@@ -65,13 +65,25 @@ def refitted_pairs(
     return found
 
 
-def beside_best(bench: Workbench, best: Explanation, second: Suspicion, *, likely: bool) -> list[Explanation]:
-    """The best single cause with each of the two that score most beside it, or with all others if not ``likely``."""
-    near = candidates(second)[:2]
+def beside_best(bench: Workbench, best: Explanation, second: Suspicion) -> list[Explanation]:
+    """The best single cause with each of the two that score most beside it."""
+    return _beside(bench, best, second, candidates(second)[:2])
+
+
+def beside_all(bench: Workbench, best: Explanation, second: Suspicion, *, effort: Effort) -> list[Explanation]:
+    """The best single cause with each of the others, those that score most first."""
     every = candidates(second, margin=1.0, most=len(second.causes))
+    return _beside(bench, best, second, [cause for cause in every if cause not in candidates(second)[:2]], effort)
+
+
+def _beside(
+    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], effort: Effort = TO_THE_END
+) -> list[Explanation]:
     found = []
-    for cause in near if likely else [cause for cause in every if cause not in near]:
+    for cause in causes:
         direction = second.best(cause)
+        if effort.spent:
+            break
         if cause == best.causes[0] or direction is None:
             continue
         fitted = fit_terms(bench.observation, best.fitted, second, (direction,))

@@ -18,6 +18,7 @@ import numpy as np
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.pair_fits import (
+    beside_all,
     beside_best,
     in_any_form,
     linear_pairs,
@@ -109,14 +110,15 @@ class Search:
         hopeless = bench.base.chi2 if best is None else best.fitted.chi2
         found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
         if best is not None and second is not None:
-            found += beside_best(bench, best, second, likely=True)
+            found += beside_best(bench, best, second)
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         self.add(list(self._pruned(found)))
         believed = self.posterior
+        # before something is called unexplained, the best cause is fitted with every other one
         if believed.word == "rest" and best is not None and second is not None:
-            found += self.add(beside_best(bench, best, second, likely=False))
+            found += self.add(beside_all(bench, best, second, effort=self.effort))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
         forms = with_all_forms(bench, found)
