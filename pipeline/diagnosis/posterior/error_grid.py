@@ -51,7 +51,8 @@ MOVED = {(0.0, 0.0): 0.1, (0.0, 1.0): 0.6, (1e-5, 0.0): 0.2, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
 several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen. `MOVED`:
 scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
-together: one that is exact in all but one thing is rarer than one that nobody aligned."""
+together: one that is exact in all but one thing is rarer than one that nobody aligned. An exact one is a simulation;
+where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
 
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
