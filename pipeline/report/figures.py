@@ -29,13 +29,18 @@ SET_ASIDE = "set-aside"
 
 
 def stiffness_unit(result: Result, words: Words) -> Unit:
-    """Unit of bending stiffness for all of a report."""
-    return suited((v for curve in trusted(result).values() for v in curve.tangent), "N m²", decimal=words.decimal)
+    """Unit of bending stiffness for all of a report: that of what is drawn in full."""
+    return suited((v for curve in _drawn(result) for v in curve.tangent), "N m²", decimal=words.decimal)
 
 
 def moment_unit(result: Result, words: Words) -> Unit:
     """Unit of bending moment for all of a report."""
-    return suited((v for curve in trusted(result).values() for v in curve.moment), "N m", decimal=words.decimal)
+    return suited((v for curve in _drawn(result) for v in curve.moment), "N m", decimal=words.decimal)
+
+
+def _drawn(result: Result) -> list[Visited]:
+    """The curves but those that are set aside, which may be of any size."""
+    return [curve for method, curve in trusted(result).items() if method not in set_aside(result)]
 
 
 def force_unit(result: Result, words: Words) -> Unit:

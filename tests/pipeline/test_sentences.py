@@ -14,7 +14,7 @@ from pipeline.diagnosis import explain
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.words import could_have_been_seen, headline
 from pipeline.errors import InputError
-from pipeline.messages import Message, catalogue, ended, entry, free_text, word
+from pipeline.messages import Message, catalogue, ended, entry, free_text
 from pipeline.report.words import Words
 from pipeline.result import CausePart, CauseRow
 from rod.balance import BalanceOutcome
@@ -171,8 +171,8 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
             "kann um 180 Grad gedreht sein, oder die Fotos sind gespiegelt",
         ),
         (
-            Message("next.settled", by=entry("settled", "length_error"), cause=word("length_error")),
-            "ein Maßband (Längenfehler)",
+            Message("next.settled", by=entry("settled", "length_error")),
+            "ein Maßband",
         ),
         (
             InputError(Message("toml/unknown-key", name="'lenght_mm'", table="specimen", near="length_mm"),

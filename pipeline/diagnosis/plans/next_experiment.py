@@ -24,7 +24,7 @@ from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
 from pipeline.diagnosis.posterior.explanation import Explanation
-from pipeline.messages import Message, entry, word
+from pipeline.messages import Message, entry
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -93,7 +93,7 @@ def next_experiment(
     differ = (causes[cause] for cause in differing if causes[cause].seat != "cable")
     outside = [cause.name for cause in differ if still_open(cause, bench)]
     if not enough and outside:
-        said = Message("next.settled", by=entry("settled", outside[0]), cause=word(outside[0]))
+        said = Message("next.settled", by=entry("settled", outside[0]))
         return NextExperiment(**NextExperiment.told(said), separates=names, repeated_sigma=repeated)
     what = enough[0] if enough else max(better, key=lambda name: better[name])
     if better[what] < TELLS:

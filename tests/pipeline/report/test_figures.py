@@ -31,3 +31,12 @@ def test_branches_are_compared_where_both_bent_the_cable(full_result, unvisited)
     inverse = full_result.inverse.model_copy(update={"branches": branches})
     result = full_result.model_copy(update={"inverse": inverse, "photos": []})
     assert "branches" not in mechanics_figures(result, Words(), ReportSettings())
+
+
+def test_the_unit_is_that_of_the_answer(diagnosed):
+    """Without its cause the inverse problem may end anywhere: a law set aside is no guide."""
+    named = diagnosed("named")
+    curve = named.inverse.curve
+    wild = curve.model_copy(update={"tangent_Nm2": [1e3 * value for value in curve.tangent_Nm2]})
+    result = named.model_copy(update={"inverse": named.inverse.model_copy(update={"curve": wild})})
+    assert stiffness_unit(result, Words()) == stiffness_unit(named, Words())
