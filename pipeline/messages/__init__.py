@@ -97,13 +97,9 @@ class Message:
         """What is wrong and, where the catalogue has it, what to do."""
         if self.key == "text":
             return (str(self.values["text"]),)
-        # `read` has made the English already, and tables and pages ask for it again; no field: it is not stored
-        made: dict[str, tuple[str, ...]] = self.__dict__.setdefault("made", {})
-        if language not in made:
-            known, gaps = catalogue(language), _Gaps(language)
-            texts = known[self.key] if language != "en" or self.key in known else _outcomes()[self.key]
-            made[language] = tuple(gaps.filled(text, self.values) for text in texts)
-        return made[language]
+        known = catalogue(language)
+        texts = known[self.key] if language != "en" or self.key in known else _outcomes()[self.key]
+        return tuple(_Gaps(language).vformat(text, (), self.values) for text in texts)
 
     def stored(self) -> dict[str, Any]:
         """The message as plain values for JSON."""
@@ -172,31 +168,14 @@ def shortened(text: str) -> str:
 
 def printable(text: str) -> str:
     """Text with line ends, control letters and bytes of a name that are no text written as Python does."""
-    if text.isprintable():
-        return text
     return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text)
 
 
-@cache
-def _pieces(text: str) -> tuple[tuple[str, str | None, str | None, str | None], ...]:
-    """Text before a gap, name of its value, form and conversion; a template is parsed once."""
-    return tuple(string.Formatter().parse(text))
-
-
-class _Gaps:
+class _Gaps(string.Formatter):
     """Values of one language for the gaps of its sentences."""
 
     def __init__(self, language: str) -> None:
         self.language, self.decimal = language, DECIMAL[language]
-
-    def filled(self, text: str, values: Mapping[str, Any]) -> str:
-        """A sentence with its values; ``!r`` quotes one."""
-        parts = []
-        for before, name, spec, quoted in _pieces(text):
-            parts.append(before)
-            if name is not None:
-                parts.append(self.format_field(repr(values[name]) if quoted else values[name], spec or ""))
-        return "".join(parts)
 
     def format_field(self, value: Any, spec: str) -> str:
         """A value as the reader gets it; see the module for what ``spec`` may be."""

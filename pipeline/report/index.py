@@ -16,9 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.files import write_atomic
@@ -32,8 +29,6 @@ from pipeline.units import Unit, suited
 
 if TYPE_CHECKING:
     from pipeline.result import Result
-
-Array = NDArray[np.float64]
 
 BLOCK = 100
 """Rows that stand in the page as they are; all others are drawn as the reader scrolls to them, as many at a time."""
@@ -158,8 +153,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
     words = Words(settings.language)
     curves = (row.curve for row in rows if row.curve and row.usable)
-    largest = (float(np.abs(curve.tangent).max()) for curve in curves)
-    unit = suited(largest, "N m²", decimal=words.decimal)
+    unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words, settings))
@@ -286,5 +280,5 @@ def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
     return {"alt": entry.alt, "members": entry.members, "kappa": [float(f"{k:.4g}") for k in mean.kappa], **scaled}
 
 
-def _list(values: Array) -> str:
-    return f"[{','.join(['%.4g'] * len(values)) % tuple(values.tolist())}]"
+def _list(values: Iterable[float]) -> str:
+    return f"[{','.join(f'{value:.4g}' for value in values)}]"

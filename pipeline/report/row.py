@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -145,7 +144,7 @@ def index_row(result: Result, settings: ReportSettings) -> IndexRow:
         worst="" if worst is None else worst.code,
         reason=None if worst is None else worst.said,
         shapes=_shapes(result),
-        curve=None if curve is None else thinned(curve, POINTS),
+        curve=None if curve is None else _thinned(curve, POINTS),
     )
 
 
@@ -158,21 +157,16 @@ def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
 POINTS = 24
 """Of a characteristic kept in the index; a spline of few control points needs no more."""
 
-FAINT = 1e-3
-"""Of the largest standard deviation: directions of the covariance below it, most of them, change no digit shown."""
 
-
-def thinned(curve: Visited, points: int) -> RowCurve:
+def _thinned(curve: Visited, points: int) -> RowCurve:
     """The curve interpolated to so many points."""
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
     columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
-    along, size, _ = np.linalg.svd(np.column_stack([np.zeros((points, 0)), *columns]), full_matrices=False)
-    shown = size > FAINT * size.max(initial=0.0)
     return RowCurve(
         kappa=grid,
         tangent=np.interp(grid, curve.kappa, curve.tangent),
         tangent_std=np.interp(grid, curve.kappa, curve.tangent_std),
-        factor=along[:, shown] * size[shown],
+        factor=np.column_stack([np.zeros((points, 0)), *columns]),
     )
 
 
@@ -257,10 +251,7 @@ def _message(stored: Any) -> Message | None:
 
 def _numbers(values: Any, count: int) -> tuple[Any, ...]:
     """Finite numbers, so many of them."""
-    numbers = tuple(map(float, values))
-    if len(numbers) != count or not all(map(isfinite, numbers)):
-        raise ValueError("numbers that are not finite, or too few or many")
-    return numbers
+    return tuple(_table(values, count).tolist())
 
 
 def _table(values: Any, *shape: int) -> Array:

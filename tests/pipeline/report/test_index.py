@@ -5,16 +5,14 @@ import math
 import re
 import subprocess
 import sys
-from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
 from pipeline.report.index import write_index
-from pipeline.report.row import POINTS, as_entry, from_entry, index_row, thinned
+from pipeline.report.row import POINTS, as_entry, from_entry, index_row
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
@@ -189,7 +187,6 @@ def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_re
         row = index_row(result, ReportSettings())
         again = from_entry(json.loads(json.dumps(as_entry(row))))
         assert as_entry(again) == as_entry(row)
-        assert all(set(as_entry(again)[said] or ()) <= {"key", "values"} for said in ("fault", "reason"))
 
 
 def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
@@ -233,18 +230,6 @@ def test_an_entry_of_wrong_values_is_no_row(place, value, full_result):
 
 def test_a_row_is_small(full_result):
     assert len(json.dumps(as_entry(index_row(full_result, ReportSettings())))) < 5000
-
-
-def test_a_covariance_of_many_directions_is_kept_in_a_few(full_result):
-    """As measured ones are: each direction a half of the one before, none of them a power of the curvature."""
-    curve = full_result.answer.curve
-    rng, many = np.random.default_rng(3), 26
-    factor = rng.standard_normal((len(curve.kappa), many)) * 0.5 ** np.arange(many) * curve.tangent[:, None]
-    whole, kept = (thinned(replace(curve, factor=factor[:, :columns]), POINTS).factor for columns in (many, 1))
-    assert kept.shape[1] == 1 and whole.shape[1] <= 12
-    on_grid = np.linspace(curve.kappa[0], curve.kappa[-1], POINTS)
-    exact = np.column_stack([np.interp(on_grid, curve.kappa, column) for column in factor.T])
-    assert np.allclose(whole @ whole.T, exact @ exact.T, rtol=0.0, atol=1e-5 * np.max(exact @ exact.T))
 
 
 def test_results_with_entries_are_not_read(full_result, tmp_path, monkeypatch):
