@@ -5,9 +5,9 @@ sin(phi) = height / largest y: in the picture y shrinks to y cos(phi), chord and
 up to z = y sin(phi) toward a camera at the distance D is seen larger as well, by 1 / (1 - z / D) from the centre of the
 picture.
 
-From step to step the height goes with a power of the bow: one lean in all photos, one height, or anything between. What
-stands up as h sin(pi s / L) over a bow in the plane is to leading order the same: with the same chord and length the
-bow is seen as sqrt(y^2 - h^2).
+From step to step the height goes with a power of the bow, from none to the square: one height in all photos, one lean,
+or a height that grows with the travel. What stands up as h sin(pi s / L) over a bow in the plane is to leading order
+the same: with the same chord and length the bow is seen as sqrt(y^2 - h^2).
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ LEAST = 1e-3
 
 NEAR = (0.1, 1.0)
 """Length over the distance of a near camera, least and most: below, no bow stands up far enough to be seen larger."""
-
 
 GROWTH = (0.0, 2.0)
 """Power of the bow with which the height goes, least and most: a height in proportion to the travel goes with its

@@ -96,9 +96,8 @@ def _starts(more: Suspicion, eligible: NDArray[np.bool_]) -> list[int]:
     A trace that grows with the square of the amount tells nothing of its sign.
     """
     ranked = [int(k) for k in descending(more.statistic * eligible) if eligible[k]]
-    first = more.terms[ranked[0]].variant
-    alike = [k for k in ranked if replace(more.terms[k].variant, trace=first.trace) == first]
-    return alike[:2]
+    first = more.terms[ranked[0]].variant.as_usual
+    return [k for k in ranked if more.terms[k].variant.as_usual == first][:2]
 
 
 def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> float:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.candidates import LEAST, MARGIN, candidates
+from pipeline.diagnosis.explanations.candidates import LEAST, MARGIN
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
@@ -65,20 +65,10 @@ def refitted_pairs(
     return found
 
 
-def beside_best(bench: Workbench, best: Explanation, second: Suspicion) -> list[Explanation]:
-    """The best single cause with each of the two that score most beside it."""
-    return _beside(bench, best, second, candidates(second)[:2])
-
-
-def beside_all(bench: Workbench, best: Explanation, second: Suspicion, *, effort: Effort) -> list[Explanation]:
-    """The best single cause with each of the others, those that score most first."""
-    every = candidates(second, margin=1.0, most=len(second.causes))
-    return _beside(bench, best, second, [cause for cause in every if cause not in candidates(second)[:2]], effort)
-
-
-def _beside(
-    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], effort: Effort = TO_THE_END
+def pairs_beside(
+    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], *, effort: Effort = TO_THE_END
 ) -> list[Explanation]:
+    """The best single cause with each of some others, those in the model already left out."""
     found = []
     for cause in causes:
         direction = second.best(cause)

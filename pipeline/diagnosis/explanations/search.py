@@ -2,7 +2,7 @@
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
 -> what scores beside the best of them, and pairs of the exhaustive linear search, refitted -> pairs pruned of what they
-do not need -> probabilities of all.
+do not need -> where something else is likelier still, the best cause with all others -> probabilities of all.
 
 A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
 2.5 standard deviations of nothing is fitted again without it.
@@ -18,10 +18,9 @@ import numpy as np
 from pipeline.diagnosis.explanations.candidates import candidates
 from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.pair_fits import (
-    beside_all,
-    beside_best,
     in_any_form,
     linear_pairs,
+    pairs_beside,
     refitted_pairs,
     settled,
     with_all_forms,
@@ -109,8 +108,9 @@ class Search:
         bench, self.effort = self.bench, Effort.of(self.settings.search_newton_steps)
         hopeless = bench.base.chi2 if best is None else best.fitted.chi2
         found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
+        near = [] if second is None else candidates(second)[:2]
         if best is not None and second is not None:
-            found += beside_best(bench, best, second)
+            found += pairs_beside(bench, best, second, near)
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
@@ -118,7 +118,9 @@ class Search:
         believed = self.posterior
         # before something is called unexplained, the best cause is fitted with every other one
         if believed.word == "rest" and best is not None and second is not None:
-            found += self.add(beside_all(bench, best, second, effort=self.effort))
+            every = candidates(second, margin=1.0, most=len(second.causes))
+            others = [cause for cause in every if cause not in near]
+            found += self.add(pairs_beside(bench, best, second, others, effort=self.effort))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
         forms = with_all_forms(bench, found)
