@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,13 +54,12 @@ def moment_curve(K: Array, m: Array, f: Array) -> MomentCurve:
     return MomentCurve(K, table, np.concatenate([K[:1], K]))
 
 
-class LawOfBend:
+class LawOfBend(Protocol):
     """What every moment curve of the bend has in common. A class of one says what its ``curve`` is."""
 
     @property
     def curve(self) -> MomentCurve:
         """The moment over the bend K - K0."""
-        raise NotImplementedError
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m."""
