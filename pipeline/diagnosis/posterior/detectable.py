@@ -18,7 +18,10 @@ from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.diagnosis.statistics.score import span
 
 LOUDEST = 40.0
-"""Standard deviations: what is not found at that size, ten times the plausible one being less, is found at none."""
+"""Standard deviations: what is found neither at that size nor at the largest possible one is found at none."""
+
+POSSIBLE = 30.0
+"""Plausible sizes: no rig has more of a cause."""
 
 
 def sigma_needed(
@@ -47,9 +50,11 @@ def sigma_needed(
         taken = np.logaddexp(0.0, off + 0.5 * rig[0] * z * z - rig[1])
         return float(needed + taken - log_gain(z, 1.0, plausible, abs(sign))[0])
 
-    if short(LOUDEST) > 0.0:
+    # what every rig has of a cause may be many times what the data tell of it
+    most = max(LOUDEST, POSSIBLE * plausible)
+    if short(most) > 0.0:
         return np.inf
-    return float(brentq(short, 0.0, LOUDEST)) + float(ndtri(power))
+    return float(brentq(short, 0.0, most)) + float(ndtri(power))
 
 
 def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) -> dict[int, float]:
@@ -73,10 +78,6 @@ def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float)
         amount = at * (needed / (norm * at)) ** (1.0 / variant.power) if norm > 0.0 else np.inf
         found[k] = float(amount) if amount <= POSSIBLE * plausible else np.inf
     return found
-
-
-POSSIBLE = 30.0
-"""Plausible sizes: no rig has more of a cause."""
 
 
 def in_any_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) -> float:

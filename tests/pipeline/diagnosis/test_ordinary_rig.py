@@ -1,5 +1,6 @@
 """A rig as laboratories have it: zero, length and camera a little off. Nothing is named then, and the reader told."""
 
+import math
 import re
 
 import pytest
@@ -10,6 +11,7 @@ from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis.causes.camera import tilt_of
 from pipeline.diagnosis.diagnose import diagnose
+from pipeline.diagnosis.posterior.detectable import sigma_needed
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -50,3 +52,14 @@ def test_a_zero_that_is_lost_is_named_on_such_a_rig():
     assert [cause.name for cause in part.causes] == ["displacement_offset"]
     # the rest of the rig is off as well: its share of the zero is in the band
     assert abs(part.causes[0].estimate - 2.5e-4) < 0.2 * 2.5e-4
+
+
+@pytest.mark.parametrize("told", [3e-6, 0.7e-6, 0.1e-6])
+def test_a_zero_is_named_from_a_few_times_that_of_every_rig(told):
+    """However much better photos tell it: at 0.7 um it was found at no size, and said to be able to hide."""
+    ordinary, usual = 2e-5, 2.6e-4
+    share = ordinary**2 / (ordinary**2 + told**2)
+    needed = sigma_needed(
+        usual / told, forms=2, causes=19, sign=0, power=0.9, rig=(share, 0.5 * math.log(1.0 + (ordinary / told) ** 2))
+    )
+    assert 2.0 * ordinary < needed * told < 6.0 * ordinary
