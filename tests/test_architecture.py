@@ -118,7 +118,8 @@ INSIDE = {
         ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),
         ("path", "refusal", "fit_errors"),
-        ("measurement", "lay", "side"),
+        ("measurement", "side"),
+        ("lay",),
     ],
     "pipeline.vision.render": [
         ("lens", "lighting", "sensor", "sheath"),

@@ -124,17 +124,13 @@ def _by_what_is_seen(
 def _alike(
     shots: Sequence[Shot], lines: tuple[Line, ...], specimen: Specimen, settings: VisionSettings
 ) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
-    """Centerlines without the lay they have in common, and with one positive side; a photo that breaks it is refused.
+    """Centerlines with one positive side; a photo that breaks it is refused.
 
     Lines that break it whichever of them is left out stay as they are, and a finding says so.
     """
-    names = [shot.found.image for shot in shots]
-    lay = partial(without_lay, diameter_m=specimen.diameter_m, settings=settings.curve)
     side = partial(on_one_side, diameter_m=specimen.diameter_m, settings=settings.series)
-    lines, even = jointly(names, lines, lay)
-    lines, turned = jointly(names, lines if even is None else even, side)
-    lines, findings = (lines, ()) if turned is None else turned
-    return lines, (*findings, _UNTOLD) if even is None or turned is None else findings
+    lines, turned = jointly([shot.found.image for shot in shots], lines, side)
+    return (lines, (_UNTOLD,)) if turned is None else turned
 
 
 def _checked(
@@ -210,7 +206,9 @@ def _measure_all(
         cables = tuple(c if isinstance(c, Rejected) else follow(shot.found) for shot, c in pairs)
     if wandering > 0.0:
         cables = tuple(c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables)
-    return shots, _tied(shots, cables, settings), findings
+    lay = partial(without_lay, diameter_m=specimen.diameter_m, settings=settings)
+    cables, even = jointly([shot.found.image for shot in shots], cables, lay)
+    return shots, _tied(shots, even or cables, settings), findings if even else (*findings, _UNTOLD)
 
 
 def _loosened(cable: Followed, std_px: float) -> Followed:

@@ -87,7 +87,9 @@ class Waves:
     length: float = 0.0
 
 
-def edge_waves(photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_per_px: float) -> Waves:
+def edge_waves(
+    photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_per_px: float, lay: float = 0.0
+) -> Waves:
     """The waves, not smaller than those that every photo has.
 
     Parameters
@@ -95,12 +97,14 @@ def edge_waves(photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_
     photos, settings
         As in `seen_waves`.
     metres_per_px : m
+    lay : m
+        What all photos err alike for what was taken off them (`pipeline.vision.centerline.lay`).
     """
     if not photos:
         return Waves()
     seen, least = seen_waves(photos, settings), _LEAST_WAVE_PX * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
-    own, common = np.hypot(seen.own, least), np.hypot(seen.common, 0.5 * least)
+    own, common = np.hypot(seen.own, least), np.linalg.norm([seen.common, 0.5 * least, lay])
     return Waves(float(own), float(common), seen.length or _USUAL * reach)
 
 

@@ -1,112 +1,161 @@
 """The lay of the strands and the print on the sheath: what all photos show at the same place of the cable.
 
-Dark strands, letters and the shade between them pull an edge by some hundredths of a pixel. They go along with the
-cable, so the same wiggle of the midline stands at the same arc length on every photo: averaged over the photos it is
-no noise, and a joint test would take it for a misfit of the simulation. Its part faster than any bend of a cable
-is taken off the sections of all photos.
+Strands, letters and the shade between them move an edge by some hundredths of a pixel, those of a rope by half a pixel.
+They go along with the cable, so the same wiggle of the midline stands at the same arc length on every photo: averaged
+over the photos it is no noise, and a joint test would take it for a misfit of the simulation; taken for noise, it
+makes the curve too stiff to follow the cable. Its part faster than any bend of a cable is taken off all photos.
 
-``centerlines of a series -> the same with sections relieved of the common wiggle``
+``cables followed on a series -> the same without the common wiggle, and fitted anew``
 
-A bend that comes and goes within two diameters moves the cable by less than an edge can be placed, so what is smoother
-than that is left alone: a kink or a soft spot is not touched.
+What is slower than `_LONGEST_WIDTHS` is left alone, for a bend may do that: a kink or a soft spot is not touched. The
+distances are those from the curves, and of the curves that the wiggle had made too stiff something is left in them; so
+it is done twice.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.interpolate import BSpline, CubicSpline
+from scipy.linalg import cholesky, solve_triangular, toeplitz
 
-from pipeline.records import Centerline, Rejected
-from pipeline.settings.vision.centerline import CurveSettings
-from rod.measurement import MeasuredShape
+from pipeline.records import Rejected
+from pipeline.settings.vision import VisionSettings
+from pipeline.vision.centerline.measurement import Followed
+from pipeline.vision.median import median
 
 Array = NDArray[np.float64]
 
-_LAY_PITCH_WIDTHS = 0.25  # widths; places along the cable at which the photos' midlines are held together
-_LAY_SMOOTH_WIDTHS = 1.5
-"""Widths; standard deviation of the running mean that is left alone: of a wave four widths long, the lay of a twisted
-pair, a twentieth is left, of a soft spot that long nine tenths.
-"""
+_LONGEST_WIDTHS, _ORDER = 5.6, 4
+"""Widths; waves this long are halved: of one four widths long, the lay of a twisted pair, a sixteenth is left alone, of
+one eight widths long all but a sixteenth. The order of the differences that tell slow from fast: no cubic is fast, also
+where the seen part of a cable ends. A running mean, one-sided there, moved the last two diameters by 0.3 px."""
+
+_PASSES = 2
+
+_PLACES = 12.0
+"""A width, at most, and no more than a photo has sections: half of them would be all that two photos show."""
 
 
 def without_lay(
-    lines: tuple[Centerline | Rejected, ...], diameter_m: float, settings: CurveSettings
-) -> tuple[Centerline | Rejected, ...]:
-    """Sections of a series relieved of the fast wiggle that all photos have in common.
+    cables: Sequence[Followed | Rejected], diameter_m: float, settings: VisionSettings
+) -> tuple[Followed | Rejected, ...]:
+    """Cables of a series without the fast wiggle that all photos have in common; a single one as it is."""
+    first = [cable for cable in cables if isinstance(cable, Followed)]
+    if len(first) < 2:
+        return tuple(cables)
+    taken, now, std, spare = [np.zeros(len(cable.fit.s)) for cable in first], first, 0.0, 1.0
+    for _ in range(_PASSES):
+        places, used = [cable.from_axis for cable in now], [cable.fit.weight > 0.0 for cable in now]
+        at, across = (
+            [part[own] for part, own in zip(parts, used, strict=True)]
+            for parts in (places, [c.fit.residual for c in now])
+        )
+        seen = common_wiggle(at, across, diameter_m)
+        parts = zip(taken, places, at, seen.across, strict=True)
+        taken = [before + np.interp(s, own, wiggle) for before, s, own, wiggle in parts]
+        std, spare = max(std, seen.std), max(spare, seen.spare)
+        now = [cable.without(off, settings, spare=spare, lay_std=std) for cable, off in zip(first, taken, strict=True)]
+    rest = iter(now)
+    return tuple(next(rest) if isinstance(cable, Followed) else cable for cable in cables)
+
+
+class Wiggle(NamedTuple):
+    """What all photos show at the same place.
+
+    Attributes
+    ----------
+    across : list of (n,)
+        At the sections of each photo: the mean over the photos, less the share of its variance that is their own noise.
+    std : float
+        By how much it may be off for what is slow in it: an error that all photos share.
+    spare : float
+        Variance of a photo's noise over that of its scatter without the wiggle, which holds a part of the noise.
+    """
+
+    across: list[Array]
+    std: float
+    spare: float
+
+
+def common_wiggle(places: Sequence[Array], across: Sequence[Array], width: float) -> Wiggle:
+    """The wiggle that photos have in common, in the unit of ``across``.
 
     Parameters
     ----------
-    lines : tuple of Centerline or Rejected
-        Outcomes of the photos of one cable.
-    diameter_m : m
-    settings : CurveSettings
-
-    Returns
-    -------
-    tuple of Centerline or Rejected
-        In the same order. Of the common wiggle only that part is taken which chance does not make of the photos' own
-        noise; a single photo is returned as it is.
+    places, across : sequences of (n,)
+        Arc lengths of the sections of every photo, ascending or nearly so, and their distances from its curve.
+    width : float
+        Of the cable, in the unit of the places.
     """
-    shapes = relieved([line.shape for line in lines if isinstance(line, Centerline)], diameter_m)
-    rest = iter(shapes)
-    return tuple(replace(line, shape=next(rest)) if isinstance(line, Centerline) else line for line in lines)
+    pitch = max(float(median(np.concatenate([np.diff(s) for s in places]))), width / _PLACES)
+    every, off = np.concatenate(places), np.concatenate(across)
+    size = int(every.max() / pitch) + 2
+    seen = [np.bincount((s / pitch).round().astype(int), minlength=size) > 0 for s in places]
+    at = np.flatnonzero(np.sum(seen, axis=0) > 1)
+    if at.size <= _ORDER:
+        return Wiggle([np.zeros_like(s) for s in places], 0.0, 1.0)
+    grid: Array = pitch * np.arange(size, dtype=np.float64)
+    # cubic: by straight lines between places, a wave of strands left a beat of a thirtieth of it on all photos
+    mean = _nearest(every, off, grid)
+    noise = float(np.mean((off - mean(every)) ** 2)) / (1.0 - size / every.size)
+    wiggle = np.zeros(size)
+    slow, std = _slow(mean(grid[at]), at, _LONGEST_WIDTHS * width / pitch)
+    wiggle[at] = mean(grid[at]) - slow
+    power = float(np.mean(wiggle[at] ** 2))
+    share = max(0.0, 1.0 - noise * size / every.size / power) if power > 0.0 else 0.0
+    held = share * (2.0 - share) * size / every.size
+    told = CubicSpline(grid, share * wiggle)
+    return Wiggle([told(s) for s in places], share * std, 1.0 / (1.0 - held))
 
 
-def relieved(shapes: list[MeasuredShape], diameter_m: float) -> list[MeasuredShape]:
-    """Shapes of one cable without the fast wiggle that they have in common; see `without_lay`."""
-    if len(shapes) < 2:
-        return shapes
-    pitch = _LAY_PITCH_WIDTHS * diameter_m
-    grid = np.arange(0.0, max(float(shape.s[-1]) for shape in shapes) + pitch, pitch)
-    wiggle = _common(np.array([_fast(shape, grid) for shape in shapes]))
-    spare = len(shapes) / (len(shapes) - 1.0)
-    return [_relieved(shape, grid, wiggle, spare=spare) for shape in shapes]
+def _nearest(s: Array, across: Array, grid: Array) -> BSpline[np.float64]:
+    """Cubic spline on a grid (g,) nearest to distances (n,) at places (n,); 0 where there are none."""
+    pitch = grid[1]
+    knots = pitch * np.arange(-3, grid.size + 3)
+    basis = BSpline.design_matrix(s, knots, 3)
+    normal = np.asarray((basis.T @ basis).toarray(), dtype=np.float64)
+    normal += _LEAST * np.median(np.diag(normal)) * np.eye(len(normal))
+    return BSpline(knots, np.linalg.solve(normal, np.asarray(basis.T @ across, dtype=np.float64)), 3)
 
 
-def _fast(shape: MeasuredShape, grid: Array) -> Array:
-    """Distance (g,) m of the sections from their curve on the grid, without what a bend could do; nan where unseen."""
-    across = shape.section_offsets()
-    cell = np.rint(shape.section_s / (grid[1] - grid[0])).astype(int).clip(0, grid.size - 1)
-    count = np.bincount(cell, minlength=grid.size)
-    mean = np.bincount(cell, across, grid.size) / np.maximum(count, 1)
-    width = _LAY_SMOOTH_WIDTHS / _LAY_PITCH_WIDTHS
-    # Weighted, so that the unseen ends and gaps pull nothing.
-    weight = gaussian_filter1d((count > 0).astype(float), width, mode="constant")
-    slow = gaussian_filter1d(np.where(count > 0, mean, 0.0), width, mode="constant") / np.maximum(weight, 1e-12)
-    return np.where(count > 0, mean - slow, np.nan)
+def _slow(mean: Array, at: NDArray[np.int_], longest: float) -> tuple[Array, float]:
+    """What of ``mean`` (m,), given at places ``at`` of a grid, is no wiggle, and its standard deviation.
 
+    ``longest``: wave length in places, as of `_LONGEST_WIDTHS`.
 
-def _common(wiggles: Array) -> Array:
-    """Mean (g,) of the photos' wiggles (n, g), shrunk by the share of its variance that their own noise makes."""
-    seen = np.isfinite(wiggles)
-    count = seen.sum(axis=0)
-    mean = np.where(seen, wiggles, 0.0).sum(axis=0) / np.maximum(count, 1)
-    shared = count > 1
-    if not shared.any():
-        return np.zeros_like(mean)
-    own = np.where(seen, wiggles - mean, 0.0)[:, shared] ** 2
-    chance = float(np.mean(own.sum(axis=0) / (count[shared] - 1) / count[shared]))
-    power = float(np.mean(mean[shared] ** 2))
-    return np.where(shared, mean, 0.0) * (max(0.0, 1.0 - chance / power) if power > 0.0 else 0.0)
-
-
-def _relieved(shape: MeasuredShape, grid: Array, wiggle: Array, *, spare: float) -> MeasuredShape:
-    """Sections without the wiggle; their standard deviations shrink as their scatter does.
-
-    The wiggle holds a part of the photo's own noise: `spare`, photos over photos less one, gives it back.
+    First as if the wiggle were white: the spline of least ``sum (slow - mean)^2 + sum (difference of coefficients)^2``,
+    the second weighed so that of waves of length l the share 1 / (1 + (longest / l)^(2 order)) is slow. Then with the
+    covariance that the rest shows: a wave of strands is one to the very end, where anything smooth could follow half of
+    its last period. Sources: Eilers and Marx (1996), Flexible smoothing with B-splines and penalties; Wiener (1949),
+    Extrapolation, interpolation and smoothing of stationary time series.
     """
-    if not shape.section_s.size:
-        return shape
-    off, across = np.interp(shape.section_s, grid, wiggle), shape.section_offsets()
-    theta = np.interp(shape.section_s, shape.s, shape.theta)
-    before, after = float(np.mean(across**2)), float(np.mean((across - off) ** 2))
-    share = min(1.0, spare * after / before) if before > 0.0 else 1.0
-    return replace(
-        shape,
-        section_x=shape.section_x + np.sin(theta) * off,
-        section_y=shape.section_y - np.cos(theta) * off,
-        section_std=shape.section_std * np.sqrt(share),
-    )
+    apart = longest / _KNOTS
+    knots = at[0] + apart * np.arange(-3, np.ceil((at[-1] - at[0] + 1.0) / apart) + 4)
+    spline = BSpline.design_matrix(at.astype(float), knots, 3).toarray()
+    rough = np.diff(np.eye(spline.shape[1]), _ORDER, axis=0) * (np.sqrt(apart) / (2.0 * np.pi / _KNOTS) ** _ORDER)
+    alike, power = np.eye(at.size), 0.0
+    for _ in range(2):
+        root = cholesky(alike, lower=True)
+        white, data = (solve_triangular(root, rows, lower=True) for rows in (spline, mean))
+        normal = white.T @ white + rough.T @ rough
+        slow = spline @ np.linalg.solve(normal, white.T @ data)
+        line = np.zeros(int(at[-1]) + 1)
+        line[at] = mean - slow
+        covariance = np.correlate(line, line, "full")[line.size - 1 :]
+        power = float(covariance[0])
+        if not power > 0.0:
+            break
+        alike = toeplitz(covariance / power)[np.ix_(at, at)] + _LEAST * np.eye(at.size)
+    spread = np.mean(np.sum(spline * np.linalg.solve(normal, spline.T).T, axis=1))
+    return np.asarray(slow), float(np.sqrt(power / at.size * spread))
+
+
+_KNOTS = 4.0
+"""Of the spline to the longest wave: a cubic one then follows waves half as long."""
+
+_LEAST = 1e-3
+"""Of the wiggle's variance, or of a place's sections: noise, or a wiggle of zero, that is there in any case."""

@@ -113,6 +113,10 @@ class Followed:
     light : (std m, length m)
         Of the light's slow error.
     diameter_m : m or None
+    breaks : tuple of m
+        As in `measure_centerline`.
+    lay_std : m
+        Of what all photos of a series err alike since their lay was taken off.
     """
 
     rough: RoughCable
@@ -123,6 +127,8 @@ class Followed:
     covariance: Array
     light: tuple[float, float]
     diameter_m: float | None
+    breaks: tuple[float, ...]
+    lay_std: float = 0.0
 
     def sight(self, settings: VisionSettings) -> AxisSight | None:
         """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
@@ -152,6 +158,21 @@ class Followed:
         used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
+
+    def without(self, wiggle: Array, settings: VisionSettings, *, spare: float, lay_std: float) -> Followed:
+        """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
+        theta = self.fit.curve.at(self.fit.s)[1]
+        moved = wiggle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+        fit = _fit(self.sections, self.chord, self.width, self.breaks, settings.curve, moved=moved)
+        noise = np.sqrt(spare)
+        fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
+        covariance = fit.smooth.covariance + slow_errors(fit, *self.light)
+        return replace(self, fit=fit, covariance=covariance, lay_std=lay_std)
+
+    @property
+    def from_axis(self) -> Array:
+        """Arc lengths (n,) m of the sections from the foot of the left axis."""
+        return np.asarray(self.fit.s - feet_of_axes(self.fit, self.chord)[0][0])
 
     def axis_std(self, fit: CurveFit, feet: Array) -> float:
         """Std (m) of the axes across the chord; ``feet`` are their arc lengths on the curve.
@@ -195,14 +216,20 @@ def follow_cable(
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
-    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
+    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m, breaks_m)
 
 
 def _fit(
-    sections: Sections, chord: ChordFrame, width: Array, breaks: tuple[float, ...], options: CurveSettings
+    sections: Sections,
+    chord: ChordFrame,
+    width: Array,
+    breaks: tuple[float, ...],
+    options: CurveSettings,
+    *,
+    moved: Array | float = 0.0,
 ) -> CurveFit:
-    """Curvature spline through the midline in the chord frame, ``s = 0`` near the left axis."""
-    points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second))
+    """Curvature spline through the midline less ``moved`` (n, 2) in the chord frame, ``s = 0`` near the left axis."""
+    points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second)) - moved
     before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
     s = before + arc_lengths(points)
     std = np.maximum(sections.std, _LEAST_STD_PX) * width / sections.width
@@ -240,7 +267,8 @@ def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) ->
     """The waves that ground and camera make in the midlines of all photos of a series."""
     halves = [cable.half_widths(settings.curve) for cable in cables if isinstance(cable, Followed)]
     scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
-    return edge_waves(halves, settings.curve, metres_per_px=max(scales, default=0.0))
+    lay = max((cable.lay_std for cable in cables if isinstance(cable, Followed)), default=0.0)
+    return edge_waves(halves, settings.curve, metres_per_px=max(scales, default=0.0), lay=lay)
 
 
 def centerline_of(
