@@ -63,14 +63,14 @@ def seen_through(move: Move) -> Observer:
         span_x, span_y = seen_x[..., 1] - seen_x[..., 0], seen_y[..., 1] - seen_y[..., 0]
         roll = np.arctan2(span_y, span_x)[..., None]
         rel_x, rel_y = seen_x[..., 2:] - seen_x[..., :1], seen_y[..., 2:] - seen_y[..., :1]
-        turned = np.arctan2(tip_y - seen_y, tip_x - seen_x)[..., 2:] - roll
+        turned = np.arctan2(tip_y - seen_y, tip_x - seen_x)[..., 2:] - roll - prediction.theta
         return replace(
             prediction,
             chord=np.hypot(span_x, span_y),
             x=np.cos(roll) * rel_x + np.sin(roll) * rel_y,
             y=np.cos(roll) * rel_y - np.sin(roll) * rel_x,
             # the direction is kept on the branch of the true one: slopes may pass 90 degrees
-            theta=prediction.theta + np.angle(np.exp(1j * (turned - prediction.theta))),
+            theta=prediction.theta + turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi)),
         )
 
     return observer

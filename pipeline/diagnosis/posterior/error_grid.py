@@ -47,7 +47,8 @@ Forms = Callable[[Array], Array]
 
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
-MOVED = {(0.0, 0.0): 0.1, (0.0, 1.0): 0.6, (1e-5, 0.0): 0.2, (5e-5, 0.0): 0.1}
+AS_RIGS_ARE = (0.0, 1.0)
+MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (1e-5, 0.0): 0.2, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
 several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen. `MOVED`:
 scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
@@ -243,21 +244,24 @@ def _sums(rows: Array, own: int) -> Array:
 
 def _with_rig(fixed: Products, displacements: int, rig: int) -> Products:
     """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it."""
-    sizes = np.array([*MOVED])
-    extra, times = displacements + rig, len(sizes)
+    sizes, chances = np.array([*MOVED]), np.array([*MOVED.values()])
+    extra, among = displacements + rig, np.flatnonzero(fixed.rest)
     count = fixed.own.shape[1] - extra
-    known = np.diag(np.r_[np.zeros(count), np.ones(extra)])
-    scales = np.hstack([np.ones((times, count)), np.repeat(sizes, (displacements, rig), axis=1)])
-    by, models = scales[:, None, :, None], times * len(fixed.log_det)
+    # something else is among a rig as rigs are, and holds what displacements scatter
+    models = [np.flatnonzero(~fixed.rest)] * len(sizes) + [among]
+    which = np.repeat([*range(len(sizes)), [*MOVED].index(AS_RIGS_ARE)], [len(own) for own in models])
+    at = np.concatenate(models)
+    scales = np.hstack([np.ones((len(sizes), count)), np.repeat(sizes, (displacements, rig), axis=1)])[which]
+    by = scales[:, :, None]
     return Products(
-        own=(fixed.own * (by * scales[:, None, None]) + known).reshape(models, *fixed.own.shape[1:]),
-        cross=(fixed.cross * by).reshape(models, *fixed.cross.shape[1:]),
-        square=np.tile(fixed.square, (times, 1)),
-        log_det=np.tile(fixed.log_det, times),
-        log_prior=np.concatenate([fixed.log_prior + np.log(chance) for chance in MOVED.values()]),
-        rest=np.tile(fixed.rest, times),
-        scales=np.repeat(scales[:, count:], len(fixed.log_det), axis=0),
-        sizes=np.tile(fixed.sizes, (times, 1)),
+        own=fixed.own[at] * (by * scales[:, None, :]) + np.diag(np.r_[np.zeros(count), np.ones(extra)]),
+        cross=fixed.cross[at] * by,
+        square=fixed.square[at],
+        log_det=fixed.log_det[at],
+        log_prior=fixed.log_prior[at] + np.where(fixed.rest[at], 0.0, np.log(chances)[which]),
+        rest=fixed.rest[at],
+        scales=scales[:, count:],
+        sizes=fixed.sizes[at],
     )
 
 
