@@ -24,6 +24,7 @@ from pipeline.vision.render.lighting import DIRECTIONAL, EVEN, Light
 from pipeline.vision.render.sensor import write_picture
 from pipeline.vision.render.sheath import WHITE, Sheath
 from pipeline.vision.series import trace_series
+from tests.pipeline.vision.drawn import drawn
 
 LENGTH, DIAMETER = 0.181, 0.0046
 BENT = Curve.from_curvature(lambda s: 2.0 + 7.0 * np.sin(np.pi * s / LENGTH), LENGTH)
@@ -58,7 +59,7 @@ class Case:
             chosen["sensor"] = replace(self.scene["sensor"], noise=condition["sensor"].noise)
         over = 0.0 if chosen.get("covers") == (None, None) else 0.003
         scene = Scene(Strand(self.curve, DIAMETER, self.sheath, FIXED, overhang_m=over), camera, **chosen)
-        return scene, render(scene)
+        return scene, drawn(scene)
 
 
 def trace(case: Case, condition: dict[str, Any], folder: Path) -> tuple[Scene, Picture, Traces]:
