@@ -14,11 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.threads import one_thread
+from pipeline.threads import keep_memory, one_thread
 
 # before any test loads numpy: threads of two workers wait for each other, and a diagnosis takes three times the
 # processor time; so the command does it, and so do its workers
 one_thread()
+keep_memory()
 
 # tests start the program a hundred times: each would compile three hundred files anew
 sys.dont_write_bytecode = False

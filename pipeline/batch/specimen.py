@@ -25,7 +25,7 @@ from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.settings import Settings
-from pipeline.threads import one_thread
+from pipeline.threads import keep_memory, one_thread
 
 Measure = Callable[..., Result]
 Write = Callable[..., None]
@@ -173,6 +173,7 @@ def _deadline(seconds: float, note: Path) -> Iterator[None]:
 def _measured(store: Store, order: Order, stages: Stages, started: float, doing: Doing) -> Outcome:
     """Read, compare with what is stored, measure, store."""
     one_thread()  # for workers that were started by others
+    keep_memory()
     store.place(order.name)  # refuses before the work, not after it
     specimen = read_specimen(order.folder, order.settings.intake)
     mark = fingerprint(specimen, order)

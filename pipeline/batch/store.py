@@ -176,4 +176,4 @@ class Store:
 
 def write_entry(entry: dict[str, Any], folder: Path) -> None:
     """Write ``entry.json`` into a folder, at once or not at all: one that is in place already may be read meanwhile."""
-    write_atomic(folder / ENTRY, json.dumps(entry, ensure_ascii=True, indent=1, sort_keys=True) + "\n")
+    write_atomic(folder / ENTRY, json.dumps(entry, sort_keys=True) + "\n")

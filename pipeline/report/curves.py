@@ -7,7 +7,7 @@ is the stiffness of the linear rod that changes its moment by as much over that 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ class TangentCurve(Protocol):
         """(n,) N m^2."""
 
     @property
-    def factor(self) -> Array:
+    def factor(self) -> NDArray[np.floating[Any]]:
         """(n, r) N m^2."""
 
 

@@ -16,6 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.files import write_atomic
@@ -265,10 +268,10 @@ def _json(value: Any) -> str:
 
 
 def _curve(row: IndexRow, unit: Unit) -> str:
-    """Curvatures, f_EI in the unit of the page, and its standard deviation, to four digits."""
+    """Ends of the curvatures, f_EI in the unit of the page, and its standard deviation, to four digits."""
     if row.curve is None:
         return "null"
-    parts = (row.curve.kappa, unit.factor * row.curve.tangent, unit.factor * row.curve.tangent_std)
+    parts = (row.curve.kappa[[0, -1]], unit.factor * row.curve.tangent, unit.factor * row.curve.tangent_std)
     return "[" + ",".join(_list(part) for part in parts) + "]"
 
 
@@ -280,5 +283,5 @@ def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
     return {"alt": entry.alt, "members": entry.members, "kappa": [float(f"{k:.4g}") for k in mean.kappa], **scaled}
 
 
-def _list(values: Iterable[float]) -> str:
-    return f"[{','.join(f'{value:.4g}' for value in values)}]"
+def _list(values: NDArray[np.float64]) -> str:
+    return f"[{','.join(map('{:.4g}'.format, values.tolist()))}]"

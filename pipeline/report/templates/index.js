@@ -3,7 +3,11 @@
   const data = read("data"), decimal = data.decimal, say = data.words;
   // Half of all data: read when the first curve is drawn.
   let stored;
-  const curve = (index) => { stored ??= read("curves"); return stored[index]; };
+  const curve = (index) => {
+    stored ??= read("curves");
+    const [[low, high], v, std] = stored[index];
+    return [v.map((_, i) => low + (high - low) * i / (v.length - 1)), v, std];
+  };
   const frame = find("specimens"), table = frame.querySelector("table");
   // Cells as `_cells` in pipeline/report/index.py writes them.
   const [NAME, HREF, TYPE, STATE, VERDICT, LOW, , HIGH, , K0, , RMS, , USED, PHOTOS, TROUBLES, REASON, LANGUAGE, SHAPES, CAUSES] = Array(20).keys();

@@ -5,14 +5,16 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
 from pipeline.report.index import write_index
-from pipeline.report.row import POINTS, as_entry, from_entry, index_row
+from pipeline.report.row import POINTS, as_entry, from_entry, index_row, thinned
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
@@ -121,8 +123,9 @@ def test_overlay_data_are_the_curves(batch, tmp_path):
     page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
     curves = json.loads(re.search(r'id="curves">(.*?)</script>', page)[1])
     assert curves[3] is None
-    kappa, value, std = curves[0]
-    assert len(kappa) == len(value) == len(std) == POINTS
+    ends, value, std = curves[0]
+    assert len(value) == len(std) == POINTS
+    assert ends == pytest.approx([batch[0].inverse.curve.kappa_per_m[i] for i in (0, -1)], rel=1e-3)
     assert value[0] == pytest.approx(1e3 * batch[0].inverse.curve.tangent_Nm2[0], rel=1e-3)  # four digits
 
 
@@ -189,6 +192,18 @@ def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_re
         assert as_entry(again) == as_entry(row)
 
 
+def test_a_row_keeps_the_covariance_whatever_its_directions(full_result):
+    curve = full_result.answer.curve
+    for columns in (0, 2, 3 * POINTS):
+        factor = np.random.default_rng(3).standard_normal((len(curve.kappa), columns))
+        kept = thinned(replace(curve, factor=factor), POINTS).factor
+        grid = np.linspace(curve.kappa[0], curve.kappa[-1], POINTS)
+        exact = np.stack([np.interp(grid, curve.kappa, row) for row in factor @ factor.T])
+        exact = np.stack([np.interp(grid, curve.kappa, row) for row in exact.T])
+        assert kept.shape[1] <= POINTS
+        assert np.allclose(kept @ kept.T, exact, atol=1e-6 * max(1, columns))
+
+
 def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
     result = diagnosed("two_causes")
     row = index_row(result, ReportSettings())
@@ -207,6 +222,9 @@ def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
         (("curve", "range"), [8.7, 2.0]),
         (("curve", "tangent"), [0.02]),
         (("curve", "tangent_std"), [1e-4]),
+        (("curve", "factor"), "AACAPw=="),  # one number where there must be 300
+        pytest.param(("curve", "factor"), "AADAfwAAwH8AAMB/" * 100, id="300 that are not finite"),
+        (("curve", "factor"), "=1"),
         (("photos_used",), True),
         (("status",), "done"),
         (("version",), 0),
@@ -220,10 +238,10 @@ def test_an_entry_of_wrong_values_is_no_row(place, value, full_result):
     for name in place[:-1]:
         inside = inside[name]
     inside[place[-1]] = value
-    with pytest.raises(ValueError, match=r"row|numbers|curve"):
+    with pytest.raises(ValueError, match=r"row|numbers|curve|padding"):
         from_entry(data)
     short = json.loads(whole)
-    short["curve"] |= {"tangent": [0.02], "tangent_std": [1e-4], "factor": [[1e-5]]}
+    short["curve"] |= {"tangent": [0.02], "tangent_std": [1e-4], "factor": ""}
     with pytest.raises(ValueError, match="a curve of nothing"):
         from_entry(short)
 

@@ -15,12 +15,13 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.candidates import Reading, branches
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.segmentation import find_cable
+from tests.pipeline.vision.drawn import drawn
 
 SETTINGS = VisionSettings()
 SCALE = 5_500.0
@@ -51,7 +52,7 @@ UNKNOWN = Cable()
 
 
 def find(scene: Scene, cable: Cable = KNOWN) -> tuple[RoughCable | Rejected, Picture]:
-    picture = render(scene)
+    picture = drawn(scene)
     return find_cable(photo_of(picture, scene.sensor.bit_depth), SETTINGS, cable=cable), picture
 
 
@@ -229,7 +230,7 @@ def test_figures_of_the_photo_are_true() -> None:
 
 
 def test_window_is_the_photo_along_the_cable() -> None:
-    picture = render(scene())
+    picture = drawn(scene())
     rough = find_cable(photo_of(picture), SETTINGS, cable=KNOWN)
     assert isinstance(rough, RoughCable)
     first, last = rough.visible
@@ -241,7 +242,7 @@ def test_neighbour_photo_narrows_the_search_and_changes_nothing() -> None:
     thing = Thing("pen", (0.09, -0.015), (0.16, 0.006), 0.0)
     first, _ = find(scene())
     assert isinstance(first, RoughCable)
-    picture = render(scene(camera=replace(CAMERA, look_at_m=(0.5 * CURVE.chord + 0.004, 0.022)), things=(thing,)))
+    picture = drawn(scene(camera=replace(CAMERA, look_at_m=(0.5 * CURVE.chord + 0.004, 0.022)), things=(thing,)))
     alone = find_cable(photo_of(picture), SETTINGS, cable=KNOWN)
     helped = find_cable(photo_of(picture), SETTINGS, cable=KNOWN, near=first)
     assert isinstance(alone, RoughCable) and isinstance(helped, RoughCable)
@@ -262,7 +263,7 @@ def test_free_ends_are_the_axes_where_nothing_covers_them() -> None:
 
 def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
     cable = replace(strand((0.17,) * 3), overhang_m=0.012)
-    picture = render(scene(cable=cable, covers=(None, None)))
+    picture = drawn(scene(cable=cable, covers=(None, None)))
     hints = BearingHints(given_px=(picture.left_px, picture.right_px))
     rough = find_cable(photo_of(picture), SETTINGS, cable=Cable(DIAMETER * SCALE, LENGTH * SCALE, hints))
     assert isinstance(rough, RoughCable)
