@@ -105,7 +105,7 @@ def assemble(
         balance=with_all_believed(parts.balance, None if fitted else wider),
         agreement=parts.agreement,
         diagnosis=diagnosis,
-        findings=_gathered(specimen, traces, parts, list(findings)),
+        findings=_gathered(specimen, traces, parts, list(findings), diagnosis),
         provenance=provenance(specimen, settings, command),
     )
     return result.model_copy(update={"answer_": result.answer.stored(), "headline": str(headline(result))})
@@ -123,15 +123,32 @@ def with_all_believed(part: Way, widening: Widening | None) -> Way:
     return part.model_copy(update={"curve": widening.of(part.curve), "pre_curvature_std_per_m": rest})
 
 
+CAUSES_NAMED = ("named", "class", "two_causes")
+WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium", "stalled", "limit-point")}
+"""Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
+
+
+def without_advice(earlier: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
+    """Findings, those of a fit that failed for want of a cause told as that where the curve is that with the cause."""
+    if diagnosis is None or diagnosis.extended is None or diagnosis.verdict not in CAUSES_NAMED:
+        return list(earlier)
+    said = Message("way.inverse-extended")
+    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in earlier]
+
+
 def _gathered(
-    specimen: Specimen, traces: Traces, parts: IdentificationParts, diagnosed: Sequence[Finding]
+    specimen: Specimen,
+    traces: Traces,
+    parts: IdentificationParts,
+    diagnosed: Sequence[Finding],
+    diagnosis: DiagnosisPart | None,
 ) -> list[FindingPart]:
     """Findings of all stages in their order, each fault told once."""
     earlier = [
         *specimen.findings,
         *traces.findings,
         *photo_findings(traces.photos),
-        *parts.findings,
+        *without_advice(parts.findings, diagnosis),
     ]
     found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]

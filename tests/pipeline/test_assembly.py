@@ -1,8 +1,10 @@
 """What the stages saw is gathered into a result: nothing that cost a photo is missing among the findings."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from pipeline.assembly import photo_findings, without_those_told_better
+from pipeline.assembly import photo_findings, without_advice, without_those_told_better
 from pipeline.messages import Message
 from pipeline.records import Finding, Rejected
 from pipeline.report.answer import first_screen
@@ -75,6 +77,19 @@ def test_what_is_told_as_a_fault_is_said_once():
     length = Finding("length/traced", "warning", "the photos show a cable of another length")
     told = without_those_told_better([*noticed, *pulled], [length])
     assert [f.code for f in told] == ["scale/displacement"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "extended", "level"), [("named", 1, "info"), ("unexplained", 1, "error"), ("named", None, "error")]
+)
+def test_a_fit_that_failed_for_want_of_a_cause_advises_nothing_else(verdict, extended, level):
+    """Stiff ends were named, f_EI measured beside them, and above it stood that length_mm was wrong."""
+    failed = Finding("identify/inverse-no-equilibrium", "error", "length_mm or the scale is wrong")
+    contradicted = Finding("identify/inverse-opposite-forces", "error", "no cable does that")
+    part = SimpleNamespace(verdict=verdict, extended=extended)
+    told = without_advice([failed, contradicted], part)
+    assert [one.level for one in told] == [level, "error"] and told[1] == contradicted
+    assert ("length_mm" in str(told[0].said)) == (level == "error")
 
 
 def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
