@@ -84,10 +84,18 @@ class Search:
         return [*best, *(one for _, one in new[LIKELIEST:])]
 
     def singles(self) -> list[Explanation]:
-        """Refit causes that matter or come near the best score."""
+        """Refit causes that matter or come near the best score; all others where something else is likelier than these.
+
+        The score of stiff ends, whose trace grows with the square of the amount, promises little where they are long.
+        """
         linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
         near = candidates(self.bench.suspicion, any_sign="mounted" not in self.bench.facts.branch)
-        return self.add(list(self._each([*near, *sorted(linear - set(near))])))
+        tried = [*near, *sorted(linear - set(near))]
+        found = self.add(list(self._each(tried)))
+        if self.posterior.word == "rest":
+            every = range(len(self.bench.suspicion.causes))
+            found += self.add(list(self._each([cause for cause in every if cause not in tried])))
+        return found
 
     def _each(self, causes: Sequence[int]) -> Iterator[Explanation]:
         rival = np.inf

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import LOOP, Protocol, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import SUSPECTS
+from pipeline.diagnosis.explanations import search
 from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import in_any_form, refitted_pairs, with_all_forms
@@ -81,6 +82,20 @@ def test_each_half_of_a_pair_has_all_its_forms():
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SHAPE_GAIN
     amount, std = whole.amount(SUSPECTS[lens])
     assert abs(amount - 0.012) < 4.0 * std
+
+
+def test_every_cause_is_tried_before_something_is_called_unexplained(monkeypatch):
+    """Stiff ends of 9 % of the length had so small a score that no fit ever held them, and f_EI was 18 % off."""
+    bench = prepare(faults_of_input(hidden_test(Cable(rigid_end=0.0163), SIX, largest=0.0138, seed=3)), SETTINGS)
+    names = [cause.name for cause in bench.suspicion.causes]
+    monkeypatch.setattr(search, "candidates", lambda *_, **__: [names.index("in_plane_load")])
+    seeking = search.Search(bench, SETTINGS)
+    seeking.hypotheses = seeking.hypotheses[:1]  # no score promises anything
+    assert seeking.posterior.word == "rest"
+    best = min(seeking.singles(), key=lambda one: one.fitted.chi2)
+    assert [names[cause] for cause in best.causes] == ["rigid_ends"]
+    amount, std = best.amount(bench.suspicion.causes[best.causes[0]])
+    assert abs(amount - 0.0163) < 4.0 * std
 
 
 def test_a_weak_cause_beside_one_fifty_times_as_loud_is_needed_where_only_both_leave_the_noise():
