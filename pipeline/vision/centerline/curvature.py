@@ -61,47 +61,34 @@ class Frame:
         return int(self.values.shape[1]) + 2
 
 
-def make_frame(start: float, end: float, *, intervals: int, order: int, breaks: tuple[float, ...] = ()) -> Frame:
-    """Knots from ``start`` to ``end``; at each of ``breaks`` the slope of the curvature may jump (a point load).
+def make_frame(start: float, end: float, *, intervals: int, order: int) -> Frame:
+    """Even knots from ``start`` to ``end``.
 
     Raises
     ------
     ValueError
-        If a break lies outside the range or ``intervals`` is below 4.
+        If the range is empty or ``intervals`` is below 4.
     """
     if intervals < 4 or not end > start:
         raise ValueError("a curvature spline needs end > start and at least 4 intervals")
-    if any(not start < at < end for at in breaks):
-        raise ValueError("a break must lie inside the range")
-    if not breaks:
-        unit, length = _unit_frame(intervals, order), end - start
-        return Frame(
-            knots=start + length * unit.knots,
-            grid=start + length * unit.grid,
-            anchor=unit.anchor,
-            values=unit.values,
-            integrals=length * unit.integrals,
-            penalty=length ** (0.5 - order) * unit.penalty,
-        )
-    inner = np.linspace(start, end, intervals + 1)[1:-1]
-    # no knot closer than half an interval to a break, which has multiplicity 3
-    gap = np.abs(inner[:, None] - np.asarray(breaks)).min(axis=1)
-    inner = np.sort(np.r_[inner[gap > 0.5 * (end - start) / intervals], np.repeat(breaks, DEGREE)])
-    return _frame(np.r_[[start] * (DEGREE + 1), inner, [end] * (DEGREE + 1)], intervals, order)
+    unit, length = _unit_frame(intervals, order), end - start
+    return Frame(
+        knots=start + length * unit.knots,
+        grid=start + length * unit.grid,
+        anchor=unit.anchor,
+        values=unit.values,
+        integrals=length * unit.integrals,
+        penalty=length ** (0.5 - order) * unit.penalty,
+    )
 
 
 @cache
 def _unit_frame(intervals: int, order: int) -> Frame:
     """Even knots from 0 to 1: the same for all photos, whatever the length of the cable on them."""
-    return _frame(np.r_[[0.0] * DEGREE, np.linspace(0.0, 1.0, intervals + 1), [1.0] * DEGREE], intervals, order)
-
-
-def _frame(knots: Array, intervals: int, order: int) -> Frame:
-    count = len(knots) - DEGREE - 1
-    spline = BSpline(knots, np.eye(count), DEGREE)
-    edges = np.unique(knots)
-    each = max(2, round(_CELLS / intervals)) + 1
-    nodes = np.interp(np.arange((each - 1) * (len(edges) - 1) + 1) / (each - 1), np.arange(len(edges)), edges)
+    edges = np.linspace(0.0, 1.0, intervals + 1)
+    knots = np.r_[[0.0] * DEGREE, edges, [1.0] * DEGREE]
+    spline = BSpline(knots, np.eye(intervals + DEGREE), DEGREE)
+    nodes = np.linspace(0.0, 1.0, intervals * max(2, round(_CELLS / intervals)) + 1)
     grid = np.empty(2 * len(nodes) - 1)
     grid[::2], grid[1::2] = nodes, 0.5 * (nodes[1:] + nodes[:-1])
     anchor = 2 * (len(nodes) // 2)

@@ -55,43 +55,10 @@ times the other's variance.
 
 
 def measure_centerline(
-    rough: RoughCable,
-    *,
-    plane: PlaneMap,
-    diameter_m: float | None,
-    settings: VisionSettings,
-    breaks_m: tuple[float, ...] = (),
-    axis_parallax_std: float = 0.0,
+    rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, settings: VisionSettings
 ) -> Centerline | Rejected:
-    """Centerline of the cable in the chord frame, or why there is none.
-
-    Parameters
-    ----------
-    rough : RoughCable
-        The cable to about a pixel, and the picture around it.
-    plane : PlaneMap
-        Pixels to metres on the plane of the cable axis.
-    diameter_m : m or None
-        Of the cable, in the unit of the plane; a check on the measured width.
-    settings : VisionSettings
-    breaks_m : tuple of m
-        Arc lengths from the left axis at which a point load is assumed: the slope of the curvature may jump there.
-    axis_parallax_std : relative
-        As in `pipeline.records.Traces`.
-
-    Raises
-    ------
-    ValueError
-        If a break lies outside the cable.
-    """
-    followed = follow_cable(
-        rough,
-        plane=plane,
-        diameter_m=diameter_m,
-        settings=settings,
-        breaks_m=breaks_m,
-        axis_parallax_std=axis_parallax_std,
-    )
+    """Centerline of the cable on a single photo in the chord frame, or why there is none; see `follow_cable`."""
+    followed = follow_cable(rough, plane=plane, diameter_m=diameter_m, settings=settings)
     return followed if isinstance(followed, Rejected) else centerline_of(followed, settings)
 
 
@@ -113,8 +80,6 @@ class Followed:
     light : (std m, length m)
         Of the light's slow error.
     diameter_m : m or None
-    breaks : tuple of m
-        As in `measure_centerline`.
     lay_std : m
         Of what all photos of a series err alike since their lay was taken off.
     """
@@ -127,7 +92,6 @@ class Followed:
     covariance: Array
     light: tuple[float, float]
     diameter_m: float | None
-    breaks: tuple[float, ...]
     lay_std: float = 0.0
 
     def sight(self, settings: VisionSettings) -> AxisSight | None:
@@ -163,7 +127,7 @@ class Followed:
         """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
         theta = self.fit.curve.at(self.fit.s)[1]
         moved = wiggle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
-        fit = _fit(self.sections, self.chord, self.width, self.breaks, settings.curve, moved=moved)
+        fit = _fit(self.sections, self.chord, self.width, settings.curve, moved=moved)
         noise = np.sqrt(spare)
         fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
         covariance = fit.smooth.covariance + slow_errors(fit, *self.light)
@@ -195,10 +159,22 @@ def follow_cable(
     plane: PlaneMap,
     diameter_m: float | None,
     settings: VisionSettings,
-    breaks_m: tuple[float, ...] = (),
     axis_parallax_std: float = 0.0,
 ) -> Followed | Rejected:
-    """The cable fitted where it is seen, or why it cannot be; arguments of `measure_centerline`."""
+    """The cable fitted where it is seen, or why it cannot be.
+
+    Parameters
+    ----------
+    rough : RoughCable
+        The cable to about a pixel, and the picture around it.
+    plane : PlaneMap
+        Pixels to metres on the plane of the cable axis.
+    diameter_m : m or None
+        Of the cable, in the unit of the plane; a check on the measured width.
+    settings : VisionSettings
+    axis_parallax_std : relative
+        As in `pipeline.records.Traces`.
+    """
     options = settings.curve
     half_width = rough.half_width_px
     if diameter_m is not None:
@@ -209,21 +185,20 @@ def follow_cable(
         return sections
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
-    fit = _fit(sections, chord, width, breaks_m, options)
+    fit = _fit(sections, chord, width, options)
     refused = refusal(rough, sections, fit, chord, width, diameter_m)
     if refused is not None:
         return refused
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
-    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m, breaks_m)
+    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
 def _fit(
     sections: Sections,
     chord: ChordFrame,
     width: Array,
-    breaks: tuple[float, ...],
     options: CurveSettings,
     *,
     moved: Array | float = 0.0,
@@ -240,7 +215,6 @@ def _fit(
         s=s,
         length=float(s[-1] + after),
         diameter=median(width),
-        breaks=breaks,
         witness=_half_widths(s, sections.balance, width, std, options),
     )
 

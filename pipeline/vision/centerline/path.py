@@ -55,7 +55,6 @@ def fit_along(
     s: Array,
     length: float,
     diameter: float,
-    breaks: tuple[float, ...] = (),
     witness: Witness | None = None,
 ) -> CurveFit:
     """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
@@ -70,8 +69,6 @@ def fit_along(
         About the arc lengths of the points from the left axis.
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
-    breaks : tuple of float
-        Arc lengths at which the slope of the curvature may jump.
     witness : Witness, optional
         Other data whose errors last as long along s as those of the points.
     """
@@ -81,7 +78,7 @@ def fit_along(
     guide_s = s
 
     def fit(correlation_length: float | None, iterations: int) -> CurveFit:
-        frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER, breaks=breaks)
+        frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER)
         return fit_curve(
             points,
             std,

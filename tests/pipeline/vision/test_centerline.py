@@ -211,24 +211,6 @@ def test_axis_beside_the_cable_is_a_finding():
     assert [f.code for f in found.findings] == ["photo/bearing"]
 
 
-def test_a_point_load_is_followed_by_a_break_only_if_asked():
-    rng = np.random.default_rng(13)
-    scene = even(rng)
-    rough = rough_cable(scene, render(scene), rng)
-    plane = PlaneMap.from_scale(scene.camera.px_per_m)
-    found = measure_centerline(rough, plane=plane, diameter_m=DIAMETER, settings=VisionSettings(), breaks_m=(0.09,))
-    assert not isinstance(found, Rejected)
-    assert (
-        found.shape.covariance.shape[0]
-        == measure_centerline(
-            rough, plane=plane, diameter_m=DIAMETER, settings=VisionSettings()
-        ).shape.covariance.shape[0]
-        + 2
-    )
-    with pytest.raises(ValueError, match="break"):
-        measure_centerline(rough, plane=plane, diameter_m=DIAMETER, settings=VisionSettings(), breaks_m=(0.5,))
-
-
 def test_chord_frame_goes_there_and_back():
     rng = np.random.default_rng(14)
     scene = even(rng)
