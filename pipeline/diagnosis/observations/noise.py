@@ -175,20 +175,13 @@ class PhotoNoise:
     doubt: float = 0.0
 
 
-def calibrate_photo_noise(
-    residuals: list[Array],
-    sections: list[Sections],
-    bases: list[Array],
-    *,
-    stretches: tuple[float, ...] = STRETCHES,
-    stretch_spread: float = STRETCH_SPREAD,
-    prior_weight: float = PRIOR_WEIGHT,
-) -> PhotoNoise:
+def calibrate_photo_noise(residuals: list[Array], sections: list[Sections], bases: list[Array]) -> PhotoNoise:
     """Noise level and correlation of the sections from what is faster along s than ``bases``.
 
     Restricted likelihood over all photos: the smooth basis is projected out, so neither a misfit of the model nor a
-    cause can raise the level. The stretch is the mean over the likelihood, not its maximum: that jumps from trial to
-    trial, and the slow noise with it.
+    cause can raise the level. What is fast along s tells factor^2 / stretch well and the stretch alone badly, but the
+    slow noise that a cause must exceed goes with factor^2 * stretch. So the stretch is the mean over the likelihood,
+    not its maximum: that jumps from trial to trial, and the slow noise with it.
 
     Parameters
     ----------
@@ -196,14 +189,6 @@ def calibrate_photo_noise(
         Normal distance of the block means from any smooth reference (the fitted cable).
     sections, bases : lists
         Per photo; bases (k, q) as of `smooth_basis`.
-    stretches : tuple of float
-        Trial factors of the stated correlation length, at equal ratios or nearly so.
-    stretch_spread : float
-        Standard deviation of the logarithm of that factor before the photos are looked at. What is fast along s tells
-        factor^2 / stretch well and the stretch alone badly, but the slow noise that a cause must exceed goes with
-        factor^2 * stretch.
-    prior_weight : float
-        Number of samples the stated level counts for.
 
     Returns
     -------
@@ -215,7 +200,7 @@ def calibrate_photo_noise(
 
     def level(stretch: float) -> tuple[float, float, float]:
         """Factor, log-likelihood and log of the slow variance at a stretch."""
-        square, freedom, determinant, slow = prior_weight, prior_weight, 0.0, 0.0
+        square, freedom, determinant, slow = PRIOR_WEIGHT, PRIOR_WEIGHT, 0.0, 0.0
         for part, block, (smooth, contrast) in zip(fast, sections, split, strict=True):
             covariance = section_covariance(block, stretch=stretch)
             root = linalg.cholesky(contrast.T @ covariance @ contrast, lower=True)
@@ -223,14 +208,14 @@ def calibrate_photo_noise(
             freedom += contrast.shape[1]
             determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
             slow += float(np.sum(smooth * (covariance @ smooth)))
-        off = np.log(stretch) / stretch_spread
+        off = np.log(stretch) / STRETCH_SPREAD
         value = -0.5 * (determinant + freedom * np.log(square / freedom) + off**2)
         return float(np.sqrt(square / freedom)), value, float(np.log(slow * square / freedom))
 
-    trials = np.array([level(stretch) for stretch in stretches])
+    trials = np.array([level(stretch) for stretch in STRETCHES])
     weight = np.exp(trials[:, 1] - trials[:, 1].max())
     weight /= weight.sum()
-    stretch = float(np.exp(weight @ np.log(stretches)))
-    freedom = prior_weight + sum(part.size for part in fast)
+    stretch = float(np.exp(weight @ np.log(STRETCHES)))
+    freedom = PRIOR_WEIGHT + sum(part.size for part in fast)
     scatter = float(weight @ (trials[:, 2] - weight @ trials[:, 2]) ** 2)
     return PhotoNoise(level(stretch)[0], stretch, float(np.sqrt(scatter + 2.0 / freedom)))

@@ -36,9 +36,6 @@ where the seen part of a cable ends. A running mean, one-sided there, moved the 
 
 _PASSES = 2
 
-_PLACES = 12.0
-"""A width, at most, and no more than a photo has sections: half of them would be all that two photos show."""
-
 
 def without_lay(
     cables: Sequence[Followed | Rejected], diameter_m: float, settings: VisionSettings
@@ -91,7 +88,8 @@ def common_wiggle(places: Sequence[Array], across: Sequence[Array], width: float
     width : float
         Of the cable, in the unit of the places.
     """
-    pitch = max(float(median(np.concatenate([np.diff(s) for s in places]))), width / _PLACES)
+    # as many places as a photo has sections: twice as many would be all that two photos show
+    pitch = float(median(np.concatenate([np.diff(s) for s in places])))
     every, off = np.concatenate(places), np.concatenate(across)
     size = int(every.max() / pitch) + 2
     seen = [np.bincount((s / pitch).round().astype(int), minlength=size) > 0 for s in places]
