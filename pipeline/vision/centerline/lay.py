@@ -90,24 +90,26 @@ def common_wiggle(places: Sequence[Array], across: Sequence[Array], width: float
     """
     # as many places as a photo has sections: twice as many would be all that two photos show
     pitch = float(median(np.concatenate([np.diff(s) for s in places])))
-    every, off = np.concatenate(places), np.concatenate(across)
-    size = int(every.max() / pitch) + 2
-    seen = [np.bincount((s / pitch).round().astype(int), minlength=size) > 0 for s in places]
-    at = np.flatnonzero(np.sum(seen, axis=0) > 1)
+    first = min(float(s.min()) for s in places)  # a visible end may lie beside the first section
+    size = int((max(float(s.max()) for s in places) - first) / pitch) + 2
+    nearest = [np.rint((s - first) / pitch).astype(int) for s in places]
+    several = np.sum([np.bincount(one, minlength=size) > 0 for one in nearest], axis=0) > 1
+    at, kept = np.flatnonzero(several), several[np.concatenate(nearest)]
     if at.size <= _ORDER:
         return Wiggle([np.zeros_like(s) for s in places], 0.0, 1.0)
+    every, off = np.concatenate(places)[kept] - first, np.concatenate(across)[kept]
     grid: Array = pitch * np.arange(size, dtype=np.float64)
     # cubic: by straight lines between places, a wave of strands left a beat of a thirtieth of it on all photos
-    mean = _nearest(every, off, grid)
-    noise = float(np.mean((off - mean(every)) ** 2)) / (1.0 - size / every.size)
+    mean, part = _nearest(every, off, grid), at.size / every.size  # half at most: each place has two sections or more
+    noise = float(np.mean((off - mean(every)) ** 2)) / (1.0 - part)
     wiggle = np.zeros(size)
     slow, std = _slow(mean(grid[at]), at, _LONGEST_WIDTHS * width / pitch)
     wiggle[at] = mean(grid[at]) - slow
     power = float(np.mean(wiggle[at] ** 2))
-    share = max(0.0, 1.0 - noise * size / every.size / power) if power > 0.0 else 0.0
-    held = share * (2.0 - share) * size / every.size
+    share = max(0.0, 1.0 - noise * part / power) if power > 0.0 else 0.0
     told = CubicSpline(grid, share * wiggle)
-    return Wiggle([told(s) for s in places], share * std, 1.0 / (1.0 - held))
+    spare = 1.0 / (1.0 - share * (2.0 - share) * part)
+    return Wiggle([told(s - first) for s in places], share * std, spare)
 
 
 def _nearest(s: Array, across: Array, grid: Array) -> BSpline[np.float64]:
@@ -116,7 +118,7 @@ def _nearest(s: Array, across: Array, grid: Array) -> BSpline[np.float64]:
     knots = pitch * np.arange(-3, grid.size + 3)
     basis = BSpline.design_matrix(s, knots, 3)
     normal = np.asarray((basis.T @ basis).toarray(), dtype=np.float64)
-    normal += _LEAST * np.median(np.diag(normal)) * np.eye(len(normal))
+    normal += _LEAST * np.max(np.diag(normal)) * np.eye(len(normal))
     return BSpline(knots, np.linalg.solve(normal, np.asarray(basis.T @ across, dtype=np.float64)), 3)
 
 

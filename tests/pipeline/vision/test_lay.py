@@ -63,6 +63,19 @@ def test_it_is_taken_off_beside_the_covers_too(photos):
         assert np.sqrt(np.mean(off[:40] ** 2)) < 0.2 * WAVE and np.abs(off[:40].mean()) < 0.03 * WAVE
 
 
+@pytest.mark.parametrize("shift", [-6e-3, 0.0])
+def test_photos_that_show_little_together_and_ends_before_their_axis_are_no_trouble(photos, shift):
+    """Two photos, the halves they show overlapping by a fifth; a visible end has sections before its axis."""
+    (one, other), (first, second) = ([part[k] for k in (0, 1)] for part in photos)
+    left, right = one < 0.6 * LENGTH, other > 0.4 * LENGTH
+    places = [one[left] + shift, other[right] + shift]
+    across = [(first + lay(one))[left], (second + lay(other))[right]]
+    (taken_left, taken_right), std, spare = common_wiggle(places, across, DIAMETER)
+    alone = one[left] < 0.38 * LENGTH
+    assert np.abs(taken_left[alone]).max() < 0.2 * WAVE  # what one photo alone shows is nothing common
+    assert np.isfinite(std) and 1.0 <= spare <= 2.0 and np.abs(taken_right).max() < 2.0 * WAVE
+
+
 def test_what_one_photo_shows_stays(photos):
     alone = taken(photos, [lay, *[np.zeros_like] * (PHOTOS - 1)])
     assert share(photos[0][0], alone[0], lay) < 1.0 / PHOTOS + 0.02
