@@ -34,6 +34,7 @@ from pipeline.result import (
     SpecimenPart,
     Widening,
 )
+from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.headline import headline
 from pipeline.settings import Settings
 
@@ -123,7 +124,6 @@ def with_all_believed(part: Way, widening: Widening | None) -> Way:
     return part.model_copy(update={"curve": widening.of(part.curve), "pre_curvature_std_per_m": rest})
 
 
-CAUSES_NAMED = ("named", "class", "two_causes")
 WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium", "stalled", "limit-point")}
 """Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
 

@@ -27,6 +27,7 @@ from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
+from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit, suited
 
@@ -220,7 +221,7 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
 
 def _causes(row: IndexRow, words: Words) -> str:
     """The causes that were named, and the names that cannot be told from them; where none suffices, nothing."""
-    if _verdict(row) not in ("named", "class", "two_causes"):
+    if _verdict(row) not in CAUSES_NAMED:
         return ""
     named = f" {words('and')} ".join(words.cause(name) for name in row.causes)
     return f" {words('or')} ".join((named, *(words.cause(name) for name in row.twins)))

@@ -9,6 +9,9 @@ from pydantic import BeforeValidator, Field
 from pipeline.result.lists import Floats, Number
 from pipeline.result.parts import Curve, Part, SaidPart, Widening
 
+CAUSES_NAMED = ("named", "class", "two_causes")
+"""Verdicts that name causes."""
+
 
 class CauseForm(Part):
     """One form of a cause as it stands in the extended model: what a prediction needs of it."""

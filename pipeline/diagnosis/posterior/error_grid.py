@@ -6,7 +6,8 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
     waves     errors of each photo along the cable, rough ones as below, none or up to the scatter of a section
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
-    rig       zero of displacement, length and lean of the camera as exact as told, or as rigs commonly have them
+    rig       zero of displacement, length and lean of the camera as exact as told, or as rigs commonly have them;
+              beside something else always as rigs have them, and that holds what displacements scatter
     shapes    something else in the shapes, a share of the length across the cable
     forces    something else in the forces, a share of the largest
 
