@@ -101,6 +101,8 @@ def show(browser):
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
         browser.get(address)
+        # opening the address that is shown already may return while the page is still being read
+        WebDriverWait(browser, 60).until(lambda d: d.execute_script("return document.readyState") == "complete")
         opened.append(address)
         return browser
 
