@@ -17,7 +17,15 @@ from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specim
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
-from pipeline.vision.bearings.steady import Fixed, apart_px, expected_covers, fixed_cover, is_sure, moved_axes
+from pipeline.vision.bearings.steady import (
+    Fixed,
+    apart_px,
+    expected_covers,
+    fixed_cover,
+    is_sure,
+    moved_axes,
+    stands_still,
+)
 from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
@@ -261,8 +269,8 @@ def with_fixed_cover(
     """
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
-    limit = settings.series.max_fixed_shift_m * calibration.scale.px_per_m
-    fixed = fixed_cover(found, limit)
+    play = settings.series.max_fixed_shift_m * calibration.scale.px_per_m
+    fixed = fixed_cover(found, play)
     if fixed is None:
         return shots
     scale = calibration.scale.px_per_m
@@ -273,7 +281,7 @@ def with_fixed_cover(
     settled = list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
         again = _find_again(specimen, shots[k], expected, settings)
-        if isinstance(again, RoughCable) and apart_px(again, fixed) <= limit:
+        if isinstance(again, RoughCable) and stands_still(again, fixed, play):
             settled[k] = replace(shots[k], found=again)
         elif not is_sure(cable, fixed.side) or _chord_speaks_against(cable, found, fixed, travel, k=there.index(k)):
             apart = apart_px(cable, fixed) / scale

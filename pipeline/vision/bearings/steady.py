@@ -18,6 +18,7 @@ from pipeline.vision.rough import Bearing, RoughCable
 Pair = tuple[tuple[float, float], tuple[float, float]]
 
 _LEAST_STEADY = 3  # photos; of two that differ nothing tells which one shows the fixed bearing in its place
+_ASTRAY = 4.0  # standard deviations; a cover that stands still is found so far away on one photo in 3,000
 _STEADY_SHARE = 0.6  # of the photos; so many show the fixed bearing in one place, or the camera moved
 
 
@@ -65,11 +66,11 @@ class Fixed:
     astray: tuple[int, ...]
 
 
-def fixed_cover(found: Sequence[RoughCable], limit_px: float) -> Fixed | None:
-    """The cover that stands still on most photos; None where none does (to ``limit_px``)."""
+def fixed_cover(found: Sequence[RoughCable], play_px: float) -> Fixed | None:
+    """The cover that stands still on most photos, but for its play and to its error; None where none does."""
     if len(found) < _LEAST_STEADY:
         return None
-    steady = np.stack([_off_middle(found, side) <= limit_px for side in _SIDES])
+    steady = np.stack([_off_middle(found, side) <= _reach(found, side, play_px) for side in _SIDES])
     side = int(np.argmax(steady.sum(axis=1)))
     still = [_axis(cable, _SIDES[side]) for cable, there in zip(found, steady[side], strict=True) if there]
     group = [axis for axis in still if axis.kind == "cover"]
@@ -103,6 +104,11 @@ def apart_px(cable: RoughCable, fixed: Fixed) -> float:
     return float(np.hypot(*np.subtract(_axis(cable, fixed.side).center_px, fixed.cover.center_px)))
 
 
+def stands_still(cable: RoughCable, fixed: Fixed, play_px: float) -> bool:
+    """Whether a photo shows the fixed cover where it stands, but for its play and to its error."""
+    return bool(apart_px(cable, fixed) <= _reach([cable], fixed.side, play_px)[0])
+
+
 def is_sure(cable: RoughCable, side: Side) -> bool:
     """True if nothing else can have been taken for the cover: it stands where it was found."""
     return _axis(cable, side).sure
@@ -113,6 +119,11 @@ _SIDES: tuple[Side, Side] = ("left", "right")
 
 def _axis(cable: RoughCable, side: Side) -> Bearing:
     return cable.left if side == "left" else cable.right
+
+
+def _reach(found: Sequence[RoughCable], side: Side, play_px: float) -> Array:
+    """How far from its place each photo may show an axis that stands still."""
+    return np.hypot(play_px, _ASTRAY * np.array([_axis(cable, side).std_px for cable in found]))
 
 
 def _off_middle(found: Sequence[RoughCable], side: Side) -> Array:

@@ -38,7 +38,8 @@ class Closeup:
     blur_px : px
         Standard deviation of the edge spread.
     motion_px : px
-        Length over which camera or cable moved during the exposure; 0 where the edges are equally sharp everywhere.
+        How far camera or cable moved across the cable during the exposure, where that is most, beyond where it is
+        least; 0 where the edges are equally sharp everywhere.
     """
 
     grey: NDArray[np.float32]
@@ -126,11 +127,13 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
 
 
 def _motion(spreads: Array, angles: Array) -> float:
-    """Length of a motion blur by the edge spreads ``(2, k)`` and the angles ``(k,)`` of the cable.
+    """Length of a motion across the cable by the edge spreads ``(2, k)`` and the angles ``(k,)`` of the cable.
 
     A motion over L in the direction mu adds ``L^2/12 sin^2(angle - mu)`` to the squared spread: nothing where the cable
-    runs along it. The sharper of both edges counts: a shadow softens one of them, a motion both. Where the squared
-    spread changes by less than half along the cable, the cause is another one, or does the same as defocus.
+    runs along it. The sharper of both edges counts: a shadow softens one of them, a motion both. It is read off between
+    the angles that are seen: light on a round sheath changes the spread with the angle too, by little, and a course
+    that turns by a few degrees would make a long motion of it. Where the squared spread changes by less than half along
+    the cable, the cause is another one, or does the same as defocus.
     """
     sharper = np.min(spreads, axis=0)
     known = np.isfinite(sharper)
@@ -138,11 +141,8 @@ def _motion(spreads: Array, angles: Array) -> float:
         return 0.0
     squared, twice = sharper[known] ** 2, 2.0 * angles[known]
     terms = np.column_stack([np.ones(len(twice)), np.cos(twice), np.sin(twice)])
-    # Turns of a few degrees leave the last two terms open: no more than the data ask for.
-    ridge = 1e-3 * len(terms) * np.diag([0.0, 1.0, 1.0])
-    fitted = np.linalg.solve(terms.T @ terms + ridge, terms.T @ squared)
-    smooth = terms @ fitted
-    return float(np.sqrt(24.0 * np.hypot(fitted[1], fitted[2]))) if smooth.min() < 0.5 * smooth.max() else 0.0
+    smooth = terms @ np.linalg.lstsq(terms, squared, rcond=1e-3)[0]
+    return float(np.sqrt(12.0 * np.ptp(smooth))) if smooth.min() < 0.5 * smooth.max() else 0.0
 
 
 def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: bool) -> Array:

@@ -20,11 +20,19 @@ WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis
 
 
 def arc(
-    *, motion: float = 0.0, direction: float = 0.0, blur: float = 0.8, shadow: float = 0.0, letters: bool = False
+    *,
+    motion: float = 0.0,
+    direction: float = 0.0,
+    blur: float = 0.8,
+    shadow: float = 0.0,
+    letters: bool = False,
+    softer: float = 0.0,
+    turned: float = 0.7,
 ) -> Closeup:
     """Close-up of a dark arc of 80 degrees, moved by so many px; ``shadow`` px of blur at its outer edge alone.
 
-    With ``letters`` the sheath is bright, and bright strokes across it are a third of both ends of the arc.
+    ``softer`` is a blur, px, that comes in from its left to its right end; ``turned`` half of its turn that is looked
+    at, rad. With ``letters`` the sheath is bright, and bright strokes across it are a third of both ends of the arc.
     """
     v, u = np.mgrid[0:420, 0:1100].astype(np.float32)
     away = np.hypot(u - 550.0, v - 760.0) - BEND
@@ -44,8 +52,11 @@ def arc(
     size = grey.shape[::-1]
     grey = np.mean([cv2.warpAffine(grey, m, size, borderMode=cv2.BORDER_REPLICATE) for m in moves], axis=0)
     grey = cv2.GaussianBlur(grey, (0, 0), blur)
+    if softer:
+        right = np.clip((u - 550.0) / (2.0 * BEND * np.sin(turned)) + 0.5, 0.0, 1.0)
+        grey += right * (cv2.GaussianBlur(grey, (0, 0), softer) - grey)
     noise = 0.01 * np.random.default_rng(0).standard_normal(grey.shape)
-    turn = np.linspace(-0.7, 0.7, 300)
+    turn = np.linspace(-turned, turned, 300)
     path = np.column_stack([550.0 + BEND * np.sin(turn), 760.0 - BEND * np.cos(turn)])
     pixels = np.clip(np.rint(255.0 * (grey + noise)), 0, 255).astype(np.uint8)
     return take_closeup(Photo("a.png", pixels, 8), path, WIDTH, np.ones(1))
@@ -54,7 +65,9 @@ def arc(
 @pytest.mark.parametrize("direction", [0.0, 0.6, 2.4])
 def test_motion_is_measured_by_what_it_does_to_the_edges(direction):
     """A box of length L has the variance L^2 / 12; its steepest slope tells L to a fifth, enough for a refusal."""
-    assert_allclose(arc(motion=15.0, direction=direction).motion_px, 15.0, rtol=0.2)
+    turn = np.linspace(-0.56, 0.56, 100)  # of the arc, its outermost tenths apart
+    across = 15.0 * np.sqrt(np.ptp(np.sin(turn - direction) ** 2))
+    assert_allclose(arc(motion=15.0, direction=direction).motion_px, across, rtol=0.2)
 
 
 @pytest.mark.parametrize("blur", [0.8, 2.0, 4.0])
@@ -68,6 +81,12 @@ def test_defocus_is_not_motion(blur):
 
 def test_soft_shadow_at_one_edge_is_not_motion():
     assert arc(shadow=5.0).motion_px == 0.0
+
+
+def test_edges_that_soften_along_a_cable_that_hardly_turns_are_no_long_motion():
+    """Light on a round sheath does that: sharp photos of a cable that turns by 30 degrees were "moved" by 6 px."""
+    closeup = arc(blur=0.5, softer=1.1, turned=0.27)
+    assert np.sqrt(12.0 * 0.4) < closeup.motion_px < np.sqrt(12.0 * 1.1**2)
 
 
 def test_letters_on_the_sheath_are_not_motion():
