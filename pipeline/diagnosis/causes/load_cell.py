@@ -114,9 +114,10 @@ class Relaxation(Cause):
         """Relaxation times from a tenth of a hold to three holds; each hold by itself, or all with a memory of others.
 
         What a cable has lost in one hold it does not win back in the next: a bow that grows by little loses little.
+        A log without times is taken as sampled evenly from its first row to its last.
         """
         span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
-        if not facts.timed or span <= 0.0:
+        if span <= 0.0:
             return ()
         reach = (0.02 * span, 10.0 * span)
         forms = (Variant("decaying in every hold"), Variant("decaying since every change of the bow", width=1.0))

@@ -61,7 +61,9 @@ def force_noise(steps: tuple[MeasuredStep, ...], *, floor: float, distinct: floa
     """
     plain = _scatter(steps, None)
     if not plain.freedom.any():
-        return ForceNoise(np.maximum([step.force_std for step in steps], floor), 0)
+        # stated is what the force of a hold is known to
+        samples = [1 if step.hold_forces is None else len(step.hold_forces) for step in steps]
+        return ForceNoise(np.maximum([step.force_std for step in steps] * np.sqrt(samples), floor), 0)
     found = _decaying(steps, plain, distinct) or plain
     total = int(found.freedom.sum())
     pooled = float(found.squares.sum()) / total
@@ -158,8 +160,7 @@ DECAYS = (0.03, 0.06, 0.12, 0.25, 0.5)
 
 def _decaying(steps: tuple[MeasuredStep, ...], plain: _Scatter, level: float) -> _Scatter | None:
     """Scatter about a line and a decay in every hold; None where that removes no more than chance does (F-test)."""
-    timed = [step.hold_times for step in steps if step.hold_times is not None and len(step.hold_times)]
-    span = max((float(np.ptp(times)) for times in timed), default=0.0)
+    span = max((float(np.ptp(times)) for step in steps if (times := _times(step)).size), default=0.0)
     if span <= 0.0:
         return None
     best = min((_scatter(steps, share * span) for share in DECAYS), key=lambda one: float(one.squares.sum()))
@@ -172,18 +173,25 @@ def _decaying(steps: tuple[MeasuredStep, ...], plain: _Scatter, level: float) ->
 
 
 def _scatter(steps: tuple[MeasuredStep, ...], decay: float | None) -> _Scatter:
-    """Scatter within the holds of at least four samples, about a line in time and, given its time constant, a decay."""
+    """Scatter within the holds about a line in time and, given its time constant, a decay."""
     squares, freedom = np.zeros(len(steps)), np.zeros(len(steps), dtype=int)
     for i, step in enumerate(steps):
-        if step.hold_forces is None or len(step.hold_forces) < 4:
+        if step.hold_forces is None:
             continue
         course = [np.ones(len(step.hold_forces))]
-        if step.hold_times is not None and np.ptp(step.hold_times) > 0.0:
-            since = step.hold_times - step.hold_times.min()
-            course.append(since / np.ptp(step.hold_times) - 0.5)
+        times = _times(step)
+        if np.ptp(times) > 0.0:
+            since = times - times.min()
+            course.append(since / since.max() - 0.5)
             if decay is not None:
                 course.append(np.exp(-since / decay))
-        smooth = np.column_stack(course)
+        smooth = np.column_stack(course[: len(step.hold_forces)])
         scatter = step.hold_forces - smooth @ np.linalg.lstsq(smooth, step.hold_forces, rcond=None)[0]
         squares[i], freedom[i] = float(scatter @ scatter), len(scatter) - smooth.shape[1]
     return _Scatter(squares, freedom)
+
+
+def _times(step: MeasuredStep) -> Array:
+    """Times (h,) s of the samples of a hold, or their numbers where the log has no time; empty without samples."""
+    count = 0 if step.hold_forces is None else len(step.hold_forces)
+    return np.arange(float(count)) if step.hold_times is None else step.hold_times

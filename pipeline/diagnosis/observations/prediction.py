@@ -35,9 +35,9 @@ class Facts:
     displacement_std : (n,) m
         Of each of them, as the log scatters; 0 where it is not told, and at rest.
     photo_time : (n,) s
-        Time of the photo since the hold began; 0 where the log has no time.
+        Time of the photo since the hold began; the middle of the hold where the log has no time.
     hold_times : tuple of (h,) s
-        Times of the force samples since the hold began; a single 0 where the log has no samples.
+        Times of the force samples since the hold began; numbers of the samples where the log has no time.
     clock : (n,) s
         When the hold began, since the first hold.
     picture_centre : (n, 2) m
@@ -100,12 +100,14 @@ def facts_of(test: MeasuredTest) -> Facts:
     bend = max((_range(shape.kappa[shape.seen]) for shape in shapes if np.any(shape.seen)), default=0.0)
     force = max(abs(step.force) for step in steps)
     timed = all(step.hold_times is not None and step.time is not None for step in steps)
-    begin, holds, photo = [], [], []
+    begin, holds, photo, number = [], [], [], 0.0
     for step in steps:
-        times = step.hold_times if timed and step.hold_times is not None else np.zeros(_samples(step))
+        samples = number + np.arange(_samples(step), dtype=float)
+        number += samples.size
+        times = step.hold_times if timed and step.hold_times is not None else samples
         begin.append(float(times[0]))
         holds.append(times - times[0])
-        photo.append(float(step.time) - begin[-1] if timed and step.time is not None else 0.0)
+        photo.append(float(np.mean(times) if not timed or step.time is None else step.time) - begin[-1])
     displacement, scatter = _displacements(test)
     centre = [step.picture_centre or (0.5 * (step.chord or test.length), 0.5 * bow) for step in steps]
     return Facts(
