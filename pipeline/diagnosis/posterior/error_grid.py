@@ -4,7 +4,8 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
 
     slow      slow errors of a photo and errors of its bearing axes, times 0.3, 1 or 3
     waves     errors of each photo along the cable, rough ones as below, none or up to the scatter of a section
-    hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean
+    hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean, and more of both
+              as far as few samples leave the level of their noise open
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
     rig       zero of displacement, length and lean of the camera as exact as told, or as rigs commonly have them;
               beside something else always as rigs have them, and that holds what displacements scatter
@@ -30,13 +31,14 @@ Notation of the products: G grid points, o own columns, k added ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri, ndtr
 
 from pipeline.diagnosis.observations.common_errors import shared_light
 from pipeline.diagnosis.observations.noise import by_axes, slow_errors
@@ -51,7 +53,8 @@ HOLD = {0.0: 0.7, 1.0: 0.3}
 AS_RIGS_ARE = (0.0, 1.0)
 MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (1e-5, 0.0): 0.2, (5e-5, 0.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
-several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen. `MOVED`:
+several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen; by how much
+few samples may belie their noise is no matter of belief, see `hold_sizes`. `MOVED`:
 scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
 together: one that is exact in all but one thing is rarer than one that nobody aligned. An exact one is a simulation;
 where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
@@ -147,6 +150,7 @@ class ErrorGrid:
         Of the covariance that takes away.
     kinds : tuple of Kind
         Those of noise alone come first.
+    hold : mapping of size -> probability
     displacements : (N, m)
         Whitened sensitivities to the displacements, per m.
     rig : (N, r)
@@ -158,6 +162,7 @@ class ErrorGrid:
     roots: tuple[Array, ...]
     log_det: Array
     kinds: tuple[Kind, ...]
+    hold: Mapping[float, float]
     displacements: Array
     rig: Array
 
@@ -190,13 +195,13 @@ class ErrorGrid:
                     continue
                 a, b = kind.pairs.T
                 shape, shape_det = _along(kind.shapes[slow], photo, np.zeros(1), np.array(SHAPES), own)
-                held, held_det = _along(kind.holds, force, np.array([*HOLD]), np.array(FORCES), own)
+                held, held_det = _along(kind.holds, force, np.array([*self.hold]), np.array(FORCES), own)
                 tables.append((held[:, b] + shape[:, a] + by_slow).reshape(-1, fixed.size))
                 log_det.append((held_det[:, b] + shape_det[:, a] + det).ravel())
                 share = (chance if len(kind.shapes) > 1 else 1.0) * kind.chance / len(a)
-                log_prior.append(np.repeat(np.log(np.array([*HOLD.values()]) * share), len(a)))
-                held_at = np.repeat(np.arange(len(HOLD)), len(a))
-                where = np.column_stack([held_at, np.tile(kind.pairs, (len(HOLD), 1))])
+                log_prior.append(np.repeat(np.log(np.array([*self.hold.values()]) * share), len(a)))
+                held_at = np.repeat(np.arange(len(self.hold)), len(a))
+                where = np.column_stack([held_at, np.tile(kind.pairs, (len(self.hold), 1))])
                 sizes.append(np.hstack([np.tile([slow, number], (len(where), 1)), where]))
         table, positions = np.concatenate(tables), np.concatenate(sizes)
         grid = len(table)
@@ -221,7 +226,7 @@ class ErrorGrid:
         along = in_photos / (1.0 + in_photos) * (own.turn @ (self.roots[slow] @ rows[self.photos]))
         found[self.photos] = np.linalg.solve(self.roots[slow], own.turn.T @ along)
         in_forces = FORCES[force] ** 2 * held.size
-        means = in_forces / (1.0 + [*HOLD][hold] ** 2 + in_forces) * (held.turn @ rows[self.forces])
+        means = in_forces / (1.0 + [*self.hold][hold] ** 2 + in_forces) * (held.turn @ rows[self.forces])
         found[self.forces] = held.turn.T @ means
         return found
 
@@ -303,7 +308,21 @@ def error_grid(observation: Observation, facts: Facts, displacements: Array, rig
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
         kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
-    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), displacements, rig)
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation), displacements, rig)
+
+
+def hold_sizes(observation: Observation) -> dict[float, float]:
+    """Errors that the samples of a hold share, in standard deviations of their mean, and their probabilities.
+
+    The level of the noise is as its f samples tell, or one standard deviation higher: f / chi^2 in its square.
+    """
+    own = observation.force_own
+    freedom = float(np.mean(own)) if own else float(observation.force_freedom)
+    higher = freedom / float(chdtri(freedom, float(ndtr(1.0)))) if freedom else 1.0
+    (none, as_told), (size, off) = HOLD.items()
+    found = {none: 0.5 * as_told, float(np.sqrt((1.0 + size**2) * higher - 1.0)): off}
+    found[float(np.sqrt(higher - 1.0))] = found.get(float(np.sqrt(higher - 1.0)), 0.0) + 0.5 * as_told
+    return found
 
 
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:

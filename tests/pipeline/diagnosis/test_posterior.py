@@ -14,7 +14,7 @@ from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.observations.noise import by_axes
-from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW
+from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, evidence, evidences
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.weigh import weighed
@@ -40,7 +40,7 @@ def covariance(grid, sizes):
     own, held = kind.shapes[slow], kind.holds
     turned = np.eye(len(grid.photos)) + (own.turn.T * SHAPES[shape] ** 2 * own.size) @ own.turn
     whole[np.ix_(grid.photos, grid.photos)] = root @ turned @ root
-    wide = [*HOLD][hold] ** 2 + FORCES[force] ** 2 * held.size
+    wide = [*grid.hold][hold] ** 2 + FORCES[force] ** 2 * held.size
     whole[np.ix_(grid.forces, grid.forces)] += (held.turn.T * wide) @ held.turn
     return whole
 
@@ -67,7 +67,20 @@ def test_probabilities_of_error_models_sum_to_one(bench, grid):
     found = grid.products(np.ones((count, 1)), np.ones((1, 1)), np.zeros((count, 0)))
     for rest in (True, False):
         assert np.exp(found.log_prior[found.rest == rest]).sum() == pytest.approx(1.0)
-    assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, MOVED))
+    assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, grid.hold, MOVED))
+
+
+def test_a_level_told_by_few_samples_may_be_too_low():
+    """Of a normal variance told by f samples; a level that is stated, or told by very many, is as told."""
+    told = exact_bench("loop").observation
+    stated, few, many = (hold_sizes(replace(told, force_freedom=freedom)) for freedom in (0, 5, 10**6))
+    assert stated == pytest.approx(HOLD)
+    assert [*many] == pytest.approx([0.0, 1.0, 0.0], abs=0.05)
+    rng = np.random.default_rng(4)
+    squares = 5.0 / np.sum(rng.standard_normal((100_000, 5)) ** 2, axis=1)
+    higher = np.quantile(squares, 0.8413)  # one standard deviation of a normal distribution above the middle
+    assert [*few] == pytest.approx([0.0, np.sqrt(2.0 * higher - 1.0), np.sqrt(higher - 1.0)], rel=0.02)
+    assert [*few.values()] == pytest.approx([0.35, 0.3, 0.35])
 
 
 @pytest.mark.parametrize("sign", [0, 1])
