@@ -20,10 +20,10 @@ class IdentifySettings(BaseModel):
         2e-5, gt=0, description="m; a spindle with a dial gauge, against the chord on the photos"
     )
     axis_std_m: float = Field(
-        2e-5,
+        5e-5,
         ge=0,
         description="m; of each coordinate of a bearing axis, common to all photos: a cover's shadow pulls its rim by "
-        "a fifth of a pixel on every photo alike, and covers are turned concentric to a few hundredths of a mm",
+        "a fifth of a pixel on every photo alike, and covers are glued or screwed on to a twentieth of a mm",
     )
     camera_foot_std_m: float = Field(
         0.05,
