@@ -152,11 +152,14 @@ class DisplacementOffset(Cause):
         return 0.02 * facts.travel
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Of the pushed steps, and where there is a mounted step, of that one too."""
+        """Of the pushed steps, and where there is a mounted step, of that one too.
+
+        A mounted cable is free of force wherever the zero of its rig lies: no ordinary rig presses it.
+        """
         if "mounted" not in facts.branch:
             return (Variant(ordinary=ZERO),)
         pushed = Variant("between the mounted position and the first step", ordinary=ZERO)
-        return (pushed, Variant("at every step", at=1.0, ordinary=ZERO))
+        return (pushed, Variant("at every step", at=1.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to the displacements."""

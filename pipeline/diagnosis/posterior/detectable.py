@@ -5,6 +5,8 @@ So large beside a rig whose zero, length and camera are off by what they ordinar
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtri
@@ -85,6 +87,12 @@ def in_any_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) 
     return max(in_each_form(fitted, suspicion, cause, power=power).values(), default=np.inf)
 
 
+def clearest(suspicion: Suspicion, each: Mapping[int, float]) -> int:
+    """The form (direction) of those `in_each_form` tells that is found at the smallest amount."""
+    # forms that all lack a trace at their usual size may have one at a larger
+    return min(each, key=lambda k: (each[k], -suspicion.scores.norm[k]))
+
+
 def detectable_amount(
     observation: Observation, fitted: Fit, suspicion: Suspicion, cause: int, *, power: float
 ) -> float:
@@ -96,8 +104,7 @@ def detectable_amount(
     each = in_each_form(fitted, suspicion, cause, power=power)
     if not each:
         return float("inf")
-    # forms that all lack a trace at their usual size may have one at a larger
-    best = min(each, key=lambda k: (each[k], -suspicion.scores.norm[k]))
+    best = clearest(suspicion, each)
     variant, norm = suspicion.terms[best].variant, float(suspicion.scores.norm[best])
     if norm <= 0.0 or variant.power != 1.0:
         return each[best]
