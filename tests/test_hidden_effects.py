@@ -18,6 +18,7 @@ from fixtures.trials import Trial, alien_size, f_error, record
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.diagnose import conclude
+from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.presentation.part import present
 from pipeline.faults import faults_of_input
@@ -214,6 +215,18 @@ def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     part, _, _ = diagnose(faults_of_input(with_alien(test, alien, 12.0 * alien_size("six", alien))), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
     assert {"waves": "shapes", "sticking": "forces"}[alien] in part.leftover.message
+
+
+def test_f_beside_something_unexplained_is_no_better_known_than_without_the_nearest_cause():
+    """Whether that cause is there at all is not known: with a drift of the forces f_EI is up to 23 % another."""
+    test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9, reading=Reading(force_drift=2e-3))
+    strange = with_alien(test, "waves", 12.0 * alien_size("six", "waves"))
+    part, _, _ = diagnose(faults_of_input(strange), None, SETTINGS)
+    assert (part.verdict, [cause.name for cause in part.causes]) == ("unexplained", ["force_drift"])
+    base = curve(bench_of(strange).base, points=SETTINGS.curve_points)
+    apart = np.interp(part.extended.kappa_per_m, base.kappa_per_m, base.tangent_Nm2) - part.extended.tangent_Nm2
+    assert np.all(np.abs(apart) <= 1.01 * np.array(part.extended.tangent_std_Nm2))
+    assert np.abs(apart / part.extended.tangent_Nm2).max() > 0.1
 
 
 RENDERED = {

@@ -6,6 +6,8 @@ the sentence on top -> the part of the result.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +62,9 @@ def present(
         ]
         errors += _begun_unseen(accepted.fitted)
         again = identified_again(bench.observation, shown or accepted.fitted, force_errors=errors)
+        if conclusion.unmodelled:
+            # the nearest cause may not be there at all: without it the data have another answer
+            again = replace(again, other=bench.base)
     extended = None if again is None else extended_curve(again, settings)
     causes = named_causes(bench, conclusion, again, extended)
     word = verdict(
