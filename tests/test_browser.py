@@ -95,13 +95,12 @@ def show(browser):
     opened = []
 
     def go(address, width=DESK):
-        for log in ("browser", "performance"):
-            browser.get_log(log)
+        _ = [browser.get_log(log) for log in ("browser", "performance")]
         metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
         browser.get(address)
-        # opening the address that is shown already may return while the page is still being read
+        # `get` of the address that is shown may return too early
         WebDriverWait(browser, 60).until(lambda d: d.execute_script("return document.readyState") == "complete")
         opened.append(address)
         return browser
@@ -109,9 +108,8 @@ def show(browser):
     yield go
     assert opened
     assert browser.get_log("browser") == []
-    sent = [
-        entry["message"] for entry in browser.get_log("performance") if "Network.requestWillBeSent" in entry["message"]
-    ]
+    messages = [entry["message"] for entry in browser.get_log("performance")]
+    sent = [message for message in messages if "Network.requestWillBeSent" in message]
     assert sent
     assert not [message for message in sent if '"url":"http' in message or '"url":"ws' in message]
 
