@@ -264,8 +264,7 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
     # in one colour the arms of a crossing look alike, whatever cables they are of
     if best.evidence.crossed is not None or (best.branching and (best.grid_px > 1.0 or _is_piece(best))):
         return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
-    beside = next(reading.outcomes for reading in judged if any(best is found for found in reading.outcomes))
-    other = next((o for o in beside if isinstance(o, RoughCable) and _is_rival(o, best)), None)
+    other = next((found for found in likely if _is_rival(found, best)), None)
     if other is not None:
         return _two(photo, best, other)
     return best
