@@ -9,7 +9,7 @@ from rod.balance import BalanceOptions, BalanceOutcome, balance
 from rod.balance.moment_points import _between, moment_points, pointwise_graph
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import Fading, StickSlip, bent_by_bvp, equilibrium, force_free
-from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, stretched
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, scaled, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -39,15 +39,17 @@ def test_sharp_photos_give_the_law_back(seed):
     assert graph.pre_curvature == pytest.approx(LAW.K0, abs=2e-3)
 
 
-@pytest.mark.parametrize("stiffer", [1e-3, 1.0 / 3.0, 200.0])
-def test_result_scales_with_the_stiffness(stiffer):
-    """The same photos with all forces larger by a factor: photos made anew differ by 1e-5 in the curvature."""
+@pytest.mark.parametrize(("longer", "stiffer"), [(1.0, 2.0**-10), (2.0**-10, 1.0), (256.0, 256.0)])
+def test_result_scales_with_length_and_stiffness(longer, stiffer):
+    """Numbers have units: the same photos and forces in others, by powers of two, which round as the first did."""
     test = measured()
-    steps = (replace(s, force=stiffer * s.force, force_std=stiffer * s.force_std) for s in test.steps)
-    graph, unit = law_of(replace(test, steps=tuple(steps))), law_of(test)
-    assert np.allclose(graph.tangent / stiffer, unit.tangent, rtol=1e-10)
-    assert np.allclose(graph.tangent_std / stiffer, unit.tangent_std, rtol=1e-9)
-    assert graph.pre_curvature == pytest.approx(unit.pre_curvature, rel=1e-10)
+    found, unit = balance(scaled(test, longer, stiffer)), balance(test)
+    for name, size in (("tangent", stiffer), ("moment", stiffer / longer), ("kappa", 1.0 / longer)):
+        assert getattr(found.law, name) == pytest.approx(size * getattr(unit.law, name), rel=1e-6)
+    for name, size in (("tangent_std", stiffer), ("moment_std", stiffer / longer), ("secant_std", stiffer)):
+        assert getattr(found.law, name) == pytest.approx(size * getattr(unit.law, name), rel=1e-5)
+    assert longer * found.law.pre_curvature == pytest.approx(unit.law.pre_curvature, rel=1e-7)
+    assert found.checks == pytest.approx(unit.checks, rel=1e-4)
 
 
 def test_secant_and_tangent_are_readings_of_one_moment_curve():

@@ -9,6 +9,7 @@ from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.inverse.evaluation import evaluate, free_cable
 from rod.inverse.fit import fit
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
+from rod.inverse.problem import straight_line
 from rod.midline import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
@@ -130,6 +131,13 @@ def test_block_means_lie_on_the_curve_not_inside_it():
     x, y = np.interp(blocks.s, shape.s, shape.x), np.interp(blocks.s, shape.s, shape.y)
     # Linear interpolation of the curve itself is the limit here: h^2 K / 8 = 1e-6 m.
     assert np.abs(-np.sin(blocks.theta) * (blocks.x - x) + np.cos(blocks.theta) * (blocks.y - y)).max() < 2e-6
+
+
+def test_a_start_is_the_straight_line_of_curvature_over_moment():
+    m = np.linspace(0.0, 0.02, 9)
+    assert straight_line(m, 2.0 + m / 5e-3) == pytest.approx((5e-3, 2.0))
+    level = np.r_[1.0, -2.0, 1.0, 0.0, 0.0, 0.0, -1.0, 2.0, -1.0]  # no slope at all: a fiftieth of the range
+    assert straight_line(m, level)[0] == pytest.approx(0.02 / (0.02 * 4.0))
 
 
 def test_whitener_needs_sections():

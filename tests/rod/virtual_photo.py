@@ -136,6 +136,22 @@ def photograph(shape, camera, rng, *, scale=0.0, common=0.0, points=181):
     return measured, shrink * np.hypot(*(right - left)), np.sqrt(2) * camera.axis_px * camera.px
 
 
+def scaled(test, longer, stiffer):
+    """The test of a cable longer and stiffer by factors, seen from as much farther away: lengths and forces alone."""
+    force = stiffer / longer**2
+    lengths = ("s", "x", "y", *SECTION_PLACES, "section_std", "correlation_length", "systematic_std")
+    lengths += ("systematic_length", "wave_std", "wave_length", "common_std")
+    steps = []
+    for step in test.steps:
+        shape = {name: longer * getattr(step.shape, name) for name in lengths}
+        seen = {name: longer * getattr(step, name) for name in ("displacement", "chord", "chord_std")}
+        felt = {name: force * getattr(step, name) for name in ("force", "force_std")}
+        shape = replace(step.shape, kappa=step.shape.kappa / longer, **shape)
+        steps.append(replace(step, shape=shape, **seen, **felt))
+    told = {name: longer * getattr(test, name) for name in ("length", "length_std", "axis_std", "camera_foot_std")}
+    return replace(test, steps=tuple(steps), **told)
+
+
 def stretched(test, factor):
     """The test with every length on every photo multiplied by `factor`, as a wrong scale does."""
     steps = []
