@@ -244,7 +244,7 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
         if there is not None and there.share > 1.0:
             # the share grows with the square of the turn
             part = np.sqrt((1.0 - here.share) / (there.share - here.share))
-            goal = here.state + part * size * aside
+            goal = here.state + part * size * aside + 2.0 * (1.0 - here.share) * ramp.half
             goal[-1] = 1.0
             there = ramp.corrected(goal, ramp.along_share)
         if there is not None and there.share >= here.share and not ramp.negatives(there):

@@ -149,6 +149,17 @@ def test_one_wrong_force_shows_photo_against_photo():
     assert balance(replace(test, steps=(*test.steps[:2], wrong, *test.steps[3:]))).checks["photos_p"] < 1e-6
 
 
+def test_what_forces_have_in_common_moves_the_law_as_each_of_them_would():
+    test, errors = measured(), {1: 1e-3, 3: 2e-3}
+    steps = tuple(replace(s, force=1.2 * s.force) if s.step == 2 else s for s in test.steps)
+    for given in (test, replace(test, steps=steps)):  # in spite of what contradicts the others, too
+        graph = balance(replace(given, common_force_errors=(errors,)))
+        assert (graph.checks["noise_factor"] > 1.0) == (given is not test)
+        std = graph.checks["noise_factor"] * np.array([test.steps[k].force_std for k in errors])
+        each = np.array([graph.law.gains["force", k][:, 0] * error for k, error in errors.items()])
+        assert graph.law.gains["common_force", -1][:, 0] == pytest.approx((each / std[:, None]).sum(axis=0))
+
+
 @pytest.mark.parametrize("mounted", [True, False])
 def test_pre_curvature_growing_along_the_cable(mounted):
     """Truth by solve_bvp. With a force-free photo the law comes back; without one the halves disagree, and it shows."""

@@ -201,10 +201,16 @@ def test_what_the_model_cannot_follow_widens_the_bands_and_bends_no_nuisance():
         for s in test.steps
         if s.branch == "loading"
     )
-    whole = replace(test, steps=test.steps + steps)
+    errors = {2: 1e-6, 13: 2e-6}
+    whole = replace(test, steps=test.steps + steps, common_force_errors=(errors,))
     good, bad = estimate(test), estimate(whole)
     assert bad.outcome is not InverseOutcome.NO_EQUILIBRIUM
     assert bad.model.blur[1] > 3.0
+    assert bad.model.blur[0] == 1.0  # the photos agree
+    # what forces have in common moves the law as each of them would
+    std = bad.model.blur[1] * np.array([whole.steps[k].force_std for k in (2, 6)])
+    each = [bad.law.gains["force", step][:, 0] * error for step, error in errors.items()]
+    assert bad.law.gains["common_force", -1][:, 0] == pytest.approx(each[0] / std[0] + each[1] / std[1])
     # three forces 15 % too large for one law, three as much too small: their mean is known to 15 % over sqrt(6)
     assert np.median(bad.law.tangent_std / bad.law.tangent) > 0.9 * 0.15 / np.sqrt(6)
     assert np.median(bad.law.tangent_std) > 2.0 * np.median(good.law.tangent_std)
