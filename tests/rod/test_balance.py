@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
-from rod.balance.moment_points import _between, moment_points, pointwise_graph
+from rod.balance.moment_points import CommonErrors, _between, moment_points, pointwise_graph, residual
+from rod.compliance_law import moment_basis
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import Fading, StickSlip, bent_by_bvp, equilibrium, force_free
 from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, scaled, stretched
@@ -103,6 +104,25 @@ def test_common_errors_move_the_estimate_as_told():
         assert np.all(np.abs(seen - told)[3:-3] < 0.05 * (graph.tangent_std / graph.tangent)[3:-3])
     # Where all moments are small the lift of an axis counts most.
     assert np.abs(left[0]) > 5 * np.abs(left[10:]).max()
+
+
+def test_derivatives_of_a_photo_are_those_of_differences():
+    """Without noise the weights stay as they are: only the midlines' rounding is left."""
+    steps = tuple(replace(step, picture_centre=(0.08, 0.01)) for step in measured().steps)
+    data = moment_points(replace(measured(), steps=steps))[2]
+    basis = moment_basis(0.0, float(data.moment.max()), unit=1.0 / LAW.EI0)
+    rng = np.random.default_rng(3)
+    u = np.r_[0.1 * rng.standard_normal(basis.size), 2.0, 1e-3, 1e-4 * rng.standard_normal(6), 1e-3]
+
+    def at(u):
+        errors = CommonErrors(*u[basis.size + 1 :])
+        return residual(data, basis.law(u[: basis.size]), u[basis.size], varying=0.0, errors=errors, blur=0.0)
+
+    told, sizes = at(u).jacobian, np.r_[np.full(basis.size + 1, 1e-4), np.full(8, 1e-6)]
+    for place, size in enumerate(sizes):
+        h = size * np.eye(u.size)[place]
+        slope = (at(u + h).value - at(u - h).value) / (2.0 * size)
+        assert told[:, place] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max() + 1e-3), place
 
 
 def test_a_smooth_law_falls_short_by_nothing():

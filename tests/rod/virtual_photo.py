@@ -169,8 +169,11 @@ def moved_axes(test, left, right):
     steps = []
     for step in test.steps:
         shape, roll = step.shape, (right - left) / step.chord
-        lower = {"y": shape.y - left - roll * shape.x, "section_y": shape.section_y - left - roll * shape.section_x}
-        steps.append(replace(step, shape=replace(shape, theta=shape.theta - roll, **lower)))
+        seen = {}
+        for part in ("", "section_"):
+            x, y = (getattr(shape, part + name) for name in "xy")
+            seen |= {part + "x": x + roll * y, part + "y": y - left - roll * x}
+        steps.append(replace(step, shape=replace(shape, theta=shape.theta - roll, **seen)))
     return replace(test, steps=tuple(steps))
 
 
