@@ -121,14 +121,7 @@ class BendingTest:
         grows = self.plastic_rate, self.law_stays, self.set_threshold, self.grown
         section = Section(self.characteristic, K0, profile, self.friction, *grows)
         return Rod(
-            self.length,
-            elements,
-            section,
-            self.left,
-            self.right,
-            self.load,
-            self.axial_stiffness,
-            self.shear_stiffness,
+            self.length, elements, section, self.left, self.right, self.load, self.axial_stiffness, self.shear_stiffness
         )
 
     def rod_at(self, step: int) -> Rod:
