@@ -113,21 +113,15 @@ class BendingTest:
     def rod(self) -> Rod:
         """The discrete rod of this test."""
         n = self.elements
-        elements = np.full(n, 1.0 / n) if isinstance(n, int) else np.asarray(n, float) / np.sum(n)
+        relative = np.ones(n) if isinstance(n, int | np.integer) else np.asarray(n, float)
+        elements = relative / relative.sum()
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
         profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
         grows = self.plastic_rate, self.law_stays, self.set_threshold, self.grown
         section = Section(self.characteristic, K0, profile, self.friction, *grows)
         return Rod(
-            self.length,
-            elements,
-            section,
-            self.left,
-            self.right,
-            self.load,
-            self.axial_stiffness,
-            self.shear_stiffness,
+            self.length, elements, section, self.left, self.right, self.load, self.axial_stiffness, self.shear_stiffness
         )
 
     def rod_at(self, step: int) -> Rod:

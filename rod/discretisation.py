@@ -78,6 +78,8 @@ class Rod:
             raise ValueError(f"rigid pieces leave nothing of the length {self.length} m")
         if self.left.kind == "free":
             raise ValueError("only the right end can be free")
+        if np.shape(self.load) != (2,) or not np.all(np.isfinite(self.load)):
+            raise ValueError(f"load is two finite numbers, along x and y; got {self.load}")
         if any(value is not None and not value > 0.0 for value in (self.axial_stiffness, self.shear_stiffness)):
             raise ValueError("axial and shear stiffness must be positive")
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import isclose
 from typing import Literal, get_args
 
 import numpy as np
@@ -147,10 +148,12 @@ def solve(
     Raises
     ------
     ValueError
-        For another branch.
+        For another branch, or a start with another number of elements.
     """
     if branch not in BRANCHES:
         raise ValueError(f"branch {branch!r}: one of {', '.join(BRANCHES)}")
+    if start is not None and start.angles.shape != rod.edges.shape:
+        raise ValueError(f"the start has {start.angles.size - 2} elements and the rod {rod.elements.size}")
     system = System(rod, hold, rod.virgin if memory is None else memory)
     if not _admissible(rod, hold):
         angles, R = rod.mounted.angles, hold.reaction(np.zeros(2))
@@ -263,8 +266,8 @@ def _admissible(rod: Rod, hold: Hold) -> bool:
     """Whether the chord asked for can exist: positive, and not beyond the length of a cable that hardly stretches."""
     if hold.chord is None or hold.compliance:
         return True
-    straight = abs(hold.chord - rod.mounted.chord) <= 1e-12 * rod.length
-    return hold.chord > 0.0 and (hold.chord < rod.length or straight or rod.axial_stiffness is not None)
+    mounted = isclose(hold.chord, rod.mounted.chord, rel_tol=1e-12)
+    return hold.chord > 0.0 and (hold.chord < rod.length or mounted or rod.axial_stiffness is not None)
 
 
 def _record(system: System, trial: Trial, steps: int) -> Equilibrium:

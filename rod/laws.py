@@ -112,7 +112,13 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
     # finest about rest, where laws bend most; an even number of points, so that none is 0
     far = np.arcsinh(FARTHEST * 2.0 * np.pi / 0.5)
     bend = 0.5 / length * np.sinh(np.linspace(-far, far, POINTS))
-    moment = np.asarray(given(bend), float)
+    needed = "a law as a function takes an array of bends, as those of numpy do, and returns as many finite moments"
+    try:
+        moment = np.asarray(given(bend), float)
+    except TypeError as error:  # a function of `math` takes one bend
+        raise ValueError(needed) from error
+    if moment.shape != bend.shape or not np.all(np.isfinite(moment)):
+        raise ValueError(needed)
     if moment[POINTS // 2 - 1] * moment[POINTS // 2] > 0.0:
         raise ValueError("the moment of a law must vanish at bend 0: measure the bend from the shape at rest")
     return Characteristic.from_ordinates(bend, moment / bend, reading="secant", abscissa="excess")

@@ -60,7 +60,7 @@ class Midline:
         return np.asarray(np.column_stack([self.x, self.y]) - self.offset[:, None] * normal)
 
 
-def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> Midline:
+def midline(shape: MeasuredShape, *, blocks: int = 160) -> Midline:
     """Block means of the raw sections with their covariance.
 
     Parameters
@@ -68,9 +68,6 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     shape : MeasuredShape
     blocks : int
         At most that many; fewer where a correlation length is longer. 160 on a cable of 180 mm are 1.1 mm each.
-    floor : relative
-        Independent standard deviation added to each block, against the arc length seen: 1e-9 only keeps the covariance
-        regular.
 
     Raises
     ------
@@ -93,7 +90,7 @@ def midline(shape: MeasuredShape, *, blocks: int = 160, floor: float = 1e-9) -> 
     covariance = block_covariance(s, std, first, sections, shape.correlation_length)
     # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
     covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
-    covariance[np.diag_indices_from(covariance)] += (floor * reach) ** 2
+    covariance[np.diag_indices_from(covariance)] += (1e-9 * reach) ** 2  # only keeps it regular
     x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
     factor = np.asarray(np.linalg.cholesky(covariance), float)
     return Midline(mean, x, y, theta, offset, covariance, factor, np.tril(np.linalg.inv(factor)))

@@ -43,6 +43,13 @@ Array = NDArray[np.float64]
 STEPS: Array = TABLE_1["step"] * np.arange(1.0, 4.0)
 READINGS: tuple[Reading, Reading] = ("secant", "tangent")
 
+#: Amplitude of K0(s) - K0, one wave along the cable, 1/m: what a spool leaves in a cable bent to a radius of half a
+#: metre on it differs by such an amount.
+VARYING = 0.3
+#: Standard deviation of each point of the traced centerline, m: half a pixel at 10 px/mm, a skeleton's; and the spacing
+#: of the points, and the window of the local quadratics that differentiate the centerline and its curvature.
+POSITION_NOISE, SPACING, WINDOW = 5e-5, 2e-4, 0.03
+
 
 class Arc(NamedTuple):
     """Position (n,) m of a rod in its chord frame."""
@@ -121,31 +128,6 @@ class Difference:
     share: float = float("nan")
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """What the causes of disagreement are given to work with.
-
-    Attributes
-    ----------
-    varying : 1/m
-        Amplitude of K0(s) - K0, one wave along the cable: what a spool leaves in a cable bent to a radius of half a
-        metre on it differs by such an amount.
-    position_noise : m
-        Standard deviation of each point of the traced centerline: half a pixel at 10 px/mm, a skeleton's.
-    spacing : m
-        Of the points.
-    window : m
-        Of the local quadratics that differentiate the centerline, and its curvature.
-    seed : int
-    """
-
-    varying: float = 0.3
-    position_noise: float = 5e-5
-    spacing: float = 2e-4
-    window: float = 0.03
-    seed: int = 7
-
-
 def table_one(reading: Reading, *, from_length: bool = False, elements: int = 400) -> TableOne:
     """Virtual experiment of Sec. 3.2; displacement from the natural chord, or from the length."""
     test = table_1(reading, elements=elements)
@@ -190,14 +172,13 @@ def iteration_costs(reading: Reading = "secant") -> tuple[IterationCost, ...]:
 
 def disagreement() -> tuple[Difference, ...]:
     """Causes of Fig. 7's disagreement, each alone with its share, then all together (the last)."""
-    given = Conditions()
-    rng = np.random.default_rng(given.seed)
+    rng = np.random.default_rng(7)
 
     def differentiated(step: Equilibrium) -> tuple[Array, Array]:
-        return _from_photo(step, given, rng)
+        return _from_photo(step, rng)
 
     def wave(xi: Array) -> Array:
-        return TABLE_1["pre_curvature"] + given.varying * np.cos(2.0 * np.pi * xi)
+        return TABLE_1["pre_curvature"] + VARYING * np.cos(2.0 * np.pi * xi)
 
     alone = (
         _difference("secant against tangent", table_1("secant", elements=400), "secant", _exact),
@@ -238,24 +219,24 @@ def _exact(step: Equilibrium) -> tuple[Array, Array]:
     return _graph(step.s, step.kappa, step.force * step.y)
 
 
-def _from_photo(step: Equilibrium, given: Conditions, rng: np.random.Generator) -> tuple[Array, Array]:
+def _from_photo(step: Equilibrium, rng: np.random.Generator) -> tuple[Array, Array]:
     """Graph of Eq. (14) from noisy points of the centerline, differentiated by local quadratics."""
-    s = np.arange(step.s[0], step.s[-1], given.spacing)
+    s = np.arange(step.s[0], step.s[-1], SPACING)
     theta = np.interp(s, step.s, step.theta)
-    sideways = given.position_noise * rng.standard_normal(s.size)
+    sideways = POSITION_NOISE * rng.standard_normal(s.size)
     x = np.interp(s, step.s, step.x) - sideways * np.sin(theta)
     y = np.interp(s, step.s, step.y) + sideways * np.cos(theta)
-    points = 2 * round(0.5 * given.window / given.spacing) + 1
+    points = 2 * round(0.5 * WINDOW / SPACING) + 1
     dx, dy, ddx, ddy = (
-        savgol_filter(values, points, 2, deriv=order, delta=given.spacing) for order in (1, 2) for values in (x, y)
+        savgol_filter(values, points, 2, deriv=order, delta=SPACING) for order in (1, 2) for values in (x, y)
     )
     kappa = (ddx * dy - dx * ddy) / np.hypot(dx, dy) ** 3  # positive toward the bow: K = -dtheta/ds
     return _graph(
         s,
         savgol_filter(kappa, points, 2),
         step.force * y,
-        turn=savgol_filter(kappa, points, 2, deriv=1, delta=given.spacing),
-        lift=savgol_filter(step.force * y, points, 2, deriv=1, delta=given.spacing),
+        turn=savgol_filter(kappa, points, 2, deriv=1, delta=SPACING),
+        lift=savgol_filter(step.force * y, points, 2, deriv=1, delta=SPACING),
     )
 
 

@@ -42,18 +42,36 @@ PAPER_START = (0.01, 1.0)
 FURTHER_TURNS = (0.1, 0.4, 0.8)
 #: Residuals below this, relative to the data, are rounding; gradients (cosines) below the other are at a minimum.
 EXACT, STATIONARY = 1e-8, 1e-4
+#: Of a rod that is held against forces alone.
+ELEMENTS = 100
 #: Relative change of objective and parameters at which the method stops.
 SETTLED = 1e-12
 
 
 @dataclass(frozen=True)
 class Virtual:
-    """Data of the fit: displacements and forces (n,) m, N; curvatures at the vertices (n, elements + 1) 1/m or None."""
+    """Data of the fit: displacements and forces (n,) m, N; curvatures at the joints (n, elements + 1) 1/m or None.
+
+    The simulated rod has joints where the curvatures are: `ELEMENTS` where there are none.
+    """
 
     length: float
     displacements: Array
     forces: Array
     curvatures: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("displacements", "forces", "curvatures"):
+            if (given := getattr(self, name)) is not None:
+                object.__setattr__(self, name, np.asarray(given, float))
+        rows = {given.shape[:1] for given in (self.displacements, self.forces, self.curvatures) if given is not None}
+        if len(rows) != 1 or (self.curvatures is not None and self.curvatures.ndim != 2):
+            raise ValueError("give one displacement, one force and one row of curvatures for each step")
+
+    @property
+    def elements(self) -> int:
+        """Number of elements of the simulated rod."""
+        return ELEMENTS if self.curvatures is None else self.curvatures.shape[1] - 1
 
 
 @dataclass(frozen=True)
@@ -136,7 +154,7 @@ def paper_fit(
     at = np.asarray(knots, float)
     problem = _Problem(data, at, reading, pre_curvature, zero)
     size = at.size + (pre_curvature is None)
-    if (count := data.forces.size * (1 if data.curvatures is None else 1 + data.curvatures.shape[1])) < size:
+    if (count := data.forces.size + (0 if data.curvatures is None else data.curvatures.size)) < size:
         raise ValueError(f"{count} data do not determine {size} parameters: give more steps, or fix pre_curvature")
     first = _from_start(problem, start)
     if first is None:
@@ -232,7 +250,7 @@ class _Problem:
 
     def simulate(self, parameters: Array, warm: Sequence[Equilibrium] | None) -> _Simulation:
         law, K0 = self.split(parameters)
-        test = BendingTest(self.data.length, law, K0, zero=self.zero)
+        test = BendingTest(self.data.length, law, K0, zero=self.zero, elements=self.data.elements)
         steps = simulate(test, self.data.displacements, branch="up", starts=warm)
         reached = all(step.good for step in steps)
         forces = np.array([step.force for step in steps]) - self.data.forces

@@ -44,7 +44,7 @@ PATH_STEPS = 600
 #: Reactions below this times EI/L^2 count absolutely, larger ones relative to themselves; Euler's load is 9.87.
 REACTION = 20.0
 #: Turn of the first state on a new branch, rad (root mean square), tried one after the other.
-BRANCHING = (0.1, 0.03, 0.01, 0.003)
+BRANCHING = (0.1, 0.01)
 #: Halvings of a step to locate a critical point, and the stiffness below which it is one, relative to EI/L.
 LOCATING, CRITICAL = 24, 1e-3
 
@@ -244,7 +244,7 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
         if there is not None and there.share > 1.0:
             # the share grows with the square of the turn
             part = np.sqrt((1.0 - here.share) / (there.share - here.share))
-            goal = here.state + part * size * aside
+            goal = here.state + part * size * aside + 2.0 * (1.0 - here.share) * ramp.half
             goal[-1] = 1.0
             there = ramp.corrected(goal, ramp.along_share)
         if there is not None and there.share >= here.share and not ramp.negatives(there):

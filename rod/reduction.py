@@ -61,8 +61,11 @@ class Hold:
     from_zero: bool = False
 
     def __post_init__(self) -> None:
-        if sum(given is not None for given in (self.chord, self.force, self.tip)) != 1:
+        given = [value for value in (self.chord, self.force, self.tip) if value is not None]
+        if len(given) != 1:
             raise ValueError("exactly one of chord, force and tip must be given")
+        if np.shape(given[0]) != (() if self.tip is None else (2,)) or not np.all(np.isfinite(given[0])):
+            raise ValueError(f"chord and force are finite numbers, tip is two of them; got {given[0]}")
         if not self.compliance >= 0.0:
             raise ValueError(f"compliance must not be negative, got {self.compliance}")
 

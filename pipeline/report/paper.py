@@ -29,8 +29,10 @@ from pipeline.report.words import Words
 from rod.bending_test import TABLE_1, TABLE_1_ORDINATES
 from rod.characteristic import Reading
 from rod.paper import (
+    POSITION_NOISE,
     READINGS,
-    Conditions,
+    VARYING,
+    WINDOW,
     Difference,
     IterationCost,
     TableOne,
@@ -148,13 +150,13 @@ def iterations_to(fit: PaperFit, relative: float) -> int | None:
 def statements(paper: Paper, words: Words) -> list[tuple[str, ...]]:
     """Statements of the paper: where it stands, what the paper says, what came out here."""
     inverse, low, (*causes, together) = paper.inverse, paper.straight.characteristic.ordinates[0], paper.causes
-    errors, given = force_errors(paper), Conditions()
+    errors = force_errors(paper)
     off = ", ".join(f"{1e3 * error:+.0f}" for error in errors).replace("-", "−")
     largest = float(np.max(np.abs(errors / [step.force for step in inverse.steps])))
     forces = {r: "; ".join(words.fixed(f, 4) for f in paper.experiments[r, False].forces) for r in READINGS}
     counts = [Message("paper.count", step=step, **asdict(cost)) for step, cost in enumerate(paper.iteration, start=1)]
     shares = [Message("paper.share", cause=_named(cause), share=cause.share, rms=cause.rms) for cause in causes]
-    conditions = {"varying_per_m": given.varying, "noise_m": given.position_noise, "window_m": given.window}
+    conditions = {"varying_per_m": VARYING, "noise_m": POSITION_NOISE, "window_m": WINDOW}
     reached = iterations_to(inverse, REACHED)
     said = (
         Message("paper.table", **forces),

@@ -72,7 +72,8 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     s = 1e3 * fit.steps[-1].s
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number, words))
-    return finish(bends, x=words("axis_s"), y=words("paper_bend"), decimal=words.decimal, legend=2)
+    bends.plot(s, fit.steps[-1].kappa, color=LIGHT["measured"], ls=":", label=words("paper_table"))
+    return finish(bends, x=words("axis_s"), y=words("paper_bend"), decimal=words.decimal, legend=3)
 
 
 def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: Words, figure: Area) -> Axes:
@@ -96,7 +97,8 @@ def draw_difference(cause: Difference, words: Words, figure: Area) -> Axes:
     """Fig. 7: both ways with one cause of disagreement: the graph of each of the three photos, and their median."""
     axes = plot_area(figure, top=TWO_ROWS)
     for number, ((kappa, ratio), colour) in enumerate(zip(cause.graphs, step_colours(3), strict=True), start=1):
-        axes.plot(kappa, 1e3 * ratio, ".", color=colour, ms=2.5, label=f"{words('paper_photo')} {number}")
+        axes.plot(kappa, 1e3 * ratio, ".", color=colour, ms=2.5)
+        axes.plot([], [], ".", color=colour, label=f"{words('paper_photo')} {number}")  # large enough for a legend
     axes.plot(cause.kappa, 1e3 * cause.inverse, color=LIGHT["inverse"], label=words("paper_inverse"))
     label = words("paper_median", rms=f"{100 * cause.rms:.0f}")
     axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)

@@ -116,18 +116,7 @@ def evaluate(model: FitModel, u: Array, *, starts: tuple[Equilibrium, ...] = ())
             return Evaluation(u, np.full(1, np.inf), np.zeros((1, model.size)), {}, failure=failure)
         slopes = derivatives(test, equilibria, PARAMETERS)
         for k, e, slope in zip(bent, equilibria, slopes, strict=True):
-            shapes[k] = Simulated(
-                e.s,
-                e.x,
-                e.y,
-                e.theta,
-                e.kappa,
-                e.force,
-                slope.x,
-                slope.y,
-                slope.theta,
-                slope.force,
-            )
+            shapes[k] = Simulated(e.s, e.x, e.y, e.theta, e.kappa, e.force, slope.x, slope.y, slope.theta, slope.force)
     fits = tuple(_step_fit(model, u, d, shapes[k], imposed[k]) for k, d in enumerate(model.data))
     return _whitened(model, u, fits, equilibria)
 

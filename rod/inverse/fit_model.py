@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 POSE = ("left_along", "left_across", "right_along", "right_across")
 
 NO_ERROR = 1e-7
-"""Relative standard deviation of a length for which none is stated: below any photo's resolution."""
+"""Of the length: standard deviation of an axis for which none is stated, below any photo's resolution."""
 
 
 @dataclass(frozen=True)
@@ -200,17 +200,14 @@ def zero_of_displacement(data: tuple[StepData, ...]) -> tuple[float, float] | No
 
 def fit_model(test: MeasuredTest, data: tuple[StepData, ...], basis: LawBasis, *, elements: int) -> FitModel:
     """Model of the given steps with its nuisances."""
-    nuisances = {
-        "length": max(test.length_std, NO_ERROR * test.length),
-        "scale": max(test.scale_std, NO_ERROR),
-    }
+    nuisances = {"length": test.length_std, "scale": test.scale_std}
     zero = zero_of_displacement(data)
     if zero is not None and any(d.midline is None for d in data):
         nuisances["zero"] = zero[1]
     if test.axis_std > 0.0:
         nuisances |= dict.fromkeys(POSE, test.axis_std)
     if test.axis_parallax_std > 0.0:
-        beside = max(test.axis_parallax_std * test.camera_foot_std, NO_ERROR * test.length)
+        beside = test.axis_parallax_std * test.camera_foot_std
         nuisances |= {"parallax": test.axis_parallax_std, "foot_along": beside, "foot_across": beside}
     for d in data:
         if d.midline is not None:

@@ -144,7 +144,7 @@ def straight_line(m: Array, K: Array) -> tuple[float, float]:
     """Constant EI (N m^2) and K0 (1/m) by a straight line of curvature over moment."""
     slope, K0 = (float(v) for v in np.polyfit(m, K, 1))
     # Noise alone may turn the slope around; its size is still a start.
-    return float(np.ptp(m)) / max(abs(slope) * float(np.ptp(m)), ROUGH * float(np.ptp(K))), K0
+    return 1.0 / max(abs(slope), ROUGH * float(np.ptp(K) / np.ptp(m))), K0
 
 
 def regressed(law: ComplianceLaw, K0: float, m: Array, K: Array) -> tuple[ComplianceLaw, float]:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from rod.balance import BalanceOptions, BalanceOutcome, balance
-from rod.balance.moment_points import _between, moment_points, pointwise_graph
+from rod.balance.moment_points import CommonErrors, _between, moment_points, pointwise_graph, residual
+from rod.compliance_law import moment_basis
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import Fading, StickSlip, bent_by_bvp, equilibrium, force_free
-from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, stretched
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, record, scaled, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -39,15 +40,17 @@ def test_sharp_photos_give_the_law_back(seed):
     assert graph.pre_curvature == pytest.approx(LAW.K0, abs=2e-3)
 
 
-@pytest.mark.parametrize("stiffer", [1e-3, 1.0 / 3.0, 200.0])
-def test_result_scales_with_the_stiffness(stiffer):
-    """The same photos with all forces larger by a factor: photos made anew differ by 1e-5 in the curvature."""
+@pytest.mark.parametrize(("longer", "stiffer"), [(1.0, 2.0**-10), (2.0**-10, 1.0), (256.0, 256.0)])
+def test_result_scales_with_length_and_stiffness(longer, stiffer):
+    """Numbers have units: the same photos and forces in others, by powers of two, which round as the first did."""
     test = measured()
-    steps = (replace(s, force=stiffer * s.force, force_std=stiffer * s.force_std) for s in test.steps)
-    graph, unit = law_of(replace(test, steps=tuple(steps))), law_of(test)
-    assert np.allclose(graph.tangent / stiffer, unit.tangent, rtol=1e-10)
-    assert np.allclose(graph.tangent_std / stiffer, unit.tangent_std, rtol=1e-9)
-    assert graph.pre_curvature == pytest.approx(unit.pre_curvature, rel=1e-10)
+    found, unit = balance(scaled(test, longer, stiffer)), balance(test)
+    for name, size in (("tangent", stiffer), ("moment", stiffer / longer), ("kappa", 1.0 / longer)):
+        assert getattr(found.law, name) == pytest.approx(size * getattr(unit.law, name), rel=1e-6)
+    for name, size in (("tangent_std", stiffer), ("moment_std", stiffer / longer), ("secant_std", stiffer)):
+        assert getattr(found.law, name) == pytest.approx(size * getattr(unit.law, name), rel=1e-5)
+    assert longer * found.law.pre_curvature == pytest.approx(unit.law.pre_curvature, rel=1e-7)
+    assert found.checks == pytest.approx(unit.checks, rel=1e-4)
 
 
 def test_secant_and_tangent_are_readings_of_one_moment_curve():
@@ -103,6 +106,25 @@ def test_common_errors_move_the_estimate_as_told():
     assert np.abs(left[0]) > 5 * np.abs(left[10:]).max()
 
 
+def test_derivatives_of_a_photo_are_those_of_differences():
+    """Without noise the weights stay as they are: only the midlines' rounding is left."""
+    steps = tuple(replace(step, picture_centre=(0.08, 0.01)) for step in measured().steps)
+    data = moment_points(replace(measured(), steps=steps))[2]
+    basis = moment_basis(0.0, float(data.moment.max()), unit=1.0 / LAW.EI0)
+    rng = np.random.default_rng(3)
+    u = np.r_[0.1 * rng.standard_normal(basis.size), 2.0, 1e-3, 1e-4 * rng.standard_normal(6), 1e-3]
+
+    def at(u):
+        errors = CommonErrors(*u[basis.size + 1 :])
+        return residual(data, basis.law(u[: basis.size]), u[basis.size], varying=0.0, errors=errors, blur=0.0)
+
+    told, sizes = at(u).jacobian, np.r_[np.full(basis.size + 1, 1e-4), np.full(8, 1e-6)]
+    for place, size in enumerate(sizes):
+        h = size * np.eye(u.size)[place]
+        slope = (at(u + h).value - at(u - h).value) / (2.0 * size)
+        assert told[:, place] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max() + 1e-3), place
+
+
 def test_a_smooth_law_falls_short_by_nothing():
     """A constant stiffness is what the prior expects; between straight line and bent law it takes a part."""
     graph = law_of(measured())
@@ -145,6 +167,17 @@ def test_one_wrong_force_shows_photo_against_photo():
     step = test.steps[2]
     wrong = replace(step, force=1.05 * step.force)
     assert balance(replace(test, steps=(*test.steps[:2], wrong, *test.steps[3:]))).checks["photos_p"] < 1e-6
+
+
+def test_what_forces_have_in_common_moves_the_law_as_each_of_them_would():
+    test, errors = measured(), {1: 1e-3, 3: 2e-3}
+    steps = tuple(replace(s, force=1.2 * s.force) if s.step == 2 else s for s in test.steps)
+    for given in (test, replace(test, steps=steps)):  # in spite of what contradicts the others, too
+        graph = balance(replace(given, common_force_errors=(errors,)))
+        assert (graph.checks["noise_factor"] > 1.0) == (given is not test)
+        std = graph.checks["noise_factor"] * np.array([test.steps[k].force_std for k in errors])
+        each = np.array([graph.law.gains["force", k][:, 0] * error for k, error in errors.items()])
+        assert graph.law.gains["common_force", -1][:, 0] == pytest.approx((each / std[:, None]).sum(axis=0))
 
 
 @pytest.mark.parametrize("mounted", [True, False])

@@ -31,6 +31,19 @@ EVERYTHING = replace(
 )
 
 
+def test_the_border_is_how_forces_at_the_end_move_the_balance_of_a_soft_rod():
+    """And how the end moves with the angles: one energy, so one matrix; both by differences."""
+    step = simulate(PLAIN, [0.01])[0]
+    angles, R, n = step.angles, step.right_reaction, step.angles.size
+    told = step.system.border(step.balance.edge)
+    for k, unit in enumerate(np.eye(2) * 1e-3):
+        ahead, behind = (step.system.balance(angles, R + sign * unit).gradient for sign in (1.0, -1.0))
+        assert told[k] == pytest.approx((ahead - behind) / 2e-3, abs=1e-9)
+    for j, unit in enumerate(np.eye(n) * 1e-5):
+        ahead, behind = (step.system.balance(angles + sign * unit, R).gap for sign in (1.0, -1.0))
+        assert told[:, j] == pytest.approx((ahead - behind) / 2e-5, abs=1e-9)
+
+
 def state(step: Equilibrium) -> tuple[Potential, np.ndarray]:
     V = Potential(step.rod, step.before)
     return V, V.unknowns(step.angles, step.x, step.y)

@@ -230,3 +230,10 @@ def test_equilibria_travel_between_processes() -> None:
     again = pickle.loads(pickle.dumps(steps))
     assert again[-1].outcome is Outcome.CONVERGED
     assert simulate(test, STEPS, starts=again)[-1].iterations <= 2
+
+
+def test_a_step_begins_at_the_one_before() -> None:
+    first, same = simulate(table_1("tangent"), [5e-3, 5e-3])
+    assert same.force == pytest.approx(first.force, rel=1e-9)
+    assert same.iterations < first.iterations
+    assert same.iterations <= 2  # one finds that nothing is left to do

@@ -13,7 +13,7 @@ from rod.inverse.estimate import invisible_combinations
 from rod.inverse.options import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
-from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, random_cable, stretched
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, random_cable, scaled, stretched
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -76,16 +76,22 @@ def test_far_starts_find_the_same_optimum_of_any_cable(number):
     assert np.all(np.abs(far.tangent - near.tangent) < 0.05 * near.tangent_std)
 
 
-@pytest.mark.parametrize("stiffer", [1e-3, 200.0])
-def test_results_scale_with_the_stiffness(stiffer):
-    """The same photos with all forces larger by a factor: photos made anew differ by 1e-5 in the curvature."""
-    test = measured()
-    steps = tuple(replace(s, force=stiffer * s.force, force_std=stiffer * s.force_std) for s in test.steps)
-    unit, other = law_of(test, options=QUICK), law_of(replace(test, steps=steps), options=QUICK)
+@pytest.mark.parametrize(("longer", "stiffer"), [(1.0, 2.0**-10), (2.0**-10, 1.0), (256.0, 256.0)])
+def test_results_scale_with_length_and_stiffness(longer, stiffer):
+    """Numbers have units: the same photos and forces in others (powers of two), no error stated but of the midlines."""
+    test = replace(measured(), length_std=0.0, scale_std=0.0)
+    test = replace(test, steps=tuple(replace(step, chord_std=0.0) for step in test.steps))
+    unit, other = (law_of(given, options=QUICK) for given in (test, scaled(test, longer, stiffer)))
     # The fit stops within a few thousandths of a standard deviation, not at the last digit.
-    assert np.all(np.abs(other.tangent / stiffer - unit.tangent) < 0.005 * unit.tangent_std)
-    assert np.allclose(other.tangent_std / stiffer, unit.tangent_std, rtol=5e-4)
-    assert other.pre_curvature == pytest.approx(unit.pre_curvature, abs=0.005 * unit.pre_curvature_std)
+    for name, size in (("tangent", stiffer), ("moment", stiffer / longer)):
+        apart = np.abs(getattr(other, name) / size - getattr(unit, name))
+        assert np.all(apart <= 0.005 * getattr(unit, f"{name}_std") + 1e-12 * unit.moment.max())
+    for name, size in (("tangent_std", stiffer), ("moment_std", stiffer / longer), ("secant_std", stiffer)):
+        assert getattr(other, name) == pytest.approx(size * getattr(unit, name), rel=5e-4)
+    for name in ("pre_curvature", "loaded_pre_curvature"):
+        apart = longer * getattr(other, name) - getattr(unit, name)
+        assert abs(apart) < 0.005 * getattr(unit, f"{name}_std")
+        assert longer * getattr(other, f"{name}_std") == pytest.approx(getattr(unit, f"{name}_std"), rel=5e-4)
 
 
 def test_finer_rods_change_nothing_beyond_a_tenth_of_the_band():
@@ -195,10 +201,16 @@ def test_what_the_model_cannot_follow_widens_the_bands_and_bends_no_nuisance():
         for s in test.steps
         if s.branch == "loading"
     )
-    whole = replace(test, steps=test.steps + steps)
+    errors = {2: 1e-6, 13: 2e-6}
+    whole = replace(test, steps=test.steps + steps, common_force_errors=(errors,))
     good, bad = estimate(test), estimate(whole)
     assert bad.outcome is not InverseOutcome.NO_EQUILIBRIUM
     assert bad.model.blur[1] > 3.0
+    assert bad.model.blur[0] == 1.0  # the photos agree
+    # what forces have in common moves the law as each of them would
+    std = bad.model.blur[1] * np.array([whole.steps[k].force_std for k in (2, 6)])
+    each = [bad.law.gains["force", step][:, 0] * error for step, error in errors.items()]
+    assert bad.law.gains["common_force", -1][:, 0] == pytest.approx(each[0] / std[0] + each[1] / std[1])
     # three forces 15 % too large for one law, three as much too small: their mean is known to 15 % over sqrt(6)
     assert np.median(bad.law.tangent_std / bad.law.tangent) > 0.9 * 0.15 / np.sqrt(6)
     assert np.median(bad.law.tangent_std) > 2.0 * np.median(good.law.tangent_std)

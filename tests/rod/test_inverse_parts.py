@@ -9,9 +9,10 @@ from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.inverse.evaluation import evaluate, free_cable
 from rod.inverse.fit import fit
 from rod.inverse.fit_model import fit_model, step_data, zero_of_displacement
+from rod.inverse.problem import straight_line
 from rod.midline import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
-from tests.rod.virtual_photo import Camera, bending_test
+from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes
 
 LENGTH = 0.2
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
@@ -132,6 +133,13 @@ def test_block_means_lie_on_the_curve_not_inside_it():
     assert np.abs(-np.sin(blocks.theta) * (blocks.x - x) + np.cos(blocks.theta) * (blocks.y - y)).max() < 2e-6
 
 
+def test_a_start_is_the_straight_line_of_curvature_over_moment():
+    m = np.linspace(0.0, 0.02, 9)
+    assert straight_line(m, 2.0 + m / 5e-3) == pytest.approx((5e-3, 2.0))
+    level = np.r_[1.0, -2.0, 1.0, 0.0, 0.0, 0.0, -1.0, 2.0, -1.0]  # no slope at all: a fiftieth of the range
+    assert straight_line(m, level)[0] == pytest.approx(0.02 / (0.02 * 4.0))
+
+
 def test_whitener_needs_sections():
     shape = measured().steps[1].shape
     few = replace(shape, section_s=shape.section_s[:4], section_x=shape.section_x[:4], section_y=shape.section_y[:4])
@@ -139,8 +147,36 @@ def test_whitener_needs_sections():
         midline(replace(few, section_std=shape.section_std[:4]))
 
 
+def test_errors_of_the_axes_are_taken_back_whatever_their_source():
+    """Axes found beside the pins and too far from the camera's foot: told so, every distance is what it was."""
+    test = replace(measured(), axis_std=1e-4, axis_parallax_std=1e-3, camera_foot_std=0.05)
+    test = replace(test, steps=tuple(replace(step, picture_centre=(0.08, 0.01)) for step in test.steps))
+    model, here = model_of(test), start_of(model_of(test))
+
+    def distances(moved, told):
+        u = here.copy()
+        for name, value in told.items():
+            u[model.index(name)] = value / model.nuisances[name]
+        found = evaluate(model_of(moved), u)
+        return np.concatenate([found.value[block] for name, block in found.blocks.items() if name.startswith("shape")])
+
+    same = distances(test, {})
+    lifted, parted = moved_axes(test, 2e-5, -3e-5), parted_axes(test, 1e-4, (0.08, 0.01))
+    # a turn and a stretch by 2e-4 are exact to their squares; the noise of a midline is 5e-6 m
+    for moved, told in (
+        (lifted, {"left_across": 2e-5, "right_across": -3e-5}),
+        (lifted, {f"{part}/{k}": e for part, e in (("left_across", 2e-5), ("right_across", -3e-5)) for k in range(4)}),
+        (moved_axes(test, 2e-5, 2e-5), {"foot_across": 2e-5}),
+        (parted, {"parallax": 1e-4}),
+    ):
+        assert np.abs(distances(moved, {}) - same).max() > 1.0
+        assert distances(moved, told) == pytest.approx(same, abs=0.02)
+
+
 def test_zero_of_displacement_is_that_of_the_photos():
     test = measured()
+    alone = zero_of_displacement(step_data(replace(test, steps=test.steps[1:2])))
+    assert alone == pytest.approx((test.steps[1].chord + test.steps[1].displacement, test.steps[1].chord_std))
     value, std = zero_of_displacement(step_data(test))
     assert value == pytest.approx(force_free(LAW, LENGTH).chord, abs=4 * std)
     assert zero_of_displacement(()) is None

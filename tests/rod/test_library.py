@@ -1,6 +1,7 @@
 """The library as somebody new uses it: the examples of `rod` run, and whatever describes a cable is a law."""
 
 import doctest
+import math
 
 import numpy as np
 import pytest
@@ -85,6 +86,16 @@ def test_a_number_is_a_stiffness_and_a_curve_stays_itself():
         ({"law": 1.0, "chord": 0.1, "force": 1.0}, "exactly one of displacement"),
         ({"law": 1.0, "tip": (0.0, 1.0)}, "right=FREE"),
         ({"law": 1.0, "chord": 0.1, "right": FREE}, "right=FREE"),
+        ({"law": 1.0, "tip": 1.0, "right": FREE}, "tip is two"),
+        ({"law": 1.0, "displacement": np.nan}, "finite numbers"),
+        ({"law": 1.0, "force": np.inf}, "finite numbers"),
+        ({"law": 1.0, "chord": 0.1, "load": 3.0}, "load is two"),
+        ({"law": 1.0, "chord": 0.1, "load": (0.0, np.nan)}, "load is two"),
+        ({"law": 1.0, "chord": 0.1, "elements": 0}, "at least two"),
+        ({"law": lambda bend: math.tanh(bend), "chord": 0.1}, "as those of numpy do"),
+        ({"law": lambda bend: bend[:3], "chord": 0.1}, "as many .* moments"),
+        ({"law": lambda bend: bend * np.nan, "chord": 0.1}, "finite moments"),
+        ({"law": 1.0, "chord": 0.1, "start": bend(0.2, 1.0, chord=0.1, elements=50)}, "50 elements and the rod 100"),
     ],
 )
 def test_mistakes_are_told_with_what_to_do(call, says):
@@ -93,7 +104,7 @@ def test_mistakes_are_told_with_what_to_do(call, says):
 
 
 def test_a_warm_start_is_taken():
-    cold = bend(0.2, LAW, chord=0.18, pre_curvature=2.0)
+    cold = bend(0.2, LAW, chord=0.18, pre_curvature=2.0, elements=np.int64(100))  # a number, whoever counted
     assert bend(0.2, LAW, chord=0.18, pre_curvature=2.0, start=cold).iterations <= 2
 
 

@@ -25,6 +25,7 @@ from rod.equilibrium import Equilibrium, Outcome, solve
 from rod.newton import Start, newton
 from rod.reduction import Hold, System
 from rod.support import Support
+from tests.rod.elastica import uniform_equilibrium
 from tests.rod.minimum import is_minimum
 from tests.rod.potential_energy import Potential
 
@@ -268,6 +269,28 @@ def test_pinned_bar_turns_away_when_its_ends_meet():
     rest = simulate(STRAIGHT, forces=[3.0 * EULER], branch="jump")[0]
     assert rest.good
     assert rest.chord == pytest.approx(-LENGTH, rel=1e-6)
+
+
+@pytest.mark.parametrize("beyond", [1e-6, 1e-4, 2e-3])
+def test_a_bar_bows_by_the_root_of_what_its_load_is_beyond_the_critical_one(beyond):
+    """Timoshenko and Gere, Art. 2.7: 1 + a^2 / 8 times the critical load, here that of n elements in closed form."""
+    n = STRAIGHT.rod.elements.size
+    critical = EULER * (np.sin(0.5 * np.pi / n) / (0.5 * np.pi / n)) ** 2
+    step = simulate(STRAIGHT, forces=[(1.0 + beyond) * critical])[0]
+    assert step.good
+    assert step.force == pytest.approx((1.0 + beyond) * critical, rel=1e-12)
+    assert step.theta.max() == pytest.approx(np.sqrt(8.0 * beyond), rel=2e-3)
+
+
+@pytest.mark.parametrize(("K0", "elements"), [(0.0, 100), (1.0, 60), (2.0, 60), (2.0, 100)])
+def test_a_bow_whose_ends_meet_bears_no_larger_force(K0, elements):
+    """Where the ends meet another branch leaves the path; it must not be taken for one that bears the force asked."""
+    largest = uniform_equilibrium(LINEAR, length=LENGTH, chord=1e-9, pre_curvature=K0).force  # quadrature
+    test = replace(STRAIGHT, pre_curvature=K0, elements=elements)
+    for load in (1.05 * largest, 3.0):
+        lost = simulate(test, forces=[load])[0]
+        assert lost.outcome is Outcome.BIFURCATION
+        assert lost.force == pytest.approx(largest, rel=2e-3)  # 60 elements
 
 
 # Displacement control, coils, jumps -----------------------------------------------------------------------------------

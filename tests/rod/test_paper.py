@@ -24,18 +24,9 @@ def test_table_1(reading, from_length):
     assert all(step.kappa.min() == pytest.approx(2.0, abs=2e-2) for step in experiment.steps)
 
 
-def test_inverse_problem_reaches_table_1_in_about_ten_iterations():
-    fit = virtual_inverse()
-    errors = [np.max(np.abs(np.r_[s.ordinates, s.pre_curvature] / (5e-3, 3e-3, 2e-3, 2.0) - 1.0)) for s in fit.history]
-    assert min(errors[:11]) < 1e-3
-    assert errors[-1] < 1e-8
-
-
 def test_forcing_k0_to_zero_makes_stiffness_negative_at_low_curvature():
-    low, middle, high = forced_straight().characteristic.ordinates
-    assert low < 0.0
-    # about (1.73, 1.61) mN m^2 by another program; the corner of the admissible set depends on the grid
-    np.testing.assert_allclose((middle, high), (1.73e-3, 1.61e-3), rtol=0.05)
+    # 101 nodes, by two other solvers
+    np.testing.assert_allclose(1e3 * forced_straight().characteristic.ordinates, (-0.61, 1.71, 1.62), atol=6e-3)
 
 
 def test_figures_have_the_states_of_every_iteration_the_initial_rod_and_one_graph_a_photo():

@@ -136,6 +136,22 @@ def photograph(shape, camera, rng, *, scale=0.0, common=0.0, points=181):
     return measured, shrink * np.hypot(*(right - left)), np.sqrt(2) * camera.axis_px * camera.px
 
 
+def scaled(test, longer, stiffer):
+    """The test of a cable longer and stiffer by factors, seen from as much farther away: lengths and forces alone."""
+    force = stiffer / longer**2
+    lengths = ("s", "x", "y", *SECTION_PLACES, "section_std", "correlation_length", "systematic_std")
+    lengths += ("systematic_length", "wave_std", "wave_length", "common_std")
+    steps = []
+    for step in test.steps:
+        shape = {name: longer * getattr(step.shape, name) for name in lengths}
+        seen = {name: longer * getattr(step, name) for name in ("displacement", "chord", "chord_std")}
+        felt = {name: force * getattr(step, name) for name in ("force", "force_std")}
+        shape = replace(step.shape, kappa=step.shape.kappa / longer, **shape)
+        steps.append(replace(step, shape=shape, **seen, **felt))
+    told = {name: longer * getattr(test, name) for name in ("length", "length_std", "axis_std", "camera_foot_std")}
+    return replace(test, steps=tuple(steps), **told)
+
+
 def stretched(test, factor):
     """The test with every length on every photo multiplied by `factor`, as a wrong scale does."""
     steps = []
@@ -153,8 +169,11 @@ def moved_axes(test, left, right):
     steps = []
     for step in test.steps:
         shape, roll = step.shape, (right - left) / step.chord
-        lower = {"y": shape.y - left - roll * shape.x, "section_y": shape.section_y - left - roll * shape.section_x}
-        steps.append(replace(step, shape=replace(shape, theta=shape.theta - roll, **lower)))
+        seen = {}
+        for part in ("", "section_"):
+            x, y = (getattr(shape, part + name) for name in "xy")
+            seen |= {part + "x": x + roll * y, part + "y": y - left - roll * x}
+        steps.append(replace(step, shape=replace(shape, theta=shape.theta - roll, **seen)))
     return replace(test, steps=tuple(steps))
 
 
