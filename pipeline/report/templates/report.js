@@ -105,7 +105,7 @@
     const std = way.factor.length ? Math.hypot(...way.factor.map((column) => mean(column, a, b))) : mean(way.std, a, b);
     result.textContent = `${rounded(mean(way.value, a, b), std, decimal)} ${data.unit} (\u03ba ${shown(a, 3, decimal)} \u2026 ${shown(b, 3, decimal)} 1/m)`;
   };
-  from.addEventListener("input", work); to.addEventListener("input", work); work();
+  from.addEventListener("input", work); to.addEventListener("input", work);
 })();
 // On paper everything is shown, also what is folded on the screen.
 addEventListener("beforeprint", () => { for (const fold of document.querySelectorAll("details.paper")) fold.open = true; });

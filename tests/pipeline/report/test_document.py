@@ -190,7 +190,7 @@ def test_what_was_fitted_besides_has_names_and_units(full_result):
     rows = nuisance_rows(full_result.model_copy(update={"inverse": inverse}), Words("de"))
     assert rows == [
         ("Länge", "−40 ± 90\u00a0µm"),
-        ("Maßstab, relativ", "0,0013 ± 0,0005"),
+        ("Maßstab", "0,13 ± 0,05\u00a0%"),
         ("linke Achse, längs der Sehne, Schritt 3", "4,2 ± 2,7\u00a0µm"),
     ]
 
@@ -213,7 +213,7 @@ def test_nothing_of_a_user_is_markup(partial_result):
 
 def test_failed_specimen_says_why(failed_result):
     text = Page(report_html(failed_result)).text
-    assert "cable-13 was not measured: force.csv: the log is empty; export it again." in text
+    assert "Specimen cable-13 was not measured: force.csv: the log is empty; export it again." in text
     assert "Mend that and run the same command again" in text
 
 
@@ -228,7 +228,7 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
     page = report_html(full_result.model_copy(update=nothing), ReportSettings(language="de"))
     heading = headline(page)
     assert heading == (
-        f"cable-07 wurde nicht vermessen: Keines seiner 2 Fotos war verwendbar. Das erste: {refused[0].image}: "
+        f"Probe cable-07 wurde nicht vermessen: Keines ihrer 2 Fotos war verwendbar. Das erste: {refused[0].image}: "
         "die Datei ist leer."
     )
     assert "Sie danach neu aufnehmen" in page

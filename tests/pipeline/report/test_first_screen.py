@@ -36,7 +36,7 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
         SETTINGS,
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
-    assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading in the same steps."
+    assert told[0] == "hysteresis, by up to 27 % of f_EI: unloading in the same steps would show it."
 
 
 def test_what_was_found_hides_no_more(diagnosed):

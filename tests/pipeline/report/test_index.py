@@ -43,8 +43,8 @@ def test_summary_has_a_row_a_specimen(batch, tmp_path):
     table = pd.read_csv(summary)
     assert list(table.status) == ["measured", "measured", "partial", "failed"]
     assert list(table.verdict) == ["none", "class", "none", "none"]
-    assert table.low_tangent_Nm2[0] == pytest.approx(batch[0].inverse.curve.tangent_Nm2[0], rel=1e-8)
-    assert table.pre_curvature_std_per_m[0] == 0.013
+    assert table.f_EI_low_Nm2[0] == pytest.approx(batch[0].inverse.curve.tangent_Nm2[0], rel=1e-8)
+    assert table.K0_std_per_m[0] == 0.013
     assert table.reason[3] == "force.csv: the log is empty; export it again."
     assert table.id[2].startswith("'=")
     assert table.report[0] == "a/report.html"
