@@ -91,7 +91,7 @@ MOST_HIDDEN = 3
 def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str, ...]:
     """Blind spots that would move f_EI, at a plausible size, farther than its band reaches; the worst first."""
     curve, diagnosis = result.answer.curve, result.diagnosis
-    if curve is None or diagnosis is None:
+    if curve is None or diagnosis is None or not result.answer.usable:
         return ()
     band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
     spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.could_hide]
@@ -183,7 +183,7 @@ def _advice(result: Result, words: Words) -> str:
         what = words.said(experiment.said).text
         what = what[:1].upper() + what[1:]
         key = "next_what" if len(experiment.separates) > 1 else "next_settles"
-        return words(key, what=what, causes=names) if names else what
+        return words(key, what=what, causes=names) if names else f"{what}."
     if any(finding.level != "info" for finding in result.findings):
         return words("next_findings")
     return words("next_none")

@@ -95,7 +95,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class CausePlan:
-    """What the planned test would show of one cause; ``separated_by``, not planned yet, tells it from its nearest twin."""
+    """What the planned test would show of one cause; ``separated_by``, not planned yet, tells it from its twin."""
 
     name: str
     unit: str
