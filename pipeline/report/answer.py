@@ -78,6 +78,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
         pre_curvatures=tuple(
             (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
             for way, (value, std) in _all_pre_curvatures(result).items()
+            if result.answer.usable or result.status == "failed"
         ),
         hidden=_hidden(result, words, settings),
         doubt=words("band_unexplained") if diagnosis and diagnosis.verdict == "unexplained" else "",

@@ -47,6 +47,7 @@ def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):
         "What could hide in these data",
         "Is the model adequate?",
         "Do the two ways agree?",
+        ">Pre-curvature K0</span>",
         ">measured</span>",
     )
     good, bad = report_html(result), report_html(wrong)
