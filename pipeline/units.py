@@ -69,5 +69,5 @@ def quantity(value: float, symbol: str, std: float | None = None, *, decimal: st
 
 
 def amount_unit(unit: str, *amounts: float, decimal: str = ".") -> Unit:
-    """Unit of amounts of a cause: the contract writes ``N m^2``, and ``-`` for a plain number."""
-    return suited(amounts, "" if unit == "-" else unit.replace("^2", "²"), decimal=decimal)
+    """Unit of amounts of a cause: the contract writes ``N m^2``, and ``-`` for a share, which is read in per cent."""
+    return Unit(1e2, "%", decimal) if unit == "-" else suited(amounts, unit.replace("^2", "²"), decimal=decimal)

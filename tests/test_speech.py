@@ -115,6 +115,8 @@ def test_tables_fit_a_terminal_and_are_a_line_a_record_in_a_pipe(monkeypatch, ca
     assert max(map(len, lines[80])) <= 80
     (record,) = [line for line in lines[None] if line.startswith("bearing_friction")]
     assert "of its trace survives; like " in record
+    (alone,) = [line for line in lines[None] if line.startswith("hysteresis")]  # on loading f_EI takes it over
+    assert "survives; what helps: unload" in alone
 
 
 def test_long_words_and_names_are_wrapped_beside_their_begin(monkeypatch):

@@ -136,9 +136,10 @@ def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> No
     """One entry a specimen, then the counts and where to look."""
     width = min(30, max((len(name) for name in tally.names), default=0))
     states = {state: told(Message(f"word.{state}")) for state in ("measured", "partial", "failed", "unusable")}
+    stated = max(map(len, states.values()))
     for stored in entries:
         state = states["unusable" if stored.get("state") == "unusable" else stored["status"]]
-        click.echo(entry(f"{stored['name']:<{width}}  {state:<8}  ", told(headline_of(stored))))
+        click.echo(entry(f"{stored['name']:<{width}}  {state:<{stated}}  ", told(headline_of(stored))))
     kept = Message("cli.kept", count=tally.reused) if tally.reused else ""
     unusable = Message("cli.unusable", count=tally.unusable) if tally.unusable else ""
     counts = {"measured": tally.measured, "total": tally.total, "failed": tally.failed}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
 from pipeline.diagnosis.posterior.words import Verdict
-from pipeline.messages import Message, entry, word
+from pipeline.messages import PER, Message, entry, word
 from pipeline.result import CausePart, CauseRow
 
 
@@ -90,7 +90,7 @@ def explain(name: str, language: str = "en") -> str:
     page = Message(
         "explain.cause",
         title=name if language == "en" else f"{name}: {word(name).said(language)}",
-        unit=unit,
+        unit=unit.replace(" per ", PER[language]),
         sign="not-negative" if sign else "either-sign",
         summary=summary,
         amount=amount,

@@ -17,8 +17,8 @@ written as in `str.format`; what may stand behind its colon:
     A name used inside the program (a branch, a column) as one says it: the entry ``word.NAME``.
 ``amount``
     Value, standard deviation (or None) and unit, with the prefix that suits it, and further values that may follow.
-``wrong``
-    Of a message: what is wrong, without what to do.
+``wrong``, ``capital``
+    Of a message: what is wrong, without what to do; the message with a capital, as a German sentence after a colon has.
 `` and ``
     Of a list: what stands between its last two parts, and a comma between the others; other signs stand between all;
     a comma, where nothing is said; a dot makes a sentence of each.
@@ -181,7 +181,8 @@ class _Gaps(string.Formatter):
         """A value as the reader gets it; see the module for what ``spec`` may be."""
         if isinstance(value, Message):
             parts = value.parts(self.language)
-            return parts[0] if spec == "wrong" else "; ".join(parts)
+            text = parts[0] if spec == "wrong" else "; ".join(parts)
+            return sentence(text) if spec == "capital" else text
         if isinstance(value, str):
             return word(value).said(self.language) if spec == "word" else format(value, spec)
         if spec in QUANTITIES:

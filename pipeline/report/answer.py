@@ -78,6 +78,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
         pre_curvatures=tuple(
             (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
             for way, (value, std) in _all_pre_curvatures(result).items()
+            if result.answer.usable or result.status == "failed"
         ),
         hidden=_hidden(result, words, settings),
         doubt=words("band_unexplained") if diagnosis and diagnosis.verdict == "unexplained" else "",
@@ -91,7 +92,7 @@ MOST_HIDDEN = 3
 def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str, ...]:
     """Blind spots that would move f_EI, at a plausible size, farther than its band reaches; the worst first."""
     curve, diagnosis = result.answer.curve, result.diagnosis
-    if curve is None or diagnosis is None:
+    if curve is None or diagnosis is None or not result.answer.usable:
         return ()
     band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
     spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.could_hide]
@@ -183,7 +184,7 @@ def _advice(result: Result, words: Words) -> str:
         what = words.said(experiment.said).text
         what = what[:1].upper() + what[1:]
         key = "next_what" if len(experiment.separates) > 1 else "next_settles"
-        return words(key, what=what, causes=names) if names else what
+        return words(key, what=what, causes=names) if names else f"{what}."
     if any(finding.level != "info" for finding in result.findings):
         return words("next_findings")
     return words("next_none")

@@ -97,7 +97,7 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
-        share = words("probability_of", share=words.number(100.0 * cause.probability, SHARE_DIGITS))
+        share = words("probability_of", share=_share(cause.probability, words))
         if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
             share = words("does_not_suffice")
         line = f"{words.cause(cause.name)}: {estimate} ({share})"
@@ -119,8 +119,18 @@ def _twin(name: str, twin: TwinPart | None, words: Words) -> str:
     """Another name for a cause; how likely it is and what settles it, where it was tried."""
     if twin is None:
         return words.cause(name)
-    share = words.number(100.0 * twin.probability, SHARE_DIGITS)
+    share = _share(twin.probability, words)
     return words("other_name", name=words.cause(name), share=share, settled=words.settled(name))
+
+
+LEAST_SHARE = 1e-3
+"""Probability below which its size is not told: nothing hangs on it."""
+
+
+def _share(probability: float, words: Words) -> str:
+    """A probability in per cent."""
+    shown = words.number(100.0 * max(probability, LEAST_SHARE), SHARE_DIGITS)
+    return shown if probability >= LEAST_SHARE else f"< {shown}"
 
 
 def _gain(part: DiagnosisPart, words: Words) -> list[str]:
@@ -133,7 +143,7 @@ def _gain(part: DiagnosisPart, words: Words) -> list[str]:
         unit = words.unit(symbol, *values)
         return f"{words.number(unit.factor * values[0])} → {unit.plain(values[1])}"
 
-    percent = [words.number(100.0 * v) for v in (gain.heldout_excess_removed, *gain.ci95)]
+    percent = [words.number(100.0 * v, SHARE_DIGITS) for v in (gain.heldout_excess_removed, *gain.ci95)]
     return [
         words("gain_text", share=percent[0], low=percent[1], high=percent[2]),
         words("gain_rmse", force=pair(gain.force_rmse_N, "N"), shape=pair(gain.shape_rmse_m, "m")),
@@ -184,7 +194,7 @@ def _leftover(part: DiagnosisPart, words: Words) -> list[str]:
     if left is None or part.verdict == "adequate":
         return []
     if left.probability < LIKELY:
-        return [words("leftover_noise", p=words.probability(left.probability, name="p"))]
+        return [words("leftover_noise", share=_share(left.probability, words))]
     noise = [] if left.noise_factor == 1.0 else [Message("left.noise", factor=left.noise_factor)]
     return [words.said(said).sentence for said in (left.said, *noise)]
 

@@ -140,7 +140,7 @@ def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         if said.doubt:
             sheet.text(said.doubt, bold=True)
     parts = [("what_next", said.advice)]
-    if result.status != "failed":
+    if result.answer.usable:
         parts += [
             ("adequate", f"{said.verdict[:1].upper()}{said.verdict[1:]}. {said.model}" if said.verdict else said.model),
             ("two_ways", said.agreement),

@@ -7,15 +7,11 @@ from collections.abc import Iterable, Iterator
 from pipeline.report.cells import csv_lines
 from pipeline.report.row import IndexRow
 
-ENDS = ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2")
 HEADS = (
     *("id", "status", "usable", "verdict", "causes", "answer_method", "K0_per_m", "K0_std_per_m"),
     *("kappa_low_per_m", "f_EI_low_Nm2", "f_EI_low_std_Nm2", "kappa_high_per_m", "f_EI_high_Nm2", "f_EI_high_std_Nm2"),
     *("worst_finding", "reason", "type", "agreement_rms_relative", "compatible"),
     *("photos_used", "photos_given", "warnings", "errors", "report"),
-    # the names these columns had before the contract named them
-    *(f"{end}_{name}" for end in ("low", "high") for name in ENDS),
-    *("pre_curvature_per_m", "pre_curvature_std_per_m"),
 )
 
 
@@ -30,4 +26,4 @@ def _cells(row: IndexRow) -> tuple[object, ...]:
     told = (row.worst, str(row.fault or row.reason or ""), row.type, row.rms_relative, row.compatible)
     counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
     about = (row.id, row.status, row.usable, row.verdict, ";".join(row.causes), row.method)
-    return (*about, *rest, *ends, *told, *counts, row.report, *ends, *rest)
+    return (*about, *rest, *ends, *told, *counts, row.report)

@@ -152,5 +152,5 @@ class Words:
         return f"{text.partition(' (')[0]} ({self('exact')})" if std == 0.0 else text
 
     def unit(self, unit: str, *values: float) -> Unit:
-        """A unit of the contract as one writes it (nothing for a plain number), its prefix suited to the values."""
+        """A unit of the contract as one writes it (per cent for a share), its prefix suited to the values."""
         return amount_unit(unit.replace(" per ", PER[self.language]), *values, decimal=self.decimal)

@@ -136,7 +136,8 @@ SEEN = could_have_been_seen(
             [],
             {"seen": SEEN},
             "Nichts jenseits des Rauschens: Die Simulation erklärt Kräfte und Fotos; 2 von 19 Ursachen hätten sich "
-            "bei plausibler Größe gezeigt, etwa veränderliche Steifigkeit ab 0,00051, Wegnullpunkt ab 3,5\u00a0µm.",
+            "bei plausibler Größe gezeigt, etwa veränderliche Steifigkeit ab 0,051\u00a0%, Wegnullpunkt "
+            "ab 3,5\u00a0µm.",
         ),
     ],
 )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.units import suited
+from pipeline.units import amount_unit, suited
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,11 @@ def test_decimal_sign_and_exact_numbers():
     unit = suited([0.0125], "m", decimal=",")
     assert unit.plain(0.0125, 2) == "12\u00a0mm"
     assert unit.plain(0.0125) == "12,5\u00a0mm"
+
+
+def test_a_share_reads_in_per_cent():
+    assert amount_unit("-", 0.0015).plain(0.0015, 2) == "0.15\u00a0%"
+    assert amount_unit("-", 0.0125, decimal=",").text(0.0125, 0.0007) == "1,25 ± 0,07\u00a0%"
 
 
 def test_prefixes_end_where_nobody_reads_them_any_more():

@@ -95,7 +95,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class CausePlan:
-    """What the planned test would show of one cause; ``separated_by``, not planned yet, takes its nearest twin off."""
+    """What the planned test would show of one cause; ``separated_by``, not planned yet, tells it from its twin."""
 
     name: str
     unit: str
@@ -121,10 +121,13 @@ class CausePlan:
 
     @property
     def twin(self) -> Message:
-        """How much of its trace survives, what it is most like, and what takes that off."""
-        key = "plan.apart" if self.separated_by else "plan.like" if self.nearest_twin else "plan.alone"
-        like = {"twin": self.nearest_twin, "cosine": self.twin_cosine, "by": self.separated_by or ""}
-        return Message(key, survives=self.surviving_fraction, **like)
+        """How much of its trace survives, what it is most like, and what tells both apart."""
+        parts = [Message("plan.survives", survives=self.surviving_fraction)]
+        if self.nearest_twin:
+            parts.append(Message("plan.like", twin=self.nearest_twin, cosine=self.twin_cosine))
+        if self.separated_by:
+            parts.append(Message("plan.helps", by=self.separated_by))
+        return Message("plan.trace", parts=parts)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,39 @@
     event.preventDefault();
   });
   go(0); line();
+  // Marks: clicks on a photo, in its own pixels, as the lines of [[photos]] that correct it in specimen.toml.
+  const kind = document.getElementById("mark"), marks = photos.map(() => ({}));
+  const most = { use: 1, ends_px: 2, region_px: 2 };
+  const written = {
+    use: () => "false",
+    region_px: (points) => JSON.stringify([Math.min, Math.max].flatMap((end) => [0, 1].map((k) => end(...points.map((p) => p[k]))))),
+    exclude_px: (points) => JSON.stringify([points]),
+  };
+  const write = () => {
+    const blocks = marks.flatMap((mark, index) => Object.keys(mark).length ? [["[[photos]]", `image = ${JSON.stringify(photos[index].dataset.image)}`, ...Object.entries(mark).map(([key, points]) => `${key} = ${(written[key] ?? JSON.stringify)(points)}`)].join("\n")] : []);
+    document.getElementById("mark-lines").textContent = blocks.join("\n\n");
+    document.getElementById("marked").hidden = !blocks.length;
+    photos.forEach((photo, index) => {
+      const drawn = photo.querySelector(".picture svg");
+      if (!drawn) return;
+      drawn.querySelectorAll(".mark").forEach((node) => node.remove());
+      for (const [u, v] of Object.values(marks[index]).flat()) {
+        const dot = document.createElementNS("http://www.w3.org/2000/svg", "circle"), reduction = Number(drawn.parentNode.dataset.reduction);
+        dot.setAttribute("class", "mark"); dot.setAttribute("r", drawn.viewBox.baseVal.width / 200);
+        dot.setAttribute("cx", (u + 0.5) / reduction); dot.setAttribute("cy", (v + 0.5) / reduction);
+        drawn.append(dot);
+      }
+    });
+  };
+  kind.addEventListener("change", () => { delete marks[at][kind.value]; write(); });
+  photos.forEach((photo, index) => photo.querySelector(".picture")?.addEventListener("click", (event) => {
+    const picture = event.currentTarget, box = picture.getBoundingClientRect(), key = kind.value;
+    if (!key) return;
+    const pixel = (share, across) => Math.round(10 * (share * across * Number(picture.dataset.reduction) - 0.5)) / 10;
+    const { width, height } = picture.querySelector("svg").viewBox.baseVal;
+    marks[index][key] = [...(marks[index][key] ?? []), [pixel((event.clientX - box.left) / box.width, width), pixel((event.clientY - box.top) / box.height, height)]].slice(-(most[key] ?? 1e3));
+    write();
+  }));
 })();
 // Main figure: curvature, value, band and supporting photos under the pointer or at the arrow keys' cursor.
 (() => {
@@ -105,7 +138,7 @@
     const std = way.factor.length ? Math.hypot(...way.factor.map((column) => mean(column, a, b))) : mean(way.std, a, b);
     result.textContent = `${rounded(mean(way.value, a, b), std, decimal)} ${data.unit} (\u03ba ${shown(a, 3, decimal)} \u2026 ${shown(b, 3, decimal)} 1/m)`;
   };
-  from.addEventListener("input", work); to.addEventListener("input", work); work();
+  from.addEventListener("input", work); to.addEventListener("input", work);
 })();
 // On paper everything is shown, also what is folded on the screen.
 addEventListener("beforeprint", () => { for (const fold of document.querySelectorAll("details.paper")) fold.open = true; });

@@ -11,7 +11,7 @@ from pipeline.report.figures import steps_of_answer
 from pipeline.report.maps import photos_of_answer
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
-from pipeline.result import BlindSpot, TwinPart, set_aside
+from pipeline.result import BlindSpot, FindingPart, TwinPart, set_aside
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
@@ -36,7 +36,23 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
         SETTINGS,
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
-    assert told[0] == "hysteresis, by up to 27 % of f_EI; it shows by unloading in the same steps."
+    assert told[0] == "hysteresis, by up to 27 % of f_EI: unloading in the same steps would show it."
+
+
+def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):
+    result = with_spots(diagnosed("adequate").model_copy(update={"photos": []}), ("hysteresis", 0.27))
+    fault = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
+    wrong = result.model_copy(update={"findings": [fault], "answer_": None})
+    concluded = (
+        "What could hide in these data",
+        "Is the model adequate?",
+        "Do the two ways agree?",
+        ">Pre-curvature K0</span>",
+        ">measured</span>",
+    )
+    good, bad = report_html(result), report_html(wrong)
+    assert all(said in good for said in concluded) and not any(said in bad for said in concluded)
+    assert '<span class="chip bad">not usable</span>' in bad
 
 
 def test_what_was_found_hides_no_more(diagnosed):

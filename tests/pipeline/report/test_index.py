@@ -43,8 +43,8 @@ def test_summary_has_a_row_a_specimen(batch, tmp_path):
     table = pd.read_csv(summary)
     assert list(table.status) == ["measured", "measured", "partial", "failed"]
     assert list(table.verdict) == ["none", "class", "none", "none"]
-    assert table.low_tangent_Nm2[0] == pytest.approx(batch[0].inverse.curve.tangent_Nm2[0], rel=1e-8)
-    assert table.pre_curvature_std_per_m[0] == 0.013
+    assert table.f_EI_low_Nm2[0] == pytest.approx(batch[0].inverse.curve.tangent_Nm2[0], rel=1e-8)
+    assert table.K0_std_per_m[0] == 0.013
     assert table.reason[3] == "force.csv: the log is empty; export it again."
     assert table.id[2].startswith("'=")
     assert table.report[0] == "a/report.html"
@@ -137,8 +137,8 @@ def test_repeat_specimens_are_pooled_by_type(full_result, tmp_path):
     page = write_index(repeats, tmp_path)[0].read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert page.count("<figcaption>") == 1
     assert (
-        "3 specimens, bent to 2.00 to 8.70 1/m by all. They may all be the same cable: the scatter of f_EI and K0 "
-        in page
+        "3 specimens, compared from 2.00 to 8.70 1/m, where all were bent. "
+        "They may all be the same cable: the scatter of f_EI and K0 " in page
     )
     assert '<td>f_EI</td><td>K0</td></tr><tr><th scope="row">mean</th><td>13.2' in page
 
@@ -148,9 +148,7 @@ def test_repeats_that_are_not_one_cable_are_told_and_the_farthest_is_named(full_
     inverse = full_result.inverse.model_copy(update={"pre_curvature_per_m": other})
     turned = named(full_result, "turned", "B").model_copy(update={"inverse": inverse, "answer_": None})
     page = write_index([*(named(full_result, str(i), "B") for i in range(3)), turned], tmp_path)[0].read_text("utf-8")
-    assert (
-        "They are not all the same cable: the scatter of K0 " in page and "Farthest off for its band is turned." in page
-    )
+    assert "They are not all the same cable: the scatter of K0 " in page and "turned is farthest off" in page
 
 
 def test_german_index(batch, tmp_path):
@@ -271,7 +269,7 @@ def test_what_is_not_usable_is_in_no_mean(full_result, tmp_path):
     batch = [named(full_result, str(i), "B") for i in range(3)] + [wrong]
     page, summary = write_index(batch, tmp_path)
     text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert "3 specimens, bent to 2.00 to 8.70 1/m by all" in text
+    assert "3 specimens, compared from 2.00 to 8.70 1/m" in text
     assert '<td>f_EI</td><td>K0</td></tr><tr><th scope="row">mean</th><td>13.2' in text
     assert '<tr class="unusable">' in text and "data at fault" in text
     table = pd.read_csv(summary)
@@ -289,7 +287,7 @@ def test_a_wrong_unit_that_shows_beside_repeat_specimens_alone(full_result, tmp_
     assert list(pd.read_csv(summary).usable) == [True] * 5 + [False]
     assert "f_EI is 1000 times that of the other 5 specimens of type B" in pd.read_csv(summary).reason[5]
     text = page.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert said in text and ("5 specimens, bent" in text or "5 Proben, alle gebogen" in text)
+    assert said in text and ("5 specimens, compared" in text or "5 Proben, verglichen" in text)
 
 
 def test_of_two_that_contradict_each_other_neither_is_believed(full_result, tmp_path):

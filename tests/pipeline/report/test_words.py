@@ -62,6 +62,7 @@ def test_tails_of_probability_are_not_claimed():
 
 
 def test_a_specimen_is_called_as_it_is_written():
-    refused = Message("opening.failed", id="plain", reason="no photo")
-    assert Words().said(refused).sentence.startswith("plain was not measured")
+    refused = Message("sentences", sentences=[Message("opening.failed", id="plain", reason="no photo")])
+    assert str(refused) == Words().said(refused).sentence == "Specimen plain was not measured: no photo."
+    assert Words().said(Message("comparison.unusable", name="plain", reason="")).sentence.startswith("plain is not")
     assert Words().said(Message("text", text="plain words begin a sentence")).sentence.startswith("Plain words")
