@@ -66,8 +66,8 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
         return Conclusion(believed, search.grid, None, (), unmodelled=False, curtailed=search.curtailed)
     unmodelled = word == "rest"
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
-    refits = believed.explanations()
-    first = next((one for one in refits if len(one.causes) == count or unmodelled), None)
+    refits = believed.beside_something_else() if unmodelled else believed.explanations(count=count)
+    first = next(iter(refits), None)
     accepted = None if first is None else first.found
     if accepted is None or unmodelled:
         alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)

@@ -66,7 +66,9 @@ class Addition:
             # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
             bent = np.sign(share * amount) * traced * abs(share * amount / traced) ** (1.0 / term.variant.power)
             value = float(np.clip(bent, -limit, limit))
-            parts.append(term.numbers(max(value, 0.0) if term.cause.sign > 0 else value))
+            if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
+                value = share * term.cause.plausible(facts)
+            parts.append(term.numbers(value))
         return np.concatenate(parts)
 
 

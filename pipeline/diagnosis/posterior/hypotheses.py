@@ -87,6 +87,10 @@ class Posterior:
             if one.found is not None and not one.something_else and count in (None, len(one.causes))
         ]
 
+    def beside_something_else(self) -> list[Believed]:
+        """Refitted causes beside something else, most probable first."""
+        return [one for one in self.believed if one.found is not None and one.something_else]
+
     def credible(self) -> list[Believed]:
         """The smallest set of causes, without something else, that holds 95 % of the probability of all these."""
         named = [one for one in self.believed if one.causes and not one.something_else]

@@ -262,3 +262,16 @@ def test_hypotheses_are_told_and_sum_to_one():
     assert part.hypotheses[0].probability == max(one.probability for one in part.hypotheses)
     named = sum(one.probability for one in part.hypotheses if "force_offset" in one.causes and not one.something_else)
     assert part.causes[0].name == "force_offset" and part.causes[0].probability == pytest.approx(named, abs=1e-4)
+
+
+def test_the_nearest_cause_is_the_likeliest_beside_something_else():
+    """Where nothing explains the data, causes alone have no probability that a number can hold: all of them 0."""
+    first, second = object(), object()
+    hypotheses = [
+        Hypothesis((), -19000.0, -900.0),
+        Hypothesis((0,), -15000.0, -700.0, first),
+        Hypothesis((1,), -18000.0, -500.0, second),
+    ]
+    found = posterior(hypotheses, [0, 1])
+    assert found.word == "rest" and found.of(0) == found.of(1) == 0.0
+    assert [one.found for one in found.beside_something_else()] == [second, first]
