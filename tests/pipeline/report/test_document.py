@@ -291,6 +291,17 @@ def test_unsupported_points_are_not_drawn(full_result, brief):
     assert f"at κ = {last:.2f} 1/m" in heading
 
 
+def test_where_f_is_known_no_better_than_to_itself_it_is_not_told(full_result, brief):
+    curve = full_result.inverse.curve
+    for wide, told in ((4.0, "1/m"), (float("inf"), "do not tell")):
+        std = [2.0 * f if k < wide else 0.01 * f for k, f in zip(curve.kappa_per_m, curve.tangent_Nm2, strict=True)]
+        changed = {"tangent_std_Nm2": std, "tangent_factor_Nm2": []}
+        inverse = full_result.inverse.model_copy(update={"curve": curve.model_copy(update=changed)})
+        heading = headline(report_html(brief.model_copy(update={"inverse": inverse})))
+        first = min((k for k in curve.kappa_per_m if k >= wide), default=None)
+        assert told in heading and (first is None or f"at κ = {first:.2f} 1/m" in heading)
+
+
 def test_report_is_small_and_the_same_each_time(page, full_result, tmp_path):
     path = write_report(full_result, tmp_path / "a")
     assert path.stat().st_size < LARGEST_BYTES
