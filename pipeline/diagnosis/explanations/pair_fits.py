@@ -19,9 +19,9 @@ from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
-from pipeline.diagnosis.fits.fit import fit_from
+from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
-from pipeline.diagnosis.fits.workbench import Workbench
+from pipeline.diagnosis.fits.workbench import Workbench, laid_along
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
@@ -146,17 +146,31 @@ IN_ANY_FORM = 2
 
 
 def settled(bench: Workbench, pair: Explanation) -> Explanation:
-    """An explanation whose fit ran out of steps, fitted on: beside a half-way cause scores mislead."""
+    """An explanation fitted on where its fit ran out of steps, or where its law is pulled by what is known of its form.
+
+    Beside a half-way cause scores mislead. The abscissa lies along the law of the base model, which bends to hide what
+    a cause now explains: a knee that is none there was pulled to a smooth law by 10 sigma, and told as unexplained.
+    """
     fitted = pair.fitted
-    if fitted.converged:
-        return pair
     for _ in range(ATTEMPTS):
-        further = fit_from(bench.observation, fitted.extension, fitted.vector, fitted)
-        gained, fitted = fitted.chi2 - further.chi2, further
-        if fitted.converged or gained < SHAPE_GAIN:
+        if fitted.converged and not _law_is_pulled(fitted):
             break
-    return explanation_of(pair.causes, bench.base, fitted)
+        start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
+        further = fit_from(bench.observation, *start, fitted)
+        gained = fitted.chi2 - further.chi2 if further.run.prediction is not None else 0.0
+        if gained > 0.0:
+            fitted = further
+        if gained < SHAPE_GAIN:
+            break
+    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
+
+
+def _law_is_pulled(fitted: Fit) -> bool:
+    """Whether what is known of the law's form pulls at its numbers by more than a standard deviation each (rms)."""
+    base, known = fitted.extension.base, fitted.residual[-len(fitted.extension.prior) :]
+    pull = known[base.known : len(base.prior)]
+    return bool(pull @ pull > pull.size)
 
 
 ATTEMPTS = 3
-"""Fits at most that go on where the last one ran out of steps."""
+"""Fits at most that go on where the last one ended too early."""
