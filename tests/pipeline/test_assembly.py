@@ -60,7 +60,7 @@ def test_the_headline_of_numbers_that_are_not_usable_is_the_fault_alone(measured
     german = Words("de").said(led)
     assert german.language == "de"
     assert german.text == (
-        "Die Zahlen von cable-07 sind nicht verwendbar: die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder "
+        "Die Zahlen von cable-07 sind nicht verwendbar: Die Kräfte scheinen 1000-mal zu groß (mN für N gehalten, oder "
         "N für kN)."
     )
 

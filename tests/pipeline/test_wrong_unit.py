@@ -65,7 +65,7 @@ def test_no_mean_holds_it(run):
     out, _ = run
     table = pd.read_csv(out / "summary.csv").set_index("id")
     page = (out / "index.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    told = re.search(r"3 specimens, bent .*?>mean</th><td>([\d.]+) ± [\d.]+ (\S+) m²", page)
+    told = re.search(r"3 specimens, compared .*?>mean</th><td>([\d.]+) ± [\d.]+ (\S+) m²", page)
     mean = float(told[1]) * {"mN": 1e-3, "N": 1.0, "kN": 1e3}[told[2]]
     right = table[table.usable]
     assert right.f_EI_high_Nm2.min() < mean < right.f_EI_low_Nm2.max()
