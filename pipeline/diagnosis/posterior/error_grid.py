@@ -321,8 +321,8 @@ def hold_sizes(observation: Observation) -> dict[float, float]:
     higher = freedom / float(chdtri(freedom, float(ndtr(1.0)))) if freedom else 1.0
     (none, as_told), (size, off) = HOLD.items()
     found = {none: 0.5 * as_told, float(np.sqrt((1.0 + size**2) * higher - 1.0)): off}
-    found[float(np.sqrt(higher - 1.0))] = found.get(float(np.sqrt(higher - 1.0)), 0.0) + 0.5 * as_told
-    return found
+    more = float(np.sqrt(higher - 1.0))  # none, where the level is stated
+    return found | {more: found.get(more, 0.0) + 0.5 * as_told}
 
 
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
