@@ -97,7 +97,8 @@ def show(browser):
     opened = []
 
     def go(address, width=DESK):
-        _ = [browser.get_log(log) for log in ("browser", "performance")]
+        for log in ("browser", "performance"):
+            browser.get_log(log)
         metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
