@@ -100,6 +100,11 @@ SEEN = could_have_been_seen(
 )
 
 
+def test_an_amount_that_shows_in_one_form_only_is_not_told():
+    row = CauseRow(name="displacement_offset", unit="m", minimal_detectable=3e-6, detectable_in_any_form=5e-5, **LOUD)
+    assert "from 50 µm" in str(could_have_been_seen([row], 1)).replace("\N{NO-BREAK SPACE}", " ")
+
+
 @pytest.mark.parametrize(
     ("verdict", "names", "values", "told"),
     [
