@@ -73,6 +73,8 @@ def _by_inner_disc(
 ) -> Circle | None:
     """Cover with a middle that stands out, all round, of a rim that does not: the middle tells the axis."""
     inner = Radius(settings.inner_disc * radius.px, 0.5 * settings.search_radii)
+    if inner.px < width_px:  # the end of the cable itself passes for a disc that is little wider than it
+        return None
     disc = find_rim(photo, end, inner, width_px, settings)
     if disc is None or disc.rim < settings.sure_rim:
         return None
