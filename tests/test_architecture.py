@@ -77,7 +77,7 @@ INSIDE = {
         ("weigh", "detectable", "mixture"),
     ],
     "pipeline.diagnosis.explanations": [
-        ("candidates", "refit", "effort"),
+        ("candidates", "refit"),
         ("forms",),
         ("free_profile",),
         ("single_cause", "pair_fits"),

@@ -137,7 +137,7 @@ def test_twins_of_three_loading_steps_are_one_class(name, times):
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_nothing_is_named_where_nothing_is_hidden(protocol, seed):
     law = {11: Cable(), 12: Cable(EI0=0.03, EI1=0.005, kc=5.0, K0=1.2), 13: Cable(EI0=2e-4, EI1=1.5e-4, kc=3.0, K0=2.5)}
-    conclusion = conclude(bench_of(hidden_test(law[seed], PROTOCOLS[protocol], largest=LARGEST, seed=seed)), SETTINGS)
+    conclusion = conclude(bench_of(hidden_test(law[seed], PROTOCOLS[protocol], largest=LARGEST, seed=seed)))
     assert conclusion.singles == [] and conclusion.accepted is None and not conclusion.unmodelled
 
 
@@ -171,7 +171,7 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
     causes = [cause for cause in CATALOGUE if cause.name in names]
     test = hidden_test(cable, SIX, largest=LARGEST, seed=15)
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
-    found = conclude(bench, SETTINGS)
+    found = conclude(bench)
     assert [causes[k].name for k in found.accepted.causes] == ["in_plane_load"] and not found.unmodelled
     fitted = found.accepted.fitted
     for place, term in enumerate(fitted.extension.terms):
@@ -187,7 +187,7 @@ def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
     causes = [cause for cause in CATALOGUE if cause.name in NEEDS_THE_WAY_BACK]
     test = hidden_test(cable, LOOP, largest=LARGEST, seed=16)
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
-    part = present(bench, conclude(bench, SETTINGS), SETTINGS)
+    part = present(bench, conclude(bench), SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
     assert part.causes[0].estimate == pytest.approx(0.08, abs=4.0 * part.causes[0].std)
     assert [form.at > 0.5 for form in part.causes[0].forms] == [law_stays]

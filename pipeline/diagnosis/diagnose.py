@@ -22,7 +22,7 @@ from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, 
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
 from pipeline.diagnosis.posterior.weigh import weighed
-from pipeline.diagnosis.presentation.findings import search_ended, too_large
+from pipeline.diagnosis.presentation.findings import too_large
 from pipeline.diagnosis.presentation.part import present
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.twins import cosines
@@ -84,7 +84,7 @@ def diagnose(
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     large = too_large(bench, conclusion) if part.verdict == "unexplained" else ()
     off = () if rig is None else ordinary.told(rig)
-    return Diagnosed(part, (*faults.findings, *large, *off, *search_ended(conclusion)), faults)
+    return Diagnosed(part, (*faults.findings, *large, *off), faults)
 
 
 def _not_to_be_compared(
@@ -102,9 +102,9 @@ def _not_to_be_compared(
     return None if faults.loaded_forces() else Message("diagnosis.no-force-used")
 
 
-def conclude(bench: Workbench, settings: DiagnosisSettings) -> Conclusion:
+def conclude(bench: Workbench) -> Conclusion:
     """Refit suspects and pairs of them, and say what is believed; displacements are as exact as the log tells."""
-    return conclusion_of(bench, searched(bench, settings))
+    return conclusion_of(bench, searched(bench))
 
 
 def concluded(
@@ -115,7 +115,7 @@ def concluded(
     What is found then is held against the exact displacements once more: a search that had missed it took what it
     leaves for scatter.
     """
-    search = searched(bench, settings)
+    search = searched(bench)
     first = conclusion_of(bench, search)
     chance, std = _scatter(bench, first)
     if (
@@ -126,7 +126,7 @@ def concluded(
     again = prepare(scattered, settings, graph=graph)
     if isinstance(again, Message):
         return faults, bench, first
-    second = conclude(again, settings)
+    second = conclude(again)
     if second.accepted is not None:
         exact = with_exact_displacements(bench.observation, bench.base, second.accepted.fitted)
         search.add([explanation_of(second.accepted.causes, bench.base, exact)] if exact else [])

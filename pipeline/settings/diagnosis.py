@@ -31,13 +31,6 @@ class DiagnosisSettings(BaseModel):
 
     # naming
     twin_cosine: float = Field(0.95, description="|cos| above which two causes that remove as much are one class")
-    search_newton_steps: int = Field(
-        40_000,
-        gt=0,
-        description="Newton steps after which the search for two causes begins nothing further; 1,000 to 3,000 a"
-        " second; searches that found their pair took 5,000 to 30,000",
-    )
-
     powerless: float = Field(
         0.34, description="share of the causes; `underpowered` if fewer would have shown at a plausible size"
     )

@@ -46,7 +46,7 @@ def result_of(name):
     test = hidden_test(cable, protocol, largest=LARGEST, seed=21)
     causes = [cause for cause in CATALOGUE if cause.name == name]
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
-    part = present(bench, conclude(bench, SETTINGS), SETTINGS)
+    part = present(bench, conclude(bench), SETTINGS)
     specimen = SpecimenPart(id="hidden", length_m=cable.length, diameter_m=0.005, folder=".", moving_bearing="left")
     return Result(status="measured", specimen=specimen, diagnosis=part)
 

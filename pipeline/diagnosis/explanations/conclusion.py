@@ -31,8 +31,6 @@ class Conclusion:
         For each of its causes the names that may stand in its place, itself first.
     unmodelled : bool
         Whether something is likelier that no cause of the catalogue makes.
-    curtailed : bool
-        Whether the search for causes was ended before its end.
     """
 
     posterior: Posterior
@@ -40,7 +38,6 @@ class Conclusion:
     accepted: Explanation | None
     classes: tuple[tuple[int, ...], ...]
     unmodelled: bool
-    curtailed: bool = False
 
     def fitted(self, bench: Workbench) -> Fit:
         """The model that was concluded: extended where something was accepted, else the base model."""
@@ -63,7 +60,7 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
     believed = search.posterior
     word = believed.word
     if word == "base":
-        return Conclusion(believed, search.grid, None, (), unmodelled=False, curtailed=search.curtailed)
+        return Conclusion(believed, search.grid, None, (), unmodelled=False)
     unmodelled = word == "rest"
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
     refits = believed.beside_something_else() if unmodelled else believed.explanations(count=count)
@@ -71,9 +68,9 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
     accepted = None if first is None else first.found
     if accepted is None or unmodelled:
         alone = () if accepted is None else tuple((cause,) for cause in accepted.causes)
-        return Conclusion(believed, search.grid, accepted, alone, unmodelled=True, curtailed=search.curtailed)
+        return Conclusion(believed, search.grid, accepted, alone, unmodelled=True)
     classes = _classes(bench, believed, accepted)
-    return Conclusion(believed, search.grid, accepted, classes, unmodelled=False, curtailed=search.curtailed)
+    return Conclusion(believed, search.grid, accepted, classes, unmodelled=False)
 
 
 def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tuple[tuple[int, ...], ...]:

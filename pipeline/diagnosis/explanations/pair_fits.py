@@ -1,10 +1,9 @@
-"""Pairs of causes as they are fitted: the best of the linear search, the best single cause with what scores beside it.
+"""Pairs of causes as they are fitted: a single cause with what scores beside it.
 
-The linear search is exhaustive about the base model, and only a start: amounts of two causes at once come from it, the
-rest from refits. A pair then gets all forms of its causes, as a single cause has: without its lesser part a load at an
-angle left a wrong pair the better one. Forms with a place of their own (elements of friction, profiles along the cable)
-cost several refits, so only the best pairs get them (`in_any_form`): beside friction of the bearings a loop of two
-elements fitted by one was a quarter too small and left more than noise, so two right names were refused.
+A pair gets all forms of its causes, as a single cause has: without its lesser part a load at an angle left a wrong pair
+the better one. Forms with a place of their own (elements of friction, profiles along the cable) cost several refits, so
+only the best pairs get them (`in_any_form`): beside friction of the bearings a loop of two elements fitted by one was a
+quarter too small and left more than noise, so two right names were refused.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.candidates import LEAST, MARGIN
-from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
+from pipeline.diagnosis.explanations.candidates import LEAST
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import fit_terms
@@ -23,57 +21,13 @@ from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench, laid_along
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.diagnosis.statistics.pairs import Pair, best_pairs, pair_gains
-from pipeline.diagnosis.statistics.twins import cosines
 
 
-def linear_pairs(bench: Workbench) -> list[Pair]:
-    """Best pairs of the exhaustive linear search about the base model that are worth a refit."""
-    suspicion = bench.suspicion
-    cosine = cosines(suspicion.scores.unit)
-    gains = pair_gains(suspicion.scores.z, cosine, suspicion.sign, suspicion.owner)
-    # a tuned place or width costs two of chi-square (Akaike): a smooth form that does nearly as well comes first
-    cost = 2.0 * np.array([len(term.variant.tuned) for term in suspicion.terms])
-    gains = np.maximum(gains - cost[:, None] - cost, 0.0)
-    pairs = best_pairs(gains, suspicion.owner, count=PAIRS)
-    least = pairs[0].gain - max(LEAST, MARGIN * pairs[0].gain) if pairs else 0.0
-    return [pair for pair in pairs if pair.gain > least]
-
-
-def refitted_pairs(
-    bench: Workbench,
-    pairs: list[Pair],
-    *,
-    hopeless: float,
-    effort: Effort = TO_THE_END,
-) -> list[Explanation]:
-    """The pairs, fitted in full from their linear amounts; the best two in any case."""
-    suspicion, found = bench.suspicion, []
-    z, norm, unit = suspicion.scores.z, suspicion.scores.norm, suspicion.scores.unit
-    for rank, pair in enumerate(pairs):
-        if rank > 1 and effort.spent:
-            break
-        one, other = pair.first, pair.second
-        c = float(unit[:, one] @ unit[:, other])
-        amounts = tuple(
-            float((z[own] - c * z[rest]) / (1.0 - c * c) / norm[own]) for own, rest in ((one, other), (other, one))
-        )
-        fitted = fit_terms(bench.observation, bench.base, suspicion, (one, other), amounts=amounts, hopeless=hopeless)
-        if fitted is not None:
-            causes = (int(suspicion.owner[one]), int(suspicion.owner[other]))
-            found.append(explanation_of(causes, bench.base, fitted))
-    return found
-
-
-def pairs_beside(
-    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], *, effort: Effort = TO_THE_END
-) -> list[Explanation]:
-    """The best single cause with each of some others, those in the model already left out."""
+def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
+    """A single cause with each of some others, those in the model already left out."""
     found = []
     for cause in causes:
         direction = second.best(cause)
-        if effort.spent:
-            break
         if cause == best.causes[0] or direction is None:
             continue
         fitted = fit_terms(bench.observation, best.fitted, second, (direction,))
@@ -109,25 +63,16 @@ def with_own_forms(bench: Workbench, pair: Explanation, *, rival: float) -> Expl
     return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
 
 
-def in_any_form(
-    bench: Workbench,
-    found: Sequence[Explanation],
-    *,
-    effort: Effort = TO_THE_END,
-) -> list[Explanation]:
+def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanation]:
     """What the best pairs become with further forms of their own place, and with profiles of any form.
 
     One that cannot come near the best one so far, as far as its scores tell, is left out.
     """
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
-        if effort.spent:
-            break
         rival = min(e.fitted.chi2 for e in (*found, *new))
         fitted, hopeless = pair.fitted, rival + LEAST
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-            if effort.spent:
-                break
             fitted = with_free_profile(bench.observation, fitted, kind, hopeless=hopeless)
             if is_profile(kind) or not kind.combines:
                 continue
@@ -137,9 +82,6 @@ def in_any_form(
             new.append(explanation_of(pair.causes, bench.base, fitted))
     return new
 
-
-PAIRS = 6
-"""Best pairs of the exhaustive linear search that are refitted; time."""
 
 IN_ANY_FORM = 2
 """Pairs, the best first, that get forms with a place of their own; time."""

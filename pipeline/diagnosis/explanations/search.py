@@ -1,8 +1,8 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what scores beside the best of them, and pairs of the exhaustive linear search, refitted -> pairs pruned of what they
-do not need -> where something else is likelier still, the best cause with all others -> probabilities of all.
+-> what scores beside those that the data allow refitted -> pairs pruned of what they do not need -> where something
+else is likelier still, the best cause with all others -> probabilities of all.
 
 A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
 2.5 standard deviations of nothing is fitted again without it.
@@ -11,20 +11,11 @@ A refit may fail to find its valley where another one, from beside it, does: so 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import candidates
-from pipeline.diagnosis.explanations.effort import TO_THE_END, Effort
-from pipeline.diagnosis.explanations.pair_fits import (
-    in_any_form,
-    linear_pairs,
-    pairs_beside,
-    refitted_pairs,
-    settled,
-    with_all_forms,
-)
+from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, settled, with_all_forms
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
@@ -33,8 +24,6 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
-from pipeline.diagnosis.statistics.pairs import Pair
-from pipeline.settings.diagnosis import DiagnosisSettings
 
 MATTERS = 0.1
 """Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
@@ -43,11 +32,7 @@ ALSO = 0.01
 """Probability of a cause by the linear model from which it is refitted besides those that come near the best score."""
 
 LIKELIEST = 4
-"""Refits, the likeliest first, that are weighed with something else besides."""
-
-MASKED = 20.0
-"""Chi-square that the best pair must remove beyond the best single score for pairs to be refitted where no cause is
-likely by itself; time."""
+"""Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""
 
 NEEDED = 2.5
 """Standard deviations from nothing that each member of a pair must have to be left in it."""
@@ -56,14 +41,13 @@ NEEDED = 2.5
 class Search:
     """Hypotheses about one specimen as they are found, and their probabilities."""
 
-    def __init__(self, bench: Workbench, settings: DiagnosisSettings) -> None:
-        self.bench, self.settings, self.effort = bench, settings, TO_THE_END
+    def __init__(self, bench: Workbench) -> None:
+        self.bench = bench
         self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
         first = weighed(self.grid, bench.base, bench.suspicion)
         self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]
         self.hypotheses += [Hypothesis((cause,), *values) for cause, values in first.further.items()]
-        self.curtailed = False
 
     @property
     def posterior(self) -> Posterior:
@@ -108,35 +92,34 @@ class Search:
                 yield one
 
     def beside(self, best: Explanation) -> Suspicion:
-        """Scores of all causes about the best single cause."""
+        """Scores of all causes about a single cause."""
         return suspect(self.bench.observation, best.fitted, self.bench.suspicion.causes)
 
-    def pairs(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> None:
-        """Refit pairs: of the linear search, and what scores beside the best single cause."""
-        bench, self.effort = self.bench, Effort.of(self.settings.search_newton_steps)
-        hopeless = bench.base.chi2 if best is None else best.fitted.chi2
-        found = refitted_pairs(bench, linear, hopeless=hopeless, effort=self.effort)
-        near = [] if second is None else candidates(second)[:2]
-        if best is not None and second is not None:
-            found += pairs_beside(bench, best, second, near)
+    def pairs(self, singles: Sequence[Explanation], best: Explanation, second: Suspicion) -> None:
+        """Refit pairs: each single cause that these data allow with the two that score most beside it."""
+        bench, near = self.bench, candidates(second)[:2]
+        found = pairs_beside(bench, best, second, near)
+        for one in singles:
+            if one is not best:
+                beside = self.beside(one)
+                found += pairs_beside(bench, one, beside, candidates(beside)[:2])
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         self.add(list(self._pruned(found)))
         believed = self.posterior
         # before something is called unexplained, the best cause is fitted with every other one
-        if believed.word == "rest" and best is not None and second is not None:
+        if believed.word == "rest":
             every = candidates(second, margin=1.0, most=len(second.causes))
             others = [cause for cause in every if cause not in near]
-            found += self.add(pairs_beside(bench, best, second, others, effort=self.effort))
+            found += self.add(pairs_beside(bench, best, second, others))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
         forms = with_all_forms(bench, found)
         new = [one for one in forms if one not in found]
-        new += in_any_form(bench, forms, effort=self.effort)
+        new += in_any_form(bench, forms)
         new = self.add(new)
         self.add(list(self._pruned(new)))
-        self.curtailed |= self.effort.spent
 
     def _pruned(self, pairs: Sequence[Explanation]) -> Iterator[Explanation]:
         """Pairs without a member that they do not need, the rest fitted again where no single refit is as good."""
@@ -153,51 +136,28 @@ class Search:
                 reached[left] = min(rest.chi2, reached.get(left, np.inf))
                 yield explanation_of(left, self.bench.base, rest)
 
-    def pairs_speak(self, best: Explanation | None, second: Suspicion | None, linear: list[Pair]) -> bool:
+    def pairs_speak(self, best: Explanation, second: Suspicion) -> bool:
         """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
-        bench, rest, ahead = self.bench, self.hypotheses[0].rest, 0.0
-        if best is not None and second is not None:
-            beside = weighed(self.grid.plain, best.fitted, second)
-            mine = next(one.plain for one in self.hypotheses if one.found is best)
-            for cause, (plain, _) in beside.further.items():
-                if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
-                    self.hypotheses.append(Hypothesis((*best.causes, cause), plain + mine - beside.own.plain, rest))
-            # how far the linear model is off for the best single cause it is for pairs
-            direction = bench.suspicion.best(best.causes[0])
-            ahead = 0.0 if direction is None else mine - linearly(bench, self.grid, (direction,)).plain
-        for pair in linear:
-            found = linearly(bench, self.grid, (pair.first, pair.second))
-            self.hypotheses.append(found._replace(plain=found.plain + ahead, rest=rest, found=None))
+        beside, rest = weighed(self.grid.plain, best.fitted, second), self.hypotheses[0].rest
+        mine = next(one.plain for one in self.hypotheses if one.found is best)
+        for cause, (plain, _) in beside.further.items():
+            if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
+                self.hypotheses.append(Hypothesis((*best.causes, cause), plain + mine - beside.own.plain, rest))
         believed = self.posterior
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
 
 
-def linearly(bench: Workbench, grid: ErrorGrid, directions: tuple[int, ...]) -> Hypothesis:
-    """Causes by the linear model of the base with further columns, as if it had been fitted with all amounts zero."""
-    base, seen = bench.base, bench.suspicion
-    terms = [seen.terms[k] for k in directions]
-    held = tuple(term._replace(variant=replace(term.variant, tuned=())) for term in terms)
-    extension = replace(base.extension, terms=(*base.extension.terms, *held))
-    vector, columns = np.r_[base.vector, np.zeros(len(terms))], seen.columns[:, directions]
-    fitted = replace(base, extension=extension, vector=vector, jacobian=np.hstack([base.jacobian, columns]))
-    causes = tuple(int(seen.owner[k]) for k in directions)
-    return refitted(grid.plain, explanation_of(causes, base, fitted), bench.facts)
-
-
-def searched(bench: Workbench, settings: DiagnosisSettings) -> Search:
+def searched(bench: Workbench) -> Search:
     """All hypotheses about a specimen that are worth it, weighed."""
-    search = Search(bench, settings)
-    every = linear_pairs(bench)
-    linear = [pair for pair in every if pair.gain > bench.largest**2 + MASKED]
+    search = Search(bench)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    if silent and first.word == "base" and not linear and bench.largest < bench.limit:
+    if silent and first.word == "base" and bench.largest < bench.limit:
         return search
-    singles = search.singles()
-    believed = search.posterior.explanations(count=1)
-    best = believed[0].found if believed else max(singles, key=lambda e: e.gain, default=None)
-    second = None if best is None else search.beside(best)
-    if search.pairs_speak(best, second, every):
-        search.pairs(best, second, linear or every)
+    search.singles()
+    credible = [one.found for one in search.posterior.credible() if one.found is not None][:LIKELIEST]
+    best = next((one.found for one in search.posterior.explanations(count=1)), None)
+    if best is not None and search.pairs_speak(best, second := search.beside(best)):
+        search.pairs(credible, best, second)
     return search

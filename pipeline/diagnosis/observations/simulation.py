@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
-from pipeline.diagnosis.observations.work import counted
 from rod.equilibrium import Branch, Equilibrium, solve
 from rod.newton import Outcome
 from rod.parameters import Parameter
@@ -136,7 +135,6 @@ def _simulated(model: Model, facts: Facts, near: Run | None, *, patient: bool) -
             memory = replace(memory, step=i)
             hold = model.bending.hold("forces", 0.0) if free else model.bending.hold("displacements", displacement[i])
             here = solve(model.bending.rod_at(i), hold, memory=memory, start=start, branch=side, patient=patient)
-            counted(here.iterations)
             if not here.good:
                 return (here,)
             memory, last = here.after, here

@@ -1,6 +1,6 @@
 """What a conclusion asks the reader to know beside its sentence: a cause that is too large, a search that was ended.
 
-Codes: ``diagnosis/impossible-size``, ``diagnosis/search-ended``.
+Code: ``diagnosis/impossible-size``.
 """
 
 from __future__ import annotations
@@ -27,8 +27,3 @@ def too_large(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
 
 IMPOSSIBLE = 20.0
 """Plausible sizes: a tilt of 40 degrees, stiff ends over a third of the cable, all force lost in a hold."""
-
-
-def search_ended(conclusion: Conclusion) -> tuple[Finding, ...]:
-    """That not everything was tried, where the search was ended."""
-    return (doubtful("diagnosis/search-ended"),) if conclusion.curtailed else ()

@@ -1,35 +1,19 @@
-"""Two causes at once: every pair on the linear scores.
+"""Two directions at once: what every pair of them removes, on the linear scores.
 
 In: scores ``z``, cosines, owners and admissible signs of all directions. Out: for each pair of directions of different
 causes the chi-square it removes,
 
     gain = (z_i^2 + z_j^2 - 2 c z_i z_j) / (1 - c^2),
 
-where both conditional amounts ``a_i ~ (z_i - c z_j) / (1 - c^2)`` have their admissible sign. Greedy search (the best
-single cause first, then the next) saturates: two causes may look like a third. With K directions all pairs are K^2/2
-numbers, so none is left out.
+where both conditional amounts ``a_i ~ (z_i - c z_j) / (1 - c^2)`` have their admissible sign.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.statistics.score import descending
-
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two directions and the chi-square they remove together."""
-
-    first: int
-    second: int
-    gain: float
-
 
 COLLINEAR = 0.985
 """|cos| above which the split between two causes is noise."""
@@ -48,19 +32,3 @@ def pair_gains(z: Array, cosine: Array, sign: Array, owner: NDArray[np.int_], *,
     right = (sign[:, None] == 0) | (sign[:, None] * amount > 0.0)
     gain = (z[:, None] ** 2 + z[None, :] ** 2 - 2.0 * cosine * z[:, None] * z[None, :]) / safe
     return np.where(allowed & right & right.T, gain, 0.0)
-
-
-def best_pairs(gains: Array, owner: NDArray[np.int_], *, count: int) -> list[Pair]:
-    """Best direction pair of each pair of causes, the best ``count`` of them, best first."""
-    row, column = np.triu_indices(len(gains), 1)
-    value = gains[row, column]
-    found: list[Pair] = []
-    seen: set[frozenset[int]] = set()
-    for at in descending(value):
-        if len(found) == count or value[at] <= 0.0:
-            break
-        names = frozenset((int(owner[row[at]]), int(owner[column[at]])))
-        if names not in seen:
-            seen.add(names)
-            found.append(Pair(int(row[at]), int(column[at]), float(value[at])))
-    return found

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, THREE, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
@@ -95,14 +95,6 @@ def test_a_strong_profile_beside_another_cause_is_one_of_two_names():
     assert part.verdict == "two_causes", part.headline
     assert {cause.name for cause in part.causes} == {"pre_curvature_varying", "rig_compliance"}
     assert f_error(part.extended, cable)[0] < 0.02 and findings == ()
-
-
-def test_the_end_of_a_search_is_told_only_where_a_second_cause_was_suspected():
-    """Refits of single causes count for the search; where nothing speaks for a second one there was none to end."""
-    hasty = SETTINGS.model_copy(update={"search_newton_steps": 1})
-    test = hidden_test(Cable(), SIX, largest=0.0138, seed=60404, reading=Reading(scale_error=4e-3))
-    part, findings, _ = diagnose(faults_of_input(test), None, hasty)
-    assert part.verdict == "named" and findings == ()
 
 
 def test_size_of_a_profile_is_told_where_photos_show_it():

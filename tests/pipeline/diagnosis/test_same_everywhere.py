@@ -21,7 +21,7 @@ def answer(test, names):
     """Names of the class, the causes accepted, whether more is left than noise; and the probability of the first."""
     causes = [cause for cause in CATALOGUE if cause.name in names]
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
-    found = conclude(bench, SETTINGS)
+    found = conclude(bench)
     names = " / ".join(" ".join(causes[k].name for k in place) for place in found.classes)
     return (names, found.unmodelled), found.posterior.total(count=0, something_else=False)
 

@@ -11,10 +11,10 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.fits.base import start
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
+from pipeline.diagnosis.observations import simulation
 from pipeline.diagnosis.observations.observation import observe
 from pipeline.diagnosis.observations.prediction import facts_of
 from pipeline.diagnosis.observations.simulation import run
-from pipeline.diagnosis.observations.work import newton_steps
 
 TEST = hidden_test(Cable(), PROTOCOLS["loop"], largest=LARGEST, seed=1)
 FACTS = facts_of(TEST)
@@ -53,7 +53,7 @@ FORMS = [(cause.name, form) for cause in CATALOGUE for form in range(len(cause.v
 
 
 @pytest.mark.parametrize(("name", "form"), FORMS)
-def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name, form):
+def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name, form, monkeypatch):
     (cause,) = (cause for cause in CATALOGUE if cause.name == name)
     beside = next(one for one in CATALOGUE if one.name == ("in_plane_load" if name == "hysteresis" else "hysteresis"))
     terms = (Term(cause, cause.variants(FACTS)[form]), Term(beside, beside.variants(FACTS)[0]))
@@ -61,9 +61,9 @@ def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name,
     vector = extension.start(extension.base.neutral(), (cause.plausible(FACTS), 0.2 * beside.plausible(FACTS)))
     observation, base_model = observe(TEST, SETTINGS), extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), FACTS)
-    counted = newton_steps()
+    monkeypatch.setattr(simulation, "solve", None)  # nothing is simulated for it
     jacobian = sensitivities(observation, extension, vector, base_model, here)
-    assert newton_steps() == counted  # nothing is simulated for it
+    monkeypatch.undo()
     for j in range(len(extension.base.names) + terms[0].size):
         quotient = central(observation, extension, vector, here, j)
         error = jacobian[:, j] - quotient

@@ -1,69 +1,29 @@
 """Two causes: which pair, and what may stand in the place of each."""
 
-from types import SimpleNamespace
-
-import numpy as np
-import pytest
-
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations import search
-from pipeline.diagnosis.explanations.effort import Effort
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
-from pipeline.diagnosis.explanations.pair_fits import in_any_form, refitted_pairs, with_all_forms
+from pipeline.diagnosis.explanations.pair_fits import with_all_forms
+from pipeline.diagnosis.explanations.refit import fit_terms
 from pipeline.diagnosis.fits.workbench import prepare
-from pipeline.diagnosis.observations.work import newton_steps
-from pipeline.diagnosis.statistics.pairs import Pair
+from pipeline.diagnosis.posterior.explanation import explanation_of
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
 
 
-def test_a_search_whose_effort_is_spent_begins_nothing():
-    assert in_any_form(SimpleNamespace(), [SimpleNamespace(causes=(0, 1), worth=1.0)], effort=Effort.of(-1)) == []
-    assert not Effort().spent
-
-
-@pytest.fixture(scope="module")
-def lens_and_relaxation():
+def test_a_lens_beside_a_force_that_decays_is_no_wrong_scale():
+    """Which moves the same points."""
     steps = Protocol((0.0, 1 / 3, 2 / 3, 1.0), ("mounted", *("loading",) * 3))
     reading = Reading(lens=2e-3, relaxation=(0.03, 7.0))
-    return hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)
-
-
-def counted(test, settings):
-    """What is diagnosed, the codes of its findings, and the Newton steps that took."""
-    before = newton_steps()
-    part, findings, _ = diagnose(faults_of_input(test), None, settings)
-    return part, [finding.code for finding in findings], newton_steps() - before
-
-
-@pytest.fixture(scope="module")
-def searched(lens_and_relaxation):
-    return counted(lens_and_relaxation, SETTINGS)
-
-
-def test_a_search_that_is_ended_says_so_and_ends_at_the_same_place_each_time(lens_and_relaxation, searched):
-    """Effort is counted in Newton steps: how busy the machine is decides nothing."""
-    hasty = SETTINGS.model_copy(update={"search_newton_steps": 1})
-    spent = []
-    for _ in range(2):
-        _, codes, steps = counted(lens_and_relaxation, hasty)
-        spent.append(steps)
-        assert codes.count("diagnosis/search-ended") == 1
-    assert spent[0] == spent[1] > 100  # four equilibria of some three steps each, in tens of fits
-    _, codes, steps = searched
-    assert steps > spent[0]
-    assert "diagnosis/search-ended" not in codes
-
-
-def test_a_lens_beside_a_force_that_decays_is_no_wrong_scale(searched):
-    """Which moves the same points."""
-    part, _, _ = searched
+    part, _, _ = diagnose(
+        faults_of_input(hidden_test(Cable(), steps, largest=0.0138, seed=21, reading=reading)), None, SETTINGS
+    )
     assert part.verdict == "two_causes", part.headline
     assert {cause.name for cause in part.causes} == {"lens_distortion", "relaxation"}, part.headline
 
@@ -76,8 +36,8 @@ def test_each_half_of_a_pair_has_all_its_forms():
     bench = prepare(faults_of_input(test), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
-    given = Pair(bench.suspicion.best(load), bench.suspicion.best(lens), 0.0)
-    (half,) = refitted_pairs(bench, [given], hopeless=np.inf)
+    loudest = bench.suspicion.best(load), bench.suspicion.best(lens)
+    half = explanation_of((load, lens), bench.base, fit_terms(bench.observation, bench.base, bench.suspicion, loudest))
     (whole,) = with_all_forms(bench, [half])
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SHAPE_GAIN
     amount, std = whole.amount(SUSPECTS[lens])
@@ -89,7 +49,7 @@ def test_every_cause_is_tried_before_something_is_called_unexplained(monkeypatch
     bench = prepare(faults_of_input(hidden_test(Cable(rigid_end=0.0163), SIX, largest=0.0138, seed=3)), SETTINGS)
     names = [cause.name for cause in bench.suspicion.causes]
     monkeypatch.setattr(search, "candidates", lambda *_, **__: [names.index("in_plane_load")])
-    seeking = search.Search(bench, SETTINGS)
+    seeking = search.Search(bench)
     seeking.hypotheses = seeking.hypotheses[:1]  # no score promises anything
     assert seeking.posterior.word == "rest"
     best = min(seeking.singles(), key=lambda one: one.fitted.chi2)
