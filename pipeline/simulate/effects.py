@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.messages import Message
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest
@@ -30,12 +31,7 @@ Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0 .. 10 1/m, as in the paper's Table 1
-ONE_SIDED = frozenset(
-    {
-        *("hysteresis", "plastic_set", "relaxation", "bearing_friction", "bearing_stiffness", "rigid_ends"),
-        *("rig_compliance", "out_of_plane_bow"),
-    }
-)  # their sizes cannot be negative, as in the catalogue of causes
+ONE_SIDED = frozenset(cause.name for cause in CATALOGUE if cause.sign)  # their sizes cannot be negative
 POSSIBLE = {
     "stiffness_varying": (-1.0, 1.0),  # a stiffness is positive
     "relaxation": (-1.0, 1.0),  # no more than all of a force is lost
