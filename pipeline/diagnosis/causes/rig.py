@@ -21,6 +21,9 @@ from pipeline.diagnosis.observations.prediction import Facts, Model
 UNDER_LOAD = "mounted under the load"
 """Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""
 
+WITH_FORCE = "that grows with the force"
+"""Label of the friction of a bearing without preload: Coulomb's, by the measured force."""
+
 
 class BearingFriction(Cause):
     """``bearing_friction``: Coulomb moment in each bearing."""
@@ -35,18 +38,23 @@ class BearingFriction(Cause):
         return 0.03 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, slipping at once or only after they have been turned by some angle."""
+        """Both bearings alike, slipping at once or only after they have been turned by some angle.
+
+        The friction of a seal is one moment, that of a journal grows with the force on it.
+        """
         yielding = Variant("that yields before it slips", at=0.03, tuned=("at",), at_range=(0.004, 0.1))
-        return (Variant("that slips at once"), yielding)
+        return (Variant("that slips at once"), Variant(WITH_FORCE), yielding)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
 
-        A form of `by_step` adds ``amount`` at the step ``at``.
+        That which grows with the force is ``amount`` at the largest one; a form of `by_step` adds ``amount`` at the
+        step ``at``.
         """
         bending = model.bending
-        if np.isfinite(variant.known):
-            more = amount * np.eye(len(facts.branch))[int(variant.at)]
+        if np.isfinite(variant.known) or variant.label == WITH_FORCE:
+            share = facts.pressed if variant.label == WITH_FORCE else np.eye(len(facts.branch))[int(variant.at)]
+            more = amount * share
             before = 0.0 if bending.friction_by_step is None else bending.friction_by_step
             return replace(model, bending=replace(bending, friction_by_step=before + more))
         angle = variant.at or bending.left.stick_angle

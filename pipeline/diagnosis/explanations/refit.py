@@ -1,8 +1,8 @@
 """Terms put beside what a fitted model has already, and everything fitted again in full.
 
 Scores are local: their amounts are right only as far as the model is linear. A refit starts from that linear estimate,
-the other parameters moved out of the new terms' place, or from the share of it that fits best; and from the law and
-K0 that photos show, where the base model went elsewhere.
+the other parameters moved out of the new terms' place, or from the share of it that fits best; and from another K0,
+where the base model may have gone elsewhere.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def fit_terms(
         amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
     added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
     best: Fit | None = None
-    for start in (linear_start(observation, added), *_as_seen(added)):
+    for start in (linear_start(observation, added), *_elsewhere(added)):
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
@@ -146,12 +146,17 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
     return np.inf if value is None else float(value @ value)
 
 
-def _as_seen(added: Addition) -> list[Array]:
-    """A start with the law and K0 that photos show, where the base model went elsewhere.
+def _elsewhere(added: Addition) -> list[Array]:
+    """Starts with the law and K0 that photos show, and from the other side of straight, where K0 may lie there.
 
-    A load in the plane may turn the mounted cable over, and no base model without it has a K0 of the true sign.
+    A load in the plane may turn the mounted cable over, and no base model without it has a K0 of the true sign. Where
+    no photo at rest shows the side, friction of the bearings does the same.
     """
     base, facts = added.base.extension.base, added.base.extension.facts
-    seen = base.as_seen()
-    apart = abs(base.pre_curvature(seen) - base.pre_curvature(added.base.vector)) > ELSEWHERE * facts.curvature_scale
-    return [added.start(seen)] if apart and len(seen) == len(added.base.vector) else []
+    at = base.pre_curvature_index
+    if at is None or len(base.names) != len(added.base.vector):
+        return []
+    K0, seen, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral()
+    mirrored[at] = -K0
+    starts = [seen] if abs(float(seen[at]) - K0) > ELSEWHERE * facts.curvature_scale else []
+    return [added.start(vector) for vector in (starts if "mounted" in facts.branch else [*starts, mirrored])]

@@ -53,6 +53,8 @@ class Facts:
         Largest force, and largest force times bow.
     curvature_scale : 1/m
         Range of the curvatures met.
+    pressed : (n,)
+        Measured force, as a share of the largest one.
     bends : (n,) 1/m
         Largest bend from rest up to each step, by a fitted model; empty before any is.
     rest_side : {"natural", "up", "down"}
@@ -73,6 +75,7 @@ class Facts:
     force_scale: float
     moment_scale: float
     curvature_scale: float
+    pressed: Array
     bends: Array = field(default_factory=lambda: np.zeros(0))
     rest_side: Branch = "natural"
 
@@ -98,7 +101,8 @@ def facts_of(test: MeasuredTest) -> Facts:
     shapes = [step.shape for step in steps if step.shape is not None]
     bow = max((float(np.max(np.abs(shape.y))) for shape in shapes), default=0.2 * test.length)
     bend = max((_range(shape.kappa[shape.seen]) for shape in shapes if np.any(shape.seen)), default=0.0)
-    force = max(abs(step.force) for step in steps)
+    forces = np.array([abs(step.force) for step in steps])
+    force = float(forces.max())
     timed = all(step.hold_times is not None and step.time is not None for step in steps)
     begin, holds, photo, number = [], [], [], 0.0
     for step in steps:
@@ -125,6 +129,7 @@ def facts_of(test: MeasuredTest) -> Facts:
         force_scale=force,
         moment_scale=force * bow,
         curvature_scale=bend or 1.0 / test.length,
+        pressed=forces / (force or 1.0),
         rest_side=_rest_side(steps),
     )
 
