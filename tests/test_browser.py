@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import re
 import shutil
-import tomllib
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +24,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from pipeline.intake.photohints import read_hints
+from pipeline.intake.tomltable import read_toml
 from pipeline.messages import free_text
 from pipeline.report.document import write_report
 from pipeline.report.index import write_index, write_rows
@@ -175,18 +176,30 @@ def test_centerline_is_toggled(show, site):
     assert shown(driver, line)
 
 
-def test_clicks_on_a_photo_become_lines_of_the_specimen_file(show, site):
+def test_clicks_on_a_photo_become_lines_of_the_specimen_file(show, site, tmp_path):
     driver, photo = show(f"{site}/cable-0/report.html", PHONE), measured_result().photos[0]
-    for key in ("use", "ends_px", "region_px"):
-        Select(one(driver, "#mark")).select_by_value(key)
-        for axis in reversed(shown(driver, "article.photo:not([hidden]) circle:not(.mark)")):
-            ActionChains(driver).move_to_element(axis).click().perform()
-    (told,) = tomllib.loads(one(driver, "#mark-lines").text)["photos"]
-    assert (told["image"], told["use"]) == (photo.image, False)
-    ends = (photo.right_px, photo.left_px)
-    pixel = photo.preview.reduction * photo.preview.width / one(driver, "article.photo:not([hidden]) img").rect["width"]
-    assert np.ravel(told["ends_px"]) == pytest.approx(np.ravel(ends), abs=pixel)
-    assert told["region_px"] == pytest.approx([*np.min(ends, axis=0), *np.max(ends, axis=0)], abs=pixel)
+    left, right = shown(driver, "article.photo:not([hidden]) circle:not(.mark)")
+    places = [(right, 0, 0), (left, 30, -15), (left, 0, 0)]  # and so many px of the screen beside
+    begun = {"ends_px": 1, "path_px": 1, "region_px": 1, "exclude_px": 2}
+    clicks = {"use": 1, "ends_px": 2, "path_px": 3, "region_px": 2, "exclude_px": 3}
+    for numbers in (begun, clicks):
+        for key, count in numbers.items():
+            Select(one(driver, "#mark")).select_by_value("")
+            Select(one(driver, "#mark")).select_by_value(key)
+            for place in places[:count]:
+                ActionChains(driver).move_to_element_with_offset(*place).click().perform()
+        assert one(driver, "#marked").is_displayed() == (numbers is clicks)  # what is half done is no line yet
+    assert len(shown(driver, "circle.mark")) == sum(clicks.values())
+    (tmp_path / "specimen.toml").write_text(one(driver, "#mark-lines").text)
+    ((image, told),) = read_hints(read_toml(tmp_path / "specimen.toml", limit=10_000)).items()
+    assert (image, told.use) == (photo.image, False)
+    picture = one(driver, "article.photo:not([hidden]) .picture")
+    pixel = photo.preview.reduction * photo.preview.width / picture.rect["width"]
+    points = np.array([photo.right_px, np.add(photo.left_px, (30 * pixel, -15 * pixel)), photo.left_px])
+    assert np.array(told.ends_px) == pytest.approx(points[:2], abs=pixel)
+    assert np.array(told.path_px) == pytest.approx(points, abs=pixel)
+    assert np.array(told.exclude_px) == pytest.approx(points[None], abs=pixel)
+    assert told.region_px == pytest.approx([*points[:2].min(axis=0), *points[:2].max(axis=0)], abs=pixel)
 
 
 def test_pointing_at_the_characteristic_tells_value_band_and_photos(show, site):

@@ -74,7 +74,7 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     if part is None:
         return []
     rows = [
-        (words("fit_outcome"), words.said(part.said).text if part.advice else part.outcome),
+        (words("fit_outcome"), words.said(part.said).sentence if part.advice else part.outcome),
         (words("fit_iterations"), f"{part.iterations} ({words('exact')})"),
     ]
     if part.misfit is not None:

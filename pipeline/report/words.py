@@ -95,6 +95,11 @@ class Words:
         named = any(text.startswith(f"{said.values.get(key) or text} ") for key in ("id", "name", "a"))
         return Said(text, "en" if said.english else self.language, named)
 
+    def after_colon(self, said: Message) -> str:
+        """A message after a colon, where a German sentence has a capital."""
+        told = self.said(said)
+        return told.sentence if told.language == "de" else told.text
+
     def about(self, cause: str) -> tuple[str, str]:
         """What a cause is and what to do about it at the rig; empty for one that the catalogue does not have."""
         known = f"cause.{cause}" in catalogue(self.language)

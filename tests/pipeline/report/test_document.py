@@ -232,6 +232,7 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
         "Die Datei ist leer."
     )
     assert "Sie danach neu aufnehmen" in page
+    assert "Dieses Foto wurde nicht verwendet: Die Datei ist leer" in page and "abgelehnt: Die Datei ist leer" in page
     assert "simuliert</text>" not in page
 
 
