@@ -28,13 +28,11 @@ from pipeline.report.evidence import (
 )
 from pipeline.report.figures import force_unit, stiffness_unit
 from pipeline.report.files import write_atomic
-from pipeline.report.page import asset, environment, palette_css, unbroken
+from pipeline.report.page import asset, environment, palette_css
 from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
 from pipeline.result import Result, curves, set_aside
 from pipeline.settings import ReportSettings
-
-__all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
 
 
 def report_html(result: Result, settings: ReportSettings | None = None) -> str:

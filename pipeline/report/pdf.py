@@ -68,10 +68,11 @@ class Sheet:
             )
         self.y += 0.4 * size
 
-    def pairs(self, rows: list[tuple[str, str]], *, size: float = 8.5) -> None:
-        """Write names and texts, one pair a paragraph."""
+    def pairs(self, rows: list[tuple[str, str]], *, size: float) -> None:
+        """Write names and texts, one pair a paragraph, as long as there is room."""
         for name, text in rows:
-            self.text(f"{name}: {text}", size=size)
+            if self.room() > 24.0:
+                self.text(f"{name}: {text}", size=size)
 
     def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> Area:
         """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
@@ -239,9 +240,7 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         *source.facts,
     ]
     rows += [(name, digest[:16]) for name, digest in source.inputs]
-    for pair in rows:
-        if sheet.room() > 24.0:
-            sheet.pairs([pair], size=8.0)
+    sheet.pairs(rows, size=8.0)
     return sheet
 
 
@@ -272,9 +271,7 @@ def _diagnosis_sheet(
         sheet.y += 170.0
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]
-    for text in texts:
-        if sheet.room() > 24.0:
-            sheet.pairs([text], size=8.5)
+    sheet.pairs(texts, size=8.5)
     return sheet
 
 

@@ -11,11 +11,14 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.messages import PER, Message, catalogue, entry, sentence, word
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
+
+if TYPE_CHECKING:
+    from pipeline.result import BlindSpot
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 CODES = TABLE.with_name("codes.toml")
@@ -105,6 +108,11 @@ class Words:
         known = f"cause.{cause}" in catalogue(self.language)
         texts = Message(f"cause.{cause}").parts(self.language) if known else ("", "")
         return texts[0], texts[-1]
+
+    def blind_spot(self, key: str, spot: BlindSpot) -> str:
+        """A cause that these data could not have shown, by the words ``key``: what it would do to f_EI."""
+        bias = self.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), 2)
+        return self(key, name=self.cause(spot.name), bias=bias, settled=self.settled(spot.name))
 
     def settled(self, cause: str) -> str:
         """The measurement that settles a cause."""
