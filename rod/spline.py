@@ -1,4 +1,4 @@
-"""Natural cubic spline with linear ends as the derivative of its primitive, and that by the ordinates.
+"""Natural cubic splines with linear ends, kept as their primitives, which are linear in the ordinates.
 
 From knots to piecewise polynomials on all segments, the two unbounded ones included. The spline and its primitive are
 linear in the ordinates; the cardinal splines (one ordinate 1, the others 0) carry that derivative.

@@ -22,7 +22,7 @@ NAMES = 2
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause that was found: its size and probability in a line, what it is, and what to do about it (English)."""
+    """A cause that was found: its size and probability in a line, what it is, and what to do about it."""
 
     line: str
     summary: str = ""

@@ -89,7 +89,7 @@ class Cable:
 
     @property
     def area(self) -> float:
-        """Of the round section."""
+        """Area of the round section, m^2."""
         return float(np.pi * self.diameter**2 / 4.0)
 
     @property
