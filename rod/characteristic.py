@@ -122,12 +122,7 @@ class Characteristic:
 
     @classmethod
     def from_ordinates(
-        cls,
-        knots: ArrayLike,
-        ordinates: ArrayLike,
-        *,
-        reading: Reading = "tangent",
-        abscissa: Abscissa = "curvature",
+        cls, knots: ArrayLike, ordinates: ArrayLike, *, reading: Reading = "tangent", abscissa: Abscissa = "curvature"
     ) -> Characteristic:
         """Spline through the control points ``(knots, ordinates)``, 1/m and N m^2, in the given reading."""
         return cls(np.asarray(knots, float), np.asarray(ordinates, float), reading, abscissa)

@@ -28,12 +28,7 @@ if TYPE_CHECKING:
 @language_option
 @settings_options
 @click.pass_context
-def check(
-    ctx: click.Context,
-    folders: tuple[Path, ...],
-    timeout: float | None,
-    as_json: bool,
-) -> None:
+def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, as_json: bool) -> None:
     """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
     settings = chosen_settings(*limit)

@@ -43,10 +43,6 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     result : Result
         Measured, partly measured or failed.
     settings : ReportSettings, optional
-
-    Returns
-    -------
-    str
     """
     settings = settings or ReportSettings()
     words = Words(settings.language)
@@ -124,11 +120,5 @@ def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> 
 
 
 def write_report(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
-    """Write ``report.html`` into a folder, at once or not at all.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write ``report.html`` into a folder, at once or not at all; its path."""
     return write_atomic(Path(folder) / "report.html", report_html(result, settings))

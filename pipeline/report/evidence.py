@@ -188,7 +188,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
         rows.append(
             [
                 str(step.step),
-                words.branch(step.branch),
+                words.known(f"branch_{step.branch}", step.branch),
                 words.number(1e3 * step.displacement_m, 5),
                 unit.number(step.force_N, step.force_std_N),
                 unit.alike(step.force_fit_N, step.force_std_N),

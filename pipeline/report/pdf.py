@@ -80,10 +80,7 @@ class Sheet:
         x0, x1 = (MARGIN + share * inner for share in (left, right))
         # a part of a figure takes its place from the ratios of its grid alone: the part is the middle of nine fields
         grid = self.figure.add_gridspec(
-            3,
-            3,
-            width_ratios=(x0, x1 - x0, PAGE[0] - x1),
-            height_ratios=(self.y, height, PAGE[1] - self.y - height),
+            3, 3, width_ratios=(x0, x1 - x0, PAGE[0] - x1), height_ratios=(self.y, height, PAGE[1] - self.y - height)
         )
         if advance:
             self.y += height + 8.0
@@ -208,7 +205,6 @@ def _grid(sheet: Sheet, heads: list[str], rows: list[list[str]]) -> None:
     table = axes.table(cellText=rows, colLabels=heads, loc="center", cellLoc="right", edges="horizontal")
     table.auto_set_font_size(False)
     table.set_fontsize(7.5)
-    table.scale(1.0, 1.0)
     for cell in table.get_celld().values():
         cell.set_linewidth(0.4)
         cell.set_edgecolor(LIGHT["grid"])
@@ -276,11 +272,5 @@ def _diagnosis_sheet(
 
 
 def write_pdf(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
-    """Write ``report.pdf`` into a folder, at once or not at all.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write ``report.pdf`` into a folder, at once or not at all; its path."""
     return write_atomic(Path(folder) / "report.pdf", pdf_bytes(result, settings))

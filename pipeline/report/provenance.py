@@ -38,8 +38,8 @@ def provenance_rows(result: Result, words: Words) -> Provenance:
     plain = {key: value for key, value in source.items() if key not in APART}
     return Provenance(
         command=_text(source.get("command", "")),
-        facts=[(words.fact(key), _text(value)) for key, value in plain.items()],
-        clock=[(words.fact(key), _text(value)) for key, value in source.get("clock", {}).items()],
+        facts=[(words.known(f"fact_{key}", key), _text(value)) for key, value in plain.items()],
+        clock=[(words.known(f"fact_{key}", key), _text(value)) for key, value in source.get("clock", {}).items()],
         inputs=list(source.get("inputs_sha256", {}).items()),
         settings=json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
     )
@@ -97,7 +97,7 @@ def nuisance_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     rows = []
     for name, (value, std) in (result.inverse.nuisance if result.inverse else {}).items():
         shared, _, step = name.partition("/")
-        label = words.nuisance(shared) + (f", {words('step')} {step}" if step else "")
+        label = words.known(f"nuisance_{shared}", shared) + (f", {words('step')} {step}" if step else "")
         unit = words.unit("-" if shared in RELATIVE else "m", value, std)
         rows.append((label, unit.text(value, std)))
     return rows

@@ -126,21 +126,10 @@ class Words:
         first = 2 * LANGUAGES[self.language][0]
         return (texts[first], texts[first + 1]) if texts else None
 
-    def branch(self, name: str) -> str:
-        """Branch of the test; a name the table does not have stays as it is."""
-        return self._known(f"branch_{name}", name)
-
-    def fact(self, name: str) -> str:
-        """A fact of the provenance; a name the table does not have stays as it is."""
-        return self._known(f"fact_{name}", name)
-
-    def nuisance(self, name: str) -> str:
-        """What was fitted besides the law; a name the table does not have stands with blanks."""
-        return self._known(f"nuisance_{name}", name.replace("_", " "))
-
-    def _known(self, key: str, otherwise: str) -> str:
+    def known(self, key: str, name: str) -> str:
+        """Words for a key made of a name; where the table does not have it, the name with blanks."""
         row = _table()["words"].get(key)
-        return str(row[LANGUAGES[self.language][0]]) if row else otherwise
+        return str(row[LANGUAGES[self.language][0]]) if row else name.replace("_", " ")
 
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""
