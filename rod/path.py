@@ -6,9 +6,9 @@ The path is followed by pseudo-arc-length continuation: a step along its tangent
 an unknown and the step's plane as a condition, so a path that turns back in the share is followed all the same.
 
 At every state the negative eigenvalues of the stiffness are counted (`System.excess_negatives`). The first state that
-has one lies behind a critical point, which is located between the two states. So does a state whose ends, in free
-bearings under a force, have passed each other: where they met nothing kept the cable from turning round them, and a
-long step may lead to where it is stable again. It is
+has one lies behind a critical point, which is located between the two states. Where the ends of a cable under a force
+meet, nothing but springs and loads keeps it from turning round them, and a long step may lead to where it is stable
+again: the state just behind is tried, too. The critical point is
 
 * a turning point (limit point), if the share is largest there: the cable jumps;
 * a bifurcation, if the path goes on unstable. Along the mode of vanishing stiffness another path branches off. If it is
@@ -49,6 +49,8 @@ REACTION = 20.0
 BRANCHING = (0.1, 0.01)
 #: Halvings of a step to locate a critical point, and the stiffness below which it is one, relative to EI/L.
 LOCATING, CRITICAL = 24, 1e-3
+#: Halvings of a step to find where the ends meet.
+MEETING = 10
 
 
 class Point(NamedTuple):
@@ -142,11 +144,24 @@ class Ramp:
         between = self.system.section(0.5 * (here.balance.K + there.balance.K))[1]
         return there if near and np.all(between > 0.0) else None
 
-    def lost(self, point: Point) -> bool:
-        """Whether the state is unstable, or lies behind one that is: where its ends met the cable could turn freely."""
-        begin, here = (self.system.rod.edges @ at.balance.edge.direction[1] for at in (self.begin, point))
-        met = self.system.turns_freely and begin * here <= 0.0
-        return bool(met or self.system.excess_negatives(point.balance))
+    def negatives(self, point: Point) -> int:
+        """Number of directions in which the state is unstable."""
+        return self.system.excess_negatives(point.balance)
+
+    def met(self, here: Point, there: Point, way: Array) -> Point:
+        """Where the ends met on the way from ``here``, the state just behind if that is unstable; else ``there``."""
+
+        def passed(point: Point) -> bool:
+            one, other = (self.system.rod.edges @ at.balance.edge.direction[1] for at in (here, point))
+            return bool(one * other < 0.0)
+
+        behind, low, span = there, 0.0, there.state - here.state
+        for halving in range(1, MEETING + 1) if passed(there) else ():
+            middle = self.corrected(here.state + (low + 0.5**halving) * span, way)
+            if middle is None:
+                return there
+            low, behind = (low, middle) if passed(middle) else (low + 0.5**halving, behind)
+        return behind if self.negatives(behind) else there
 
     def falls(self, here: Point, way: Array) -> bool:
         """Whether the moment falls with curvature in some joint within a long step ahead."""
@@ -179,7 +194,8 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
         if there is None:
             length *= 0.5
             continue
-        if ramp.lost(there):
+        there = ramp.met(here, there, way)
+        if ramp.negatives(there):
             critical = _critical(ramp, here, there, way)
             if critical is None:  # no critical point between: they are on different paths
                 length *= 0.5
@@ -216,7 +232,7 @@ def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
     still = ramp.system.balance(angles, np.zeros(2))
     R = np.linalg.lstsq(still.border.T / rod.length, -still.gradient / rod.length, rcond=None)[0]
     there = ramp.reached(here, np.r_[angles, R, 1.0], ramp.along_share)
-    return None if there is None or ramp.lost(there) else there
+    return None if there is None or ramp.negatives(there) else there
 
 
 def _critical(ramp: Ramp, here: Point, there: Point, way: Array) -> tuple[Point, Array] | None:
@@ -229,7 +245,7 @@ def _critical(ramp: Ramp, here: Point, there: Point, way: Array) -> tuple[Point,
         middle = ramp.corrected(here.state + (low + 0.5**halving) * span, way)
         if middle is None:
             break
-        if not ramp.lost(middle):
+        if ramp.negatives(middle) == 0:
             low, stable = low + 0.5**halving, middle
     stiffness, mode = softest(ramp.system, stable.balance)
     return (stable, mode) if stiffness < CRITICAL else None
@@ -251,6 +267,6 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
             goal = here.state + part * size * aside + 2.0 * (1.0 - here.share) * ramp.half
             goal[-1] = 1.0
             there = ramp.corrected(goal, ramp.along_share)
-        if there is not None and there.share >= here.share and not ramp.lost(there):
+        if there is not None and there.share >= here.share and not ramp.negatives(there):
             return there
     return None

@@ -267,11 +267,6 @@ class System:
         ends = (0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0)
         return [e for e in ends if e[1].kind == "clamp" or e[1].stiffness or e[1].friction_moment or e[1].moment]
 
-    @cached_property
-    def turns_freely(self) -> bool:
-        """Whether nothing but the distance of its ends keeps the cable from turning as a whole."""
-        return self.hold.force is not None and not self._ends and not any(self.rod.load)
-
     def clamps_turning(self, here: Balance, residual: Array) -> tuple[Array, Array]:
         """Change of gradient (n + 2,) and gap (2,) while clamps turn by what they lack in ``residual`` (n + 2,) N m.
 

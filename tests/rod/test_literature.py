@@ -350,6 +350,10 @@ def test_the_ends_of_a_coil_do_not_pass_each_other(force):
         assert stopped.outcome is Outcome.BIFURCATION
         assert abs(stopped.chord) < 1e-6 and abs(stopped.force - meeting) < 1e-3 * meeting
     assert simulate(coil, forces=[force], branch="jump")[0].good
+    assert simulate(replace(coil, load=(0.0, -0.05)), forces=[force])[0].outcome is Outcome.BIFURCATION
+    spring = Support(stiffness=1e-3)
+    held = simulate(replace(coil, left=spring, right=spring), forces=[force])[0]
+    assert held.good and held.chord < 0.0  # stable all the way, in steps of any length
 
 
 def test_energy_of_a_dead_force_is_that_of_castigliano():
