@@ -103,6 +103,7 @@ def show(browser):
             browser.get_log(log)
         metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
         browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
         browser.get(address)
         # `get` of the address that is shown may return too early
@@ -268,20 +269,14 @@ def test_dark_mode_changes_page_and_figures(show, site):
     light = driver.execute_script(colours)
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
-    try:
-        assert all(a != b for a, b in zip(light, driver.execute_script(colours), strict=True))
-    finally:
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert all(a != b for a, b in zip(light, driver.execute_script(colours), strict=True))
 
 
 def test_paper_shows_all_photos_and_no_controls(show, site):
     driver = show(f"{site}/cable-0/report.html")
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    try:
-        assert len(shown(driver, "article.photo")) == 7
-        assert not shown(driver, "nav, .stepper, #readout")
-    finally:
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert len(shown(driver, "article.photo")) == 7
+    assert not shown(driver, "nav, .stepper, #readout")
 
 
 def visible_names(driver):
@@ -341,7 +336,7 @@ def test_index_searches_and_filters(show, site):
     assert visible_names(driver) == [f"cable-{i}" for i in range(1, 20, 3)]
 
 
-def test_index_lays_selected_characteristics_over_each_other(show, site):
+def test_index_lays_selected_characteristics_over_each_other_and_leads_to_reports(show, site):
     driver = show(f"{site}/index.html")
     boxes = driver.find_elements(By.CSS_SELECTOR, "#specimens tbody input")
     assert len(boxes) == 18  # failed specimens have nothing to compare
@@ -353,10 +348,6 @@ def test_index_lays_selected_characteristics_over_each_other(show, site):
     assert not shown(driver, "#overlay-plot path.curve")
     one(driver, "#select-all").click()
     assert len(shown(driver, "#overlay-plot path.curve")) == 18
-
-
-def test_index_leads_to_the_report(show, site):
-    driver = show(f"{site}/index.html")
     driver.find_element(By.LINK_TEXT, "cable-0").click()
     assert "Bending stiffness of cable-07" in driver.title
 
