@@ -108,6 +108,9 @@ class BendingTest:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "characteristic", as_law(self.characteristic, length=self.length))
+        for side, end in (("left", self.left), ("right", self.right)):
+            if not isinstance(end, Support):
+                raise ValueError(f"{side}={end!r} is no support: give BEARING, CLAMP, FREE (right end) or Support()")
 
     @cached_property
     def rod(self) -> Rod:

@@ -26,12 +26,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rod.spline import Cardinal, cardinal, evaluate
+from rod.spline import Cardinal, cardinal, evaluate, slope
 
 Array = NDArray[np.float64]
 Reading = Literal["tangent", "secant"]
@@ -121,12 +122,7 @@ class Characteristic:
 
     @classmethod
     def from_ordinates(
-        cls,
-        knots: ArrayLike,
-        ordinates: ArrayLike,
-        *,
-        reading: Reading = "tangent",
-        abscissa: Abscissa = "curvature",
+        cls, knots: ArrayLike, ordinates: ArrayLike, *, reading: Reading = "tangent", abscissa: Abscissa = "curvature"
     ) -> Characteristic:
         """Spline through the control points ``(knots, ordinates)``, 1/m and N m^2, in the given reading."""
         return cls(np.asarray(knots, float), np.asarray(ordinates, float), reading, abscissa)
@@ -145,11 +141,16 @@ class Characteristic:
 
     def f(self, u: ArrayLike) -> Array:
         """The spline itself at the abscissa ``u`` (n,) 1/m, N m^2, in its own reading."""
-        return self._integral(np.asarray(u, float), 1)
+        return evaluate(self._value, self._cardinal, np.asarray(u, float))
 
-    def _integral(self, u: Array, order: int = 0) -> Array:
-        """Primitive of f at the abscissa (n,), N m, or a derivative of it."""
-        return evaluate(self._primitive, self._cardinal, u, order)
+    @cached_property
+    def _value(self) -> Array:
+        """Coefficients of f."""
+        return slope(self._primitive)
+
+    def _integral(self, u: Array) -> Array:
+        """Primitive of f at the abscissa (n,), N m."""
+        return evaluate(self._primitive, self._cardinal, u)
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m, shape of ``K`` broadcast with ``K0``."""
@@ -163,7 +164,7 @@ class Characteristic:
         u, _, D = self._arguments(K, K0)
         if self.reading == "tangent":
             return self.f(u) + np.zeros_like(D)
-        return np.asarray(self.f(u) + self._integral(u, 2) * D)
+        return np.asarray(self.f(u) + evaluate(slope(self._value), self._cardinal, u) * D)
 
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
@@ -212,10 +213,10 @@ class Characteristic:
         u, u0, D = self._arguments(K, K0)
         c = self._cardinal
         if self.reading == "secant":
-            rise = evaluate(c.primitive, c, u + 0.0 * D, 1) * D
-        else:
-            rise = evaluate(c.primitive, c, u + 0.0 * D) - _last(evaluate(c.primitive, c, u0), D)
-        return np.moveaxis(rise, 0, -1)
+            return np.moveaxis(evaluate(slope(c.primitive), c, u + 0.0 * D) * D, 0, -1)
+        rest = u0 if u0.size == 1 else u0 + 0.0 * D
+        both = evaluate(c.primitive, c, np.append(rest, u + 0.0 * D))
+        return np.asarray((both[:, rest.size :] - both[:, : rest.size]).T.reshape(*D.shape, -1))
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2 (negative for positive stiffness)."""
@@ -231,8 +232,3 @@ class Characteristic:
         if self.abscissa == "excess":
             return D, np.zeros(()), D
         return K_, K0_, D
-
-
-def _last(values: Array, like: Array) -> Array:
-    """Values (p, ...) with as many axes after the first as ``like`` has, so that they broadcast."""
-    return values.reshape(values.shape[:1] + (1,) * (like.ndim - values.ndim + 1) + values.shape[1:])

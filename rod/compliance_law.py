@@ -99,7 +99,7 @@ class LawBasis:
 
     @cached_property
     def abscissa(self) -> CubicHermiteSpline:
-        """Xi over the moments of the basis."""
+        """Spline from a moment of the basis, N m, to its abscissa xi."""
         return CubicHermiteSpline(self.moments, self.xi[::2], 1.0 / self.pace[::2])
 
     def at(self, moment: ArrayLike) -> Array:
@@ -237,7 +237,7 @@ class ComplianceLaw(LawOfBend):
         return np.asarray(self.basis.unit * np.exp(self.basis.at(moment) @ self.coefficients))
 
     def log_slope(self, moment: ArrayLike) -> Array:
-        """D log c / dm, (n,) 1/(N m); zero outside the moments of the basis."""
+        """Derivative of log c by the moment, (n,) 1/(N m); zero outside the moments of the basis."""
         m, b = np.asarray(moment, float), self.basis
         slope = np.asarray(b.spline(b.place(m), 1)) @ self.coefficients * b.abscissa(m, 1)
         # the end of a range counts as inside, rounded as it may be

@@ -141,10 +141,6 @@ def solve(
     patient : bool
         Else no path is followed to its end where a cable lacks an equilibrium, which costs fifty equilibria.
 
-    Returns
-    -------
-    Equilibrium
-
     Raises
     ------
     ValueError

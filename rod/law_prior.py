@@ -147,7 +147,7 @@ class Posterior:
 
     @property
     def law_forms(self) -> Array:
-        """Forms (p, k) of the one normal prior that would have made of the same data the same posterior, one std each.
+        """The single normal prior that leads to the same posterior, as forms (p, k) of one standard deviation each.
 
         Its precision is that of the posterior less the data's. Where nothing is left, the level above all, it says
         nothing, and there is no form.

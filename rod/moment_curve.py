@@ -1,4 +1,4 @@
-"""A moment curve that is one of the bend K - K0: points with tangents, cubic between them.
+"""A moment curve over the bend K - K0 alone: points with tangents, cubic between them.
 
 Every law of this kind moves with the pre-curvature K0 and lacks only its points; `rod.compliance_law` and
 `rod.stiffness_law` say how they come from coefficients.
@@ -55,7 +55,7 @@ def moment_curve(K: Array, m: Array, f: Array) -> MomentCurve:
 
 
 class LawOfBend(Protocol):
-    """What every moment curve of the bend has in common. A class of one says what its ``curve`` is."""
+    """What moment curves over the bend K - K0 have in common: from their ``curve`` to moment and derivatives."""
 
     @property
     def curve(self) -> MomentCurve:

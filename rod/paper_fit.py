@@ -113,7 +113,7 @@ class PaperFit:
 
     @property
     def converged(self) -> bool:
-        """Whether the result is a minimum; with others also the best that was found."""
+        """Whether the fit ended at a minimum: its gradient vanishes."""
         return self.gradient < STATIONARY
 
     @property
@@ -242,7 +242,7 @@ class _Problem:
         return float(np.sqrt(np.sum(self.data.forces**2) + bends))
 
     def scaled_start(self, K0: float) -> tuple[float, float]:
-        """The constant stiffness that meets the forces best with this pre-curvature, N m^2; and that, 1/m."""
+        """Start of a fit: the constant stiffness (N m^2) that meets the forces best with a K0, and that K0 (1/m)."""
         steps = self.simulate(np.r_[np.ones(self.knots.size), [K0] * (self.fixed is None)], None).steps
         forces = np.array([step.force for step in steps])
         scale = float(forces @ self.data.forces / (forces @ forces))

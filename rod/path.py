@@ -6,7 +6,9 @@ The path is followed by pseudo-arc-length continuation: a step along its tangent
 an unknown and the step's plane as a condition, so a path that turns back in the share is followed all the same.
 
 At every state the negative eigenvalues of the stiffness are counted (`System.excess_negatives`). The first state that
-has one lies behind a critical point, which is located between the two states. It is
+has one lies behind a critical point, which is located between the two states. Where the ends of a cable under a force
+meet, nothing but springs and loads keeps it from turning round them, and a long step may lead to where it is stable
+again: the state just behind is tried, too. The critical point is
 
 * a turning point (limit point), if the share is largest there: the cable jumps;
 * a bifurcation, if the path goes on unstable. Along the mode of vanishing stiffness another path branches off. If it is
@@ -47,6 +49,8 @@ REACTION = 20.0
 BRANCHING = (0.1, 0.01)
 #: Halvings of a step to locate a critical point, and the stiffness below which it is one, relative to EI/L.
 LOCATING, CRITICAL = 24, 1e-3
+#: Halvings of a step to find where the ends meet.
+MEETING = 10
 
 
 class Point(NamedTuple):
@@ -144,6 +148,21 @@ class Ramp:
         """Number of directions in which the state is unstable."""
         return self.system.excess_negatives(point.balance)
 
+    def met(self, here: Point, there: Point, way: Array) -> Point:
+        """Where the ends met on the way from ``here``, the state just behind if that is unstable; else ``there``."""
+
+        def passed(point: Point) -> bool:
+            one, other = (self.system.rod.edges @ at.balance.edge.direction[1] for at in (here, point))
+            return bool(one * other < 0.0)
+
+        behind, low, span = there, 0.0, there.state - here.state
+        for halving in range(1, MEETING + 1) if passed(there) else ():
+            middle = self.corrected(here.state + (low + 0.5**halving) * span, way)
+            if middle is None:
+                return there
+            low, behind = (low, middle) if passed(middle) else (low + 0.5**halving, behind)
+        return behind if self.negatives(behind) else there
+
     def falls(self, here: Point, way: Array) -> bool:
         """Whether the moment falls with curvature in some joint within a long step ahead."""
         return bool(np.any(self.at(here.state + LONGEST * way).balance.tangent <= 0.0))
@@ -175,6 +194,7 @@ def followed(system: System, start: Start | None = None, *, side: int = 1, most:
         if there is None:
             length *= 0.5
             continue
+        there = ramp.met(here, there, way)
         if ramp.negatives(there):
             critical = _critical(ramp, here, there, way)
             if critical is None:  # no critical point between: they are on different paths

@@ -155,6 +155,7 @@ class Section:
         """Set that is given at a step, (n,) 1/m."""
         return 0.0 if self.grown is None else self.grown[min(memory.step, len(self.grown) - 1)]
 
+    @cached_property
     def rest(self) -> Array:
         """Pre-curvature, (1,) if uniform, otherwise (n,) 1/m: a uniform one is looked up only once."""
         K0 = self.pre_curvature
@@ -222,7 +223,7 @@ class Section:
 @lru_cache(maxsize=16)
 def _elastic(section: Section) -> Response:
     """Moment of the law alone, without set; remembered, since a fit asks for it at every step of a test."""
-    bound = section.law.bound(section.rest())
+    bound = section.law.bound(section.rest)
     if section.profile is None:
         return bound
     profile = section.profile

@@ -204,7 +204,7 @@ def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
 def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Array:
     """Change of the moment at fixed curvature, (q, n)."""
     section, memory = step.rod.section, step.before
-    law, K0, move = section.law, section.rest(), moves.pre_curvature
+    law, K0, move = section.law, section.rest, moves.pre_curvature
     reads: tuple[Read, ...] = (Read(1.0, K),)
     set_move = moves.none[:, None]
     if section.sets or moves.has("plastic_set"):

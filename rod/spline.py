@@ -1,4 +1,4 @@
-"""Natural cubic spline with linear ends as the derivative of its primitive, and that by the ordinates.
+"""Natural cubic splines with linear ends, kept as their primitives, which are linear in the ordinates.
 
 From knots to piecewise polynomials on all segments, the two unbounded ones included. The spline and its primitive are
 linear in the ordinates; the cardinal splines (one ordinate 1, the others 0) carry that derivative.
@@ -50,14 +50,14 @@ def cardinal(knots: tuple[float, ...]) -> Cardinal:
     return Cardinal(at, origin, np.ascontiguousarray(primitive.transpose(0, 2, 1)))
 
 
-def evaluate(coefficients: Array, cardinal: Cardinal, u: Array, order: int = 0) -> Array:
-    """Derivative of a piecewise polynomial at ``u``.
+def slope(coefficients: Array) -> Array:
+    """Coefficients of the derivative of a piecewise polynomial, one power less."""
+    powers = np.arange(1, len(coefficients)).reshape(-1, *[1] * (coefficients.ndim - 1))
+    return np.asarray(coefficients[1:] * powers)
 
-    Coefficients (k, p + 1), or (k, p, p + 1) for a result with a first axis p.
-    """
-    for _ in range(order):
-        powers = np.arange(1, coefficients.shape[0]).reshape((-1,) + (1,) * (coefficients.ndim - 1))
-        coefficients = coefficients[1:] * powers
+
+def evaluate(coefficients: Array, cardinal: Cardinal, u: Array) -> Array:
+    """Piecewise polynomial at ``u``; coefficients (k, p + 1), or (k, p, p + 1) for a result with a first axis p."""
     segment = cardinal.knots.searchsorted(u)
     t = np.asarray(u - cardinal.origin.take(segment))
     table = coefficients.take(segment, axis=-1)

@@ -1,4 +1,4 @@
-"""A positive law of any form as one of the bend: log f_EI as a spline.
+"""A positive law of any form over the bend K - K0: log f_EI is a spline.
 
 It is `rod.compliance_law` with moment and bend exchanged:
 
@@ -36,7 +36,7 @@ class StiffnessLaw(LawOfBend):
 
     @property
     def basis(self) -> LawBasis:
-        """Of the bends."""
+        """Splines over the bend."""
         return self.rise.basis
 
     @cached_property
@@ -63,5 +63,5 @@ class StiffnessLaw(LawOfBend):
         return self.basis.at(np.asarray(K, float) - np.asarray(K0, float))
 
     def log_slope(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """D log f / dK, (n,) m."""
+        """Derivative of log f by K, (n,) m."""
         return self.rise.log_slope(np.asarray(K, float) - np.asarray(K0, float))

@@ -15,9 +15,10 @@ minimisation; once the bearing has turned by ``stick_angle`` the moment is exact
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 Kind = Literal["bearing", "clamp", "free"]
+KINDS = get_args(Kind)
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class Support:
     moment: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.kind not in ("bearing", "clamp", "free"):
-            raise ValueError(f"unknown kind of support {self.kind!r}")
+        if self.kind not in KINDS:
+            raise ValueError(f"kind of support {self.kind!r}: one of {', '.join(KINDS)}")
         if not self.stick_angle > 0.0:
             raise ValueError(f"stick_angle must be positive, got {self.stick_angle}")
         if not self.rigid_length >= 0.0:

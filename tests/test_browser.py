@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import re
 import shutil
-import tomllib
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlparse
@@ -24,6 +24,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from pipeline.intake.photohints import read_hints
+from pipeline.intake.tomltable import read_toml
 from pipeline.messages import free_text
 from pipeline.report.document import write_report
 from pipeline.report.index import write_index, write_rows
@@ -101,6 +103,7 @@ def show(browser):
             browser.get_log(log)
         metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
         browser.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # no window has it at first
         browser.get(address)
         # `get` of the address that is shown may return too early
@@ -174,18 +177,30 @@ def test_centerline_is_toggled(show, site):
     assert shown(driver, line)
 
 
-def test_clicks_on_a_photo_become_lines_of_the_specimen_file(show, site):
+def test_clicks_on_a_photo_become_lines_of_the_specimen_file(show, site, tmp_path):
     driver, photo = show(f"{site}/cable-0/report.html", PHONE), measured_result().photos[0]
-    for key in ("use", "ends_px", "region_px"):
-        Select(one(driver, "#mark")).select_by_value(key)
-        for axis in reversed(shown(driver, "article.photo:not([hidden]) circle:not(.mark)")):
-            ActionChains(driver).move_to_element(axis).click().perform()
-    (told,) = tomllib.loads(one(driver, "#mark-lines").text)["photos"]
-    assert (told["image"], told["use"]) == (photo.image, False)
-    ends = (photo.right_px, photo.left_px)
-    pixel = photo.preview.reduction * photo.preview.width / one(driver, "article.photo:not([hidden]) img").rect["width"]
-    assert np.ravel(told["ends_px"]) == pytest.approx(np.ravel(ends), abs=pixel)
-    assert told["region_px"] == pytest.approx([*np.min(ends, axis=0), *np.max(ends, axis=0)], abs=pixel)
+    left, right = shown(driver, "article.photo:not([hidden]) circle:not(.mark)")
+    places = [(right, 0, 0), (left, 30, -15), (left, 0, 0)]  # and so many px of the screen beside
+    begun = {"ends_px": 1, "path_px": 1, "region_px": 1, "exclude_px": 2}
+    clicks = {"use": 1, "ends_px": 2, "path_px": 3, "region_px": 2, "exclude_px": 3}
+    for numbers in (begun, clicks):
+        for key, count in numbers.items():
+            Select(one(driver, "#mark")).select_by_value("")
+            Select(one(driver, "#mark")).select_by_value(key)
+            for place in places[:count]:
+                ActionChains(driver).move_to_element_with_offset(*place).click().perform()
+        assert one(driver, "#marked").is_displayed() == (numbers is clicks)  # what is half done is no line yet
+    assert len(shown(driver, "circle.mark")) == sum(clicks.values())
+    (tmp_path / "specimen.toml").write_text(one(driver, "#mark-lines").text)
+    ((image, told),) = read_hints(read_toml(tmp_path / "specimen.toml", limit=10_000)).items()
+    assert (image, told.use) == (photo.image, False)
+    picture = one(driver, "article.photo:not([hidden]) .picture")
+    pixel = photo.preview.reduction * photo.preview.width / picture.rect["width"]
+    points = np.array([photo.right_px, np.add(photo.left_px, (30 * pixel, -15 * pixel)), photo.left_px])
+    assert np.array(told.ends_px) == pytest.approx(points[:2], abs=pixel)
+    assert np.array(told.path_px) == pytest.approx(points, abs=pixel)
+    assert np.array(told.exclude_px) == pytest.approx(points[None], abs=pixel)
+    assert told.region_px == pytest.approx([*points[:2].min(axis=0), *points[:2].max(axis=0)], abs=pixel)
 
 
 def test_pointing_at_the_characteristic_tells_value_band_and_photos(show, site):
@@ -254,20 +269,14 @@ def test_dark_mode_changes_page_and_figures(show, site):
     light = driver.execute_script(colours)
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
-    try:
-        assert all(a != b for a, b in zip(light, driver.execute_script(colours), strict=True))
-    finally:
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert all(a != b for a, b in zip(light, driver.execute_script(colours), strict=True))
 
 
 def test_paper_shows_all_photos_and_no_controls(show, site):
     driver = show(f"{site}/cable-0/report.html")
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    try:
-        assert len(shown(driver, "article.photo")) == 7
-        assert not shown(driver, "nav, .stepper, #readout")
-    finally:
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert len(shown(driver, "article.photo")) == 7
+    assert not shown(driver, "nav, .stepper, #readout")
 
 
 def visible_names(driver):
@@ -276,17 +285,24 @@ def visible_names(driver):
     )
 
 
-def test_the_printed_index_begins_below_its_title(show, site):
-    """A table that is kept together leaves the first page to the title alone."""
+def printed(driver):
+    """Number of texts on each page of the page as a PDF."""
+    pdf = base64.b64decode(driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
+    objects = dict(re.findall(rb"\n(\d+) 0 obj(?:(?!endobj).)*?stream\r?\n(.*?)endstream", pdf, re.DOTALL))
+    contents = re.findall(rb"/Contents (\d+) 0 R", pdf)
+    return [len(re.findall(rb"T[jJ]\b", zlib.decompress(objects[number]))) for number in contents]
+
+
+def test_the_printed_index_begins_below_its_title_and_repeats_its_head(show, site):
+    """A table that is kept together leaves the first page to the title alone, and draws its rest under what follows."""
     driver = show(f"{site}/printed/index.html")
-
-    def pages():
-        printed = driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]
-        return len(re.findall(rb"/Type ?/Page\b", base64.b64decode(printed)))
-
-    whole = pages()
-    driver.execute_script("document.querySelector('section.card').style.breakInside = 'avoid'")
-    assert whole < pages()
+    whole = printed(driver)
+    driver.execute_script("document.querySelector('main > section:last-child').remove()")
+    table = printed(driver)
+    assert len(table) == 2 and min(table) > 100
+    assert whole[:2] == table
+    driver.execute_script("document.querySelector('thead').style.visibility = 'hidden'")
+    assert all(with_head > without for with_head, without in zip(table, printed(driver), strict=True))
 
 
 def test_index_sorts_by_number_and_by_name(show, site):
@@ -320,7 +336,7 @@ def test_index_searches_and_filters(show, site):
     assert visible_names(driver) == [f"cable-{i}" for i in range(1, 20, 3)]
 
 
-def test_index_lays_selected_characteristics_over_each_other(show, site):
+def test_index_lays_selected_characteristics_over_each_other_and_leads_to_reports(show, site):
     driver = show(f"{site}/index.html")
     boxes = driver.find_elements(By.CSS_SELECTOR, "#specimens tbody input")
     assert len(boxes) == 18  # failed specimens have nothing to compare
@@ -332,10 +348,6 @@ def test_index_lays_selected_characteristics_over_each_other(show, site):
     assert not shown(driver, "#overlay-plot path.curve")
     one(driver, "#select-all").click()
     assert len(shown(driver, "#overlay-plot path.curve")) == 18
-
-
-def test_index_leads_to_the_report(show, site):
-    driver = show(f"{site}/index.html")
     driver.find_element(By.LINK_TEXT, "cable-0").click()
     assert "Bending stiffness of cable-07" in driver.title
 

@@ -19,6 +19,7 @@ def test_explain_knows_every_cause_of_the_contract():
     parts = ("Amount:", "Sits in:", "Shows with:", "Told apart by:", "At the rig:", "Settled by:")
     assert all(part in call("explain", "pre_curvature").stdout for part in parts)
     assert "An der Anlage:" in call("explain", "pre_curvature", "--language", "de").stdout
+    assert call("explain", "rigid_ends").stdout.startswith("rigid_ends (m, not negative)")
     page = call("explain", "rig_compliance").stdout
     assert page.startswith("rig_compliance (m/N")
     german = call("explain", "rig_compliance", "--language", "de").stdout

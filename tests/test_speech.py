@@ -125,6 +125,16 @@ def test_long_words_and_names_are_wrapped_beside_their_begin(monkeypatch):
     assert max(map(len, lines)) <= 40 and all(line.startswith(" " * 13) for line in lines[1:])
 
 
+@pytest.mark.parametrize(
+    "order", [["explain"], ["explain", "codes"], ["explain", "hysteresis"], ["check", "toml/missing-key/specimen"]]
+)
+def test_pages_and_findings_fit_a_terminal(monkeypatch, order):
+    monkeypatch.setattr(speech, "columns", lambda: 80)
+    monkeypatch.chdir(BROKEN)
+    lines = CliRunner().invoke(main, [*order, "--language", "de"], color=True).output.splitlines()
+    assert len(lines) > 2 and max(len(click.unstyle(line)) for line in lines) <= 80
+
+
 @pytest.mark.parametrize("batch", [{"in_process": True}, {"workers": 2}])
 def test_the_stage_of_each_specimen_is_told(batch, tmp_path):
     write_specimens(tmp_path / "batch", ["a", "b", "c"])

@@ -12,7 +12,7 @@ import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
 from pipeline.cli.run import found, nothing_found
-from pipeline.cli.speech import say, told
+from pipeline.cli.speech import entry, say, told
 from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
 
@@ -28,12 +28,7 @@ if TYPE_CHECKING:
 @language_option
 @settings_options
 @click.pass_context
-def check(
-    ctx: click.Context,
-    folders: tuple[Path, ...],
-    timeout: float | None,
-    as_json: bool,
-) -> None:
+def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, as_json: bool) -> None:
     """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
     settings = chosen_settings(*limit)
@@ -112,7 +107,7 @@ def echo_rows(rows: list[dict[str, Any]]) -> None:
         for finding in row["findings"]:
             level = click.style(told(Message("word." + finding["level"])), colours[finding["level"]])
             said = FindingPart(**finding).said
-            click.echo(f"{'':8} {level}: {told(said)} [{finding['code']}]")
+            click.echo(entry(f"{'':8} {level}: ", f"{told(said)} [{finding['code']}]"))
 
 
 def _name(row: dict[str, Any]) -> str:

@@ -27,13 +27,7 @@ MISSING = 3
 @language_option
 @settings_options
 @click.pass_context
-def compare(
-    ctx: click.Context,
-    a: Path,
-    b: Path,
-    as_json: bool,
-    out: Path | None,
-) -> None:
+def compare(ctx: click.Context, a: Path, b: Path, as_json: bool, out: Path | None) -> None:
     """Say whether the results A and B differ beyond their bands."""
     from pipeline.compare import compare as compared
     from pipeline.result import read_result

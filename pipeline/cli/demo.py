@@ -27,11 +27,7 @@ COMPARED = 5  # places along the visited range at which f_EI is laid beside the 
 @language_option
 @settings_options
 @click.pass_context
-def demo(
-    ctx: click.Context,
-    out: Path,
-    seed: int,
-) -> None:
+def demo(ctx: click.Context, out: Path, seed: int) -> None:
     """Simulate and photograph a specimen, measure it, and print the result beside the truth."""
     from pipeline.batch import run_batch
     from pipeline.cli.progress import progress

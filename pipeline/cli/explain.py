@@ -31,11 +31,11 @@ def explain(name: str | None) -> None:
     causes, codes = ("pre_curvature", *(cause.name for cause in CATALOGUE)), tuple(documented_codes())
     if name is None:
         for cause in causes:
-            title, _, text = _cause(cause, words).strip().partition("\n\n")
-            click.echo(f"{title}\n  {' '.join(text.partition(chr(10) * 2)[0].split())}")
+            title, summary, _ = _cause(cause, words).split("\n\n")
+            click.echo(f"{title}\n{entry('  ', summary)}")
     elif name == "codes":
         for code in codes:
-            click.echo(f"{code}\n  {(words.code(code) or ('',))[0]}")
+            click.echo(f"{code}\n{entry('  ', (words.code(code) or ('',))[0])}")
     elif name in causes:
         click.echo("\n".join(map(_line, _cause(name, words).splitlines())))
     else:

@@ -60,8 +60,10 @@ def entry(begin: str, text: str) -> str:
     width = columns()
     if width is None:
         return f"{begin}{text}"
-    indent = " " * min(len(begin), width // 3)
-    return "\n".join(textwrap.wrap(f"{begin}{text}", width, subsequent_indent=indent, break_on_hyphens=False))
+    plain = click.unstyle(begin)
+    indent = " " * min(len(plain), width // 3)
+    lines = textwrap.wrap(f"{plain}{text}", width, subsequent_indent=indent, break_on_hyphens=False)
+    return begin + "\n".join(lines)[len(plain) :]
 
 
 def table(rows: Sequence[Sequence[str]], *, left: int = 1) -> list[str]:

@@ -95,17 +95,9 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
     if curve is None or diagnosis is None or not result.answer.usable:
         return ()
     band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
-    spots = [(abs(spot.stiffness_bias_at_plausible_size), spot) for spot in diagnosis.could_hide]
-    worst = sorted((one for one in spots if one[0] > band), key=lambda one: -one[0])[:MOST_HIDDEN]
-    return tuple(
-        words(
-            "hidden_row",
-            name=words.cause(spot.name),
-            bias=words.number(100.0 * bias, 2),
-            settled=words.settled(spot.name),
-        )
-        for bias, spot in worst
-    )
+    worst = sorted(diagnosis.could_hide, key=lambda spot: -abs(spot.stiffness_bias_at_plausible_size))[:MOST_HIDDEN]
+    beyond = (spot for spot in worst if abs(spot.stiffness_bias_at_plausible_size) > band)
+    return tuple(words.blind_spot("hidden_row", spot) for spot in beyond)
 
 
 def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:

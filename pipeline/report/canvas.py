@@ -110,12 +110,7 @@ def style(scale: float = 1.0) -> Iterator[None]:
 
 
 def drawing(
-    name: str,
-    draw: Callable[[Area], Axes],
-    *,
-    size: tuple[float, float] = (400.0, 300.0),
-    title: str,
-    description: str,
+    name: str, draw: Callable[[Area], Axes], *, size: tuple[float, float] = (400.0, 300.0), title: str, description: str
 ) -> Drawing:
     """Draw a figure and turn it into SVG.
 
@@ -128,10 +123,6 @@ def drawing(
     size : (width, height) px
     title, description : str
         What a reader who cannot see the figure is told.
-
-    Returns
-    -------
-    Drawing
     """
     with style():
         figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72)

@@ -1,4 +1,4 @@
-"""Cells of a table as any spreadsheet reads them, and no spreadsheet runs.
+"""Cells of a table that every spreadsheet reads, and none runs as a formula.
 
 Text that would be taken for a formula gets an apostrophe in front (CWE-1236). Numbers have nine digits: below a
 nanometre on a metre and beyond any band here.

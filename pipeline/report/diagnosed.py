@@ -22,7 +22,7 @@ NAMES = 2
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause that was found: its size and probability in a line, what it is, and what to do about it (English)."""
+    """A cause that was found: its size and probability in a line, what it is, and what to do about it."""
 
     line: str
     summary: str = ""
@@ -65,15 +65,7 @@ def diagnosis_view(
         gain=_gain(part, words),
         heads=heads,
         rows=rows,
-        blind_spots=[
-            words(
-                "blind_row",
-                name=words.cause(spot.name),
-                bias=words.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), SHARE_DIGITS),
-                settled=words.settled(spot.name),
-            )
-            for spot in part.could_hide
-        ],
+        blind_spots=[words.blind_spot("blind_row", spot) for spot in part.could_hide],
         next_what=words.said(following.said).sentence if following else "",
         next_separates=_separates(following, words) if following else "",
         leftover=_leftover(part, words),

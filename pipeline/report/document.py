@@ -28,13 +28,11 @@ from pipeline.report.evidence import (
 )
 from pipeline.report.figures import force_unit, stiffness_unit
 from pipeline.report.files import write_atomic
-from pipeline.report.page import asset, environment, palette_css, unbroken
+from pipeline.report.page import asset, environment, palette_css
 from pipeline.report.provenance import fit_rows, nuisance_rows, provenance_rows, specimen_rows
 from pipeline.report.words import Words
 from pipeline.result import Result, curves, set_aside
 from pipeline.settings import ReportSettings
-
-__all__ = ["report_html", "simulation_texts", "unbroken", "write_report"]
 
 
 def report_html(result: Result, settings: ReportSettings | None = None) -> str:
@@ -45,10 +43,6 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     result : Result
         Measured, partly measured or failed.
     settings : ReportSettings, optional
-
-    Returns
-    -------
-    str
     """
     settings = settings or ReportSettings()
     words = Words(settings.language)
@@ -126,11 +120,5 @@ def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> 
 
 
 def write_report(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
-    """Write ``report.html`` into a folder, at once or not at all.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write ``report.html`` into a folder, at once or not at all; its path."""
     return write_atomic(Path(folder) / "report.html", report_html(result, settings))

@@ -175,7 +175,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSett
         draw = partial(photos.draw_photo_curvature, photo=photo, words=words, settings=settings)
         ends = {"low": words.curvature(low), "high": words.curvature(high)}
         kappa = titled(f"kappa-{index}", draw, words, key="kappa", size=TALL, **ends)
-    told, marks = words.said(photo.said).text if photo.reason else "", photos.bearing_marks(photo)
+    told, marks = words.after_colon(photo.said) if photo.reason else "", photos.bearing_marks(photo)
     return PhotoView(index, photo.step, photo.image, photo.status, told, photo.preview, seen, hidden, marks, kappa)
 
 
@@ -188,7 +188,7 @@ def force_rows(result: Result, words: Words) -> list[list[str]]:
         rows.append(
             [
                 str(step.step),
-                words.branch(step.branch),
+                words.known(f"branch_{step.branch}", step.branch),
                 words.number(1e3 * step.displacement_m, 5),
                 unit.number(step.force_N, step.force_std_N),
                 unit.alike(step.force_fit_N, step.force_std_N),
@@ -213,7 +213,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
             [
                 str(photo.step),
                 photo.image,
-                words(f"status_{photo.status}") + (f": {words.said(photo.said)}" if photo.reason else ""),
+                words(f"status_{photo.status}") + (f": {words.after_colon(photo.said)}" if photo.reason else ""),
                 *(millimetres.number(value, std) for value, std in lengths),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]

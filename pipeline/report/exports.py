@@ -89,7 +89,7 @@ class Cable:
 
     @property
     def area(self) -> float:
-        """Of the round section."""
+        """Area of the round section, m^2."""
         return float(np.pi * self.diameter**2 / 4.0)
 
     @property
@@ -201,28 +201,23 @@ def _mujoco(cable: Cable) -> str:
     points = " ".join(f"{_n(a)} 0 {_n(b)}" for a, b in zip(x, z, strict=True))
     edges = " ".join(f"{i} {i + 1}" for i in range(ELEMENTS))
     mass = DENSITY * cable.area * cable.length
-    return "\n".join(
-        (
-            "<!--",
-            *cable.head,
-            NOT_MEASURED,
-            "-->",
-            '<mujoco model="cable">',
-            # edges are held by a soft constraint: as soft as MuJoCo has it by default the arc opens three times too far
-            '  <option integrator="discrete" timestep="0.0005"/>',
-            "  <worldbody>",
-            f'    <flexcomp name="cable" dim="1" type="direct" radius="{_n(cable.diameter / 2.0)}" mass="{_n(mass)}"',
-            f'        point="{points}"',
-            f'        element="{edges}">',
-            '      <pin id="0 1"/>',
-            '      <edge equality="true" solref="0.001 1" solimp="0.9999 0.9999 0.001"/>',
-            f'      <elasticity young="{_n(cable.modulus)}" poisson="0" damping="0.05"/>',
-            '      <contact selfcollide="none"/>',
-            "    </flexcomp>",
-            "  </worldbody>",
-            "</mujoco>",
-            "",
-        )
+    return _lines(
+        "",
+        ("<!--", *cable.head, NOT_MEASURED, "-->"),
+        '<mujoco model="cable">',
+        # edges are held by a soft constraint: as soft as MuJoCo has it by default the arc opens three times too far
+        '  <option integrator="discrete" timestep="0.0005"/>',
+        "  <worldbody>",
+        f'    <flexcomp name="cable" dim="1" type="direct" radius="{_n(cable.diameter / 2.0)}" mass="{_n(mass)}"',
+        f'        point="{points}"',
+        f'        element="{edges}">',
+        '      <pin id="0 1"/>',
+        '      <edge equality="true" solref="0.001 1" solimp="0.9999 0.9999 0.001"/>',
+        f'      <elasticity young="{_n(cable.modulus)}" poisson="0" damping="0.05"/>',
+        '      <contact selfcollide="none"/>',
+        "    </flexcomp>",
+        "  </worldbody>",
+        "</mujoco>",
     )
 
 

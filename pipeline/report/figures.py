@@ -186,7 +186,7 @@ def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSe
     parts = fitted_branches(result)
     for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
         told = (curve.kappa, curve.tangent, curve.tangent_std)
-        _banded(axes, *told, colour, unit, words, settings, label=words.branch(name))
+        _banded(axes, *told, colour, unit, words, settings, label=words.known(f"branch_{name}", name))
     bottom, top = _limits(parts.values(), half)
     axes.set_ylim(unit.factor * bottom, unit.factor * top)
     return _over_kappa(axes, "axis_stiffness", unit, words)
@@ -274,7 +274,7 @@ def _branch(axes: Axes, branch: str, steps: list[StepPart], unit: Unit, half: fl
         yerr=[unit.factor * half * step.force_std_N for step in steps],
         capsize=3.0,
         elinewidth=1.2,
-        label=words.branch(branch),
+        label=words.known(f"branch_{branch}", branch),
         **_marks(branch),
     )
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 def write_atomic(path: Path, content: str | bytes | Iterable[str]) -> Path:
-    """Write a file at once or not at all; two writers leave one of their two files, never a mixture.
+    """Write a file at once or not at all, and return its path; two writers leave one of their files, never a mixture.
 
     Parameters
     ----------
@@ -21,11 +21,6 @@ def write_atomic(path: Path, content: str | bytes | Iterable[str]) -> Path:
         Its folder is made if it does not exist.
     content : str, bytes or iterable of str
         Text, whole or in pieces, is written as UTF-8 with the line ends it has.
-
-    Returns
-    -------
-    Path
-        The path given.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     pieces = (content,) if isinstance(content, str | bytes) else content

@@ -89,7 +89,8 @@ STRONG = 5.0
 def draw_map(figure: Area, residuals: ResidualMap, words: Words, *, title: str = "") -> Axes:
     """Draw shape residuals in sigma over s and step."""
     branches = residuals.branches or [""] * len(residuals.steps)
-    names = [f"{step} {words.branch(b)}" for step, b in zip(residuals.steps, branches, strict=True)]
+    told = [words.known(f"branch_{branch}", branch) for branch in branches]
+    names = [f"{step} {branch}" for step, branch in zip(residuals.steps, told, strict=True)]
     width = figure.bbox.width
     axes = plot_area(figure, left=label_width(names, most=0.4 * width), right=84.0, top=20.0 if title else 8.0)
     s = 1e3 * np.asarray(residuals.s_m)

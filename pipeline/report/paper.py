@@ -78,13 +78,7 @@ def compute() -> Paper:
 
 
 def write_paper(folder: Path, words: Words | None = None) -> Paper:
-    """Write ``paper.json``, ``paper.html`` and one SVG a figure, in English by default, into a folder, which is made.
-
-    Returns
-    -------
-    Paper
-        What was computed.
-    """
+    """Compute the paper, and write ``paper.json``, ``paper.html`` and one SVG a figure into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     paper, words = compute(), words or Words()
     figures = draw(paper, words)

@@ -79,10 +79,7 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
 def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: Words, figure: Area) -> Axes:
     """Fig. 6: fits with K0 = 0 by the forces alone (above) and with the curvatures (below), beside that of free K0."""
     for part, forced, name in zip(
-        _halves(figure),
-        (forces_alone, fit),
-        (words("paper_by_forces"), words("paper_by_both")),
-        strict=True,
+        _halves(figure), (forces_alone, fit), (words("paper_by_forces"), words("paper_by_both")), strict=True
     ):
         axes = plot_area(part)
         axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)

@@ -68,10 +68,11 @@ class Sheet:
             )
         self.y += 0.4 * size
 
-    def pairs(self, rows: list[tuple[str, str]], *, size: float = 8.5) -> None:
-        """Write names and texts, one pair a paragraph."""
+    def pairs(self, rows: list[tuple[str, str]], *, size: float) -> None:
+        """Write names and texts, one pair a paragraph, as long as there is room."""
         for name, text in rows:
-            self.text(f"{name}: {text}", size=size)
+            if self.room() > 24.0:
+                self.text(f"{name}: {text}", size=size)
 
     def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> Area:
         """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
@@ -79,10 +80,7 @@ class Sheet:
         x0, x1 = (MARGIN + share * inner for share in (left, right))
         # a part of a figure takes its place from the ratios of its grid alone: the part is the middle of nine fields
         grid = self.figure.add_gridspec(
-            3,
-            3,
-            width_ratios=(x0, x1 - x0, PAGE[0] - x1),
-            height_ratios=(self.y, height, PAGE[1] - self.y - height),
+            3, 3, width_ratios=(x0, x1 - x0, PAGE[0] - x1), height_ratios=(self.y, height, PAGE[1] - self.y - height)
         )
         if advance:
             self.y += height + 8.0
@@ -207,7 +205,6 @@ def _grid(sheet: Sheet, heads: list[str], rows: list[list[str]]) -> None:
     table = axes.table(cellText=rows, colLabels=heads, loc="center", cellLoc="right", edges="horizontal")
     table.auto_set_font_size(False)
     table.set_fontsize(7.5)
-    table.scale(1.0, 1.0)
     for cell in table.get_celld().values():
         cell.set_linewidth(0.4)
         cell.set_edgecolor(LIGHT["grid"])
@@ -239,9 +236,7 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         *source.facts,
     ]
     rows += [(name, digest[:16]) for name, digest in source.inputs]
-    for pair in rows:
-        if sheet.room() > 24.0:
-            sheet.pairs([pair], size=8.0)
+    sheet.pairs(rows, size=8.0)
     return sheet
 
 
@@ -272,18 +267,10 @@ def _diagnosis_sheet(
         sheet.y += 170.0
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]
-    for text in texts:
-        if sheet.room() > 24.0:
-            sheet.pairs([text], size=8.5)
+    sheet.pairs(texts, size=8.5)
     return sheet
 
 
 def write_pdf(result: Result, folder: Path, settings: ReportSettings | None = None) -> Path:
-    """Write ``report.pdf`` into a folder, at once or not at all.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write ``report.pdf`` into a folder, at once or not at all; its path."""
     return write_atomic(Path(folder) / "report.pdf", pdf_bytes(result, settings))

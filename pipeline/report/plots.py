@@ -31,10 +31,6 @@ def plot_characteristic(result: Result, *, settings: ReportSettings | None = Non
     result : Result
     settings : ReportSettings, optional
         Language and width of the bands.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     settings, words = _how(settings)
     if not curves(result):

@@ -38,8 +38,8 @@ def provenance_rows(result: Result, words: Words) -> Provenance:
     plain = {key: value for key, value in source.items() if key not in APART}
     return Provenance(
         command=_text(source.get("command", "")),
-        facts=[(words.fact(key), _text(value)) for key, value in plain.items()],
-        clock=[(words.fact(key), _text(value)) for key, value in source.get("clock", {}).items()],
+        facts=[(words.known(f"fact_{key}", key), _text(value)) for key, value in plain.items()],
+        clock=[(words.known(f"fact_{key}", key), _text(value)) for key, value in source.get("clock", {}).items()],
         inputs=list(source.get("inputs_sha256", {}).items()),
         settings=json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
     )
@@ -74,7 +74,7 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     if part is None:
         return []
     rows = [
-        (words("fit_outcome"), words.said(part.said).text if part.advice else part.outcome),
+        (words("fit_outcome"), words.said(part.said).sentence if part.advice else part.outcome),
         (words("fit_iterations"), f"{part.iterations} ({words('exact')})"),
     ]
     if part.misfit is not None:
@@ -97,7 +97,7 @@ def nuisance_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     rows = []
     for name, (value, std) in (result.inverse.nuisance if result.inverse else {}).items():
         shared, _, step = name.partition("/")
-        label = words.nuisance(shared) + (f", {words('step')} {step}" if step else "")
+        label = words.known(f"nuisance_{shared}", shared) + (f", {words('step')} {step}" if step else "")
         unit = words.unit("-" if shared in RELATIVE else "m", value, std)
         rows.append((label, unit.text(value, std)))
     return rows

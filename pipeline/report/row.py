@@ -7,7 +7,7 @@ summary, mean of repeat specimens) reads rows alone: a result with its photos is
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -223,20 +223,14 @@ def from_entry(data: object) -> IndexRow:
     if not isinstance(data, dict) or data.get("version") != ROW:
         raise ValueError("no row of this version")
     try:
+        given: dict[str, Any] = {n: None if data[n] is None else read(data[n]) for n, read in READ.items()}
         row = IndexRow(
             **{name: _typed(data[name], str) for name in TEXTS},
             **{name: _typed(data[name], int) for name in COUNTS},
             causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
             twins=tuple(_typed(name, str) for name in _typed(data["twins"], list)),
             usable=_typed(data["usable"], bool),
-            fault=_message(data["fault"]),
-            reason=_message(data["reason"]),
-            low=_end_of(data["low"]),
-            high=_end_of(data["high"]),
-            pre_curvature=None if data["pre_curvature"] is None else _numbers(data["pre_curvature"], 2),
-            rms_relative=None if data["rms_relative"] is None else _numbers([data["rms_relative"]], 1)[0],
-            compatible=None if data["compatible"] is None else _typed(data["compatible"], bool),
-            curve=None if data["curve"] is None else _curve(data["curve"]),
+            **given,
         )
     except (AttributeError, KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"no row: {error}") from error
@@ -252,10 +246,6 @@ def _typed(value: Any, kind: type) -> Any:
     return value.encode("utf-8", "replace").decode("utf-8") if isinstance(value, str) else value
 
 
-def _message(stored: Any) -> Message | None:
-    return None if stored is None else Message.read(stored)
-
-
 def _numbers(values: Any, count: int) -> tuple[Any, ...]:
     """Finite numbers, so many of them."""
     return tuple(_table(values, count).tolist())
@@ -268,13 +258,6 @@ def _table(values: Any, *shape: int) -> Array:
     if (table.size and not fits) or not np.isfinite(table).all():
         raise ValueError("numbers that are not finite, or too few or many")
     return table if fits else table.reshape(shape)  # a view of each would be kept ten thousand times
-
-
-def _end_of(values: Any) -> End | None:
-    if values is None:
-        return None
-    kappa, tangent, std = _numbers(values, 3)
-    return kappa, tangent, std
 
 
 def _curve(data: Any) -> RowCurve:
@@ -305,3 +288,16 @@ def _triangle(text: str, count: int) -> NDArray[np.float32]:
 def _below(rows: int, columns: int) -> NDArray[np.bool_]:
     """Where the numbers of a lower triangle stand."""
     return np.tri(rows, columns, dtype=bool)
+
+
+READ: dict[str, Callable[[Any], Any]] = {
+    "fault": Message.read,
+    "reason": Message.read,
+    "low": lambda values: _numbers(values, 3),
+    "high": lambda values: _numbers(values, 3),
+    "pre_curvature": lambda values: _numbers(values, 2),
+    "rms_relative": lambda value: _numbers([value], 1)[0],
+    "compatible": lambda value: _typed(value, bool),
+    "curve": _curve,
+}
+"""How what may be missing in an entry is read."""

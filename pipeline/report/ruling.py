@@ -164,7 +164,7 @@ def _offset(axes: Axes, by: tuple[float, float]) -> ScaledTranslation:
 
 
 def text_width(text: str) -> float:
-    """Width of a text over its size, without kerning: a hundredth of it for words, nothing for numbers."""
+    """Width of a text over its font size, without kerning, which is a hundredth for words and nothing for numbers."""
     return sum(map(_advance, text))
 
 

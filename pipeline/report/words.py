@@ -11,11 +11,14 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.messages import PER, Message, catalogue, entry, sentence, word
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
+
+if TYPE_CHECKING:
+    from pipeline.result import BlindSpot
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 CODES = TABLE.with_name("codes.toml")
@@ -95,11 +98,21 @@ class Words:
         named = any(text.startswith(f"{said.values.get(key) or text} ") for key in ("id", "name", "a"))
         return Said(text, "en" if said.english else self.language, named)
 
+    def after_colon(self, said: Message) -> str:
+        """A message after a colon, where a German sentence has a capital."""
+        told = self.said(said)
+        return told.sentence if told.language == "de" else told.text
+
     def about(self, cause: str) -> tuple[str, str]:
         """What a cause is and what to do about it at the rig; empty for one that the catalogue does not have."""
         known = f"cause.{cause}" in catalogue(self.language)
         texts = Message(f"cause.{cause}").parts(self.language) if known else ("", "")
         return texts[0], texts[-1]
+
+    def blind_spot(self, key: str, spot: BlindSpot) -> str:
+        """A cause that these data could not have shown, by the words ``key``: what it would do to f_EI."""
+        bias = self.number(100.0 * abs(spot.stiffness_bias_at_plausible_size), 2)
+        return self(key, name=self.cause(spot.name), bias=bias, settled=self.settled(spot.name))
 
     def settled(self, cause: str) -> str:
         """The measurement that settles a cause."""
@@ -113,21 +126,10 @@ class Words:
         first = 2 * LANGUAGES[self.language][0]
         return (texts[first], texts[first + 1]) if texts else None
 
-    def branch(self, name: str) -> str:
-        """Branch of the test; a name the table does not have stays as it is."""
-        return self._known(f"branch_{name}", name)
-
-    def fact(self, name: str) -> str:
-        """A fact of the provenance; a name the table does not have stays as it is."""
-        return self._known(f"fact_{name}", name)
-
-    def nuisance(self, name: str) -> str:
-        """What was fitted besides the law; a name the table does not have stands with blanks."""
-        return self._known(f"nuisance_{name}", name.replace("_", " "))
-
-    def _known(self, key: str, otherwise: str) -> str:
+    def known(self, key: str, name: str) -> str:
+        """Words for a key made of a name; where the table does not have it, the name with blanks."""
         row = _table()["words"].get(key)
-        return str(row[LANGUAGES[self.language][0]]) if row else otherwise
+        return str(row[LANGUAGES[self.language][0]]) if row else name.replace("_", " ")
 
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""

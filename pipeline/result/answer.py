@@ -90,7 +90,7 @@ def _rest(part: InversePart | BalancePart) -> tuple[float | None, float | None]:
 
 
 def refuted(diagnosis: DiagnosisPart | None) -> bool:
-    """Whether the data refute the extended model: its curve is no answer."""
+    """Whether the extended model leaves a misfit, too, and knows f_EI less well: its curve is no answer."""
     return diagnosis is not None and diagnosis.extended_refuted
 
 
@@ -103,7 +103,7 @@ def set_aside(result: Result) -> frozenset[str]:
 
 
 def trusted(result: Result) -> dict[str, Visited]:
-    """`curves` without an extended model that the data refute, unless nothing else was found."""
+    """`curves` without an extended one that is `refuted`, unless nothing else was found."""
     parts = curves(result)
     kept = {method: part for method, part in parts.items() if method != "extended"}
     return kept if kept and refuted(result.diagnosis) else parts

@@ -196,7 +196,8 @@ class DiagnosisPart(SaidPart):
     next_experiment: NextExperiment | None = Field(None, description="the cheapest measurement that tells more")
     extended: Curve | None = Field(None, description="f_EI identified again with the extended model")
     extended_refuted: bool = Field(
-        False, description="whether the data refute the extended model, so that its curve is no answer"
+        False,
+        description="whether the extended model leaves a misfit, too, and knows f_EI less well: its curve is no answer",
     )
     widening: Widening | None = Field(
         None, description="what weak effects and something else add to the band of the curve that answers"

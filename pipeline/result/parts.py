@@ -115,7 +115,7 @@ class PhotoPart(SaidPart):
     quality: dict[str, Number] = Field(
         {}, description="how well the photo could be used: contrast_to_noise and the like, plain numbers"
     )
-    preview: PreviewPart | None = None
+    preview: PreviewPart | None = Field(None, description="reduced picture, sizes in px; null if it cannot be read")
 
     @model_validator(mode="after")
     def _whole(self) -> Self:

@@ -33,15 +33,15 @@ class Result(Part):
         description="measured: the simulation was fitted; partial: only the balance equations answer; failed: none does"
     )
     headline: str = Field("", description="the answer in a sentence")
-    specimen: SpecimenPart
+    specimen: SpecimenPart = Field(description="the cable and the rig, as given; lengths in m")
     answer_: Annotated[AnswerPart | None, Field(alias="answer", description="none in the earliest results")] = None
-    scale: ScalePart | None = None
+    scale: ScalePart | None = Field(None, description="of the photos, px/mm; null where no photo has one")
     photos: list[PhotoPart] = Field([], description="every photo that the force log names")
     steps: list[StepPart] = Field([], description="every displacement step")
-    inverse: InversePart | None = None
-    balance: BalancePart | None = None
-    agreement: AgreementPart | None = None
-    diagnosis: DiagnosisPart | None = None
+    inverse: InversePart | None = Field(None, description="f_EI by simulation and fit, N m^2; null where none ran")
+    balance: BalancePart | None = Field(None, description="f_EI by the balance equations, N m^2; null if none")
+    agreement: AgreementPart | None = Field(None, description="of both ways, relative; null without both")
+    diagnosis: DiagnosisPart | None = Field(None, description="what the simulation gets wrong; null without it")
     findings: list[FindingPart] = Field([], description="everything that a reader must know, in order of the stages")
     provenance: dict[str, Any] = Field({}, description="programs, libraries, inputs, settings and command")
 

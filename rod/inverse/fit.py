@@ -70,7 +70,7 @@ class Fit:
 
     @property
     def log_evidence(self) -> float:
-        """Of the data as they are, whatever noise they were fitted with; minus infinity where nothing was fitted."""
+        """Log evidence of the data with their stated noise; minus infinity where nothing was fitted."""
         if self.posterior is None:
             return -np.inf
         counts = (self.evaluation.chi2(kind)[1] for kind in ("shape", "force"))

@@ -167,7 +167,7 @@ def test_headline_of_the_diagnosis(verdict, names, values, told):
                     Message("open.stiffness", at_per_m=5.2, std=0.3),
                 ],
             ),
-            "inverses Problem: die Daten legen nicht jeden Parameter fest (die offenen Kombinationen stehen daneben); "
+            "inverses Problem: Die Daten legen nicht jeden Parameter fest (die offenen Kombinationen stehen daneben); "
             "weiter biegen, Schritte oder ein Foto des kraftfreien Kabels ergänzen; offen: "
             "f_EI bei 3,4 1/m (± 0,2 im Logarithmus); f_EI bei 5,2 1/m (± 0,3 im Logarithmus)",
         ),

@@ -87,6 +87,8 @@ def test_a_number_is_a_stiffness_and_a_curve_stays_itself():
         ({"law": 1.0, "tip": (0.0, 1.0)}, "right=FREE"),
         ({"law": 1.0, "chord": 0.1, "right": FREE}, "right=FREE"),
         ({"law": 1.0, "tip": 1.0, "right": FREE}, "tip is two"),
+        ({"law": 1.0, "chord": 0.1, "left": "clamp"}, "left='clamp' is no support: give BEARING, CLAMP, FREE"),
+        ({"law": 1.0, "chord": 0.1, "right": None}, "right=None is no support"),
         ({"law": 1.0, "displacement": np.nan}, "finite numbers"),
         ({"law": 1.0, "force": np.inf}, "finite numbers"),
         ({"law": 1.0, "chord": 0.1, "load": 3.0}, "load is two"),

@@ -339,6 +339,23 @@ def test_a_coil_is_not_left_on_a_start_of_far_more_energy():
     assert energy(truth) < 0.1 * EI * (7.0 / LENGTH) ** 2 * LENGTH
 
 
+@pytest.mark.parametrize("force", [0.2, 0.3, 1.0])
+def test_the_ends_of_a_coil_do_not_pass_each_other(force):
+    """Where the ends meet a pinned cable turns freely; from 0.22 N on the shape behind is stable again, by itself."""
+    coil = BendingTest(LENGTH, LINEAR, 6.0 / LENGTH)
+    meeting = simulate(coil, chords=[1e-6])[0].force
+    assert simulate(coil, forces=[0.99 * meeting])[0].good
+    for steps in ([force], [0.5 * meeting, force]):
+        stopped = simulate(coil, forces=steps)[-1]
+        assert stopped.outcome is Outcome.BIFURCATION
+        assert abs(stopped.chord) < 1e-6 and abs(stopped.force - meeting) < 1e-3 * meeting
+    assert simulate(coil, forces=[force], branch="jump")[0].good
+    assert simulate(replace(coil, load=(0.0, -0.05)), forces=[force])[0].outcome is Outcome.BIFURCATION
+    spring = Support(stiffness=1e-3)
+    held = simulate(replace(coil, left=spring, right=spring), forces=[force])[0]
+    assert held.good and held.chord < 0.0  # stable all the way, in steps of any length
+
+
 def test_energy_of_a_dead_force_is_that_of_castigliano():
     # d(energy)/d(force) = the place where it acts: chord for P in compression, minus the tip's place for its force
     low, mid, high = (simulate(arch(0.0), forces=[f])[0] for f in (0.2999, 0.3, 0.3001))

@@ -25,14 +25,17 @@
   go(0); line();
   // Marks: clicks on a photo, in its own pixels, as the lines of [[photos]] that correct it in specimen.toml.
   const kind = document.getElementById("mark"), marks = photos.map(() => ({}));
-  const most = { use: 1, ends_px: 2, region_px: 2 };
+  const least = { use: 1, ends_px: 2, path_px: 2, region_px: 2, exclude_px: 3 }, most = { use: 1, ends_px: 2, region_px: 2 };
   const written = {
     use: () => "false",
     region_px: (points) => JSON.stringify([Math.min, Math.max].flatMap((end) => [0, 1].map((k) => end(...points.map((p) => p[k]))))),
     exclude_px: (points) => JSON.stringify([points]),
   };
   const write = () => {
-    const blocks = marks.flatMap((mark, index) => Object.keys(mark).length ? [["[[photos]]", `image = ${JSON.stringify(photos[index].dataset.image)}`, ...Object.entries(mark).map(([key, points]) => `${key} = ${(written[key] ?? JSON.stringify)(points)}`)].join("\n")] : []);
+    const blocks = marks.flatMap((mark, index) => {
+      const lines = Object.entries(mark).filter(([key, points]) => points.length >= least[key]).map(([key, points]) => `${key} = ${(written[key] ?? JSON.stringify)(points)}`);
+      return lines.length ? [["[[photos]]", `image = ${JSON.stringify(photos[index].dataset.image)}`, ...lines].join("\n")] : [];
+    });
     document.getElementById("mark-lines").textContent = blocks.join("\n\n");
     document.getElementById("marked").hidden = !blocks.length;
     photos.forEach((photo, index) => {

@@ -9,7 +9,8 @@ import pytest
 from pipeline.messages import Message, word
 from pipeline.report.answer import first_screen
 from pipeline.report.canvas import page_colours
-from pipeline.report.document import report_html, unbroken, write_report
+from pipeline.report.document import report_html, write_report
+from pipeline.report.page import unbroken
 from pipeline.report.pdf import pdf_bytes
 from pipeline.report.provenance import nuisance_rows
 from pipeline.report.words import Words
@@ -232,6 +233,7 @@ def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
         "Die Datei ist leer."
     )
     assert "Sie danach neu aufnehmen" in page
+    assert "Dieses Foto wurde nicht verwendet: Die Datei ist leer" in page and "abgelehnt: Die Datei ist leer" in page
     assert "simuliert</text>" not in page
 
 
