@@ -5,12 +5,14 @@ Data by collocation, no rod of ours.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from fixtures.continuum import Cable
+from fixtures.continuum import Cable, bend
 from fixtures.effects import LARGEST, PROTOCOLS
-from fixtures.hidden import Reading, hidden_test
+from fixtures.hidden import Protocol, Reading, hidden_test
 from pipeline.diagnosis import diagnose
 from pipeline.faults import faults_of_input
 
@@ -34,6 +36,30 @@ def test_friction_of_the_bearings_that_differs_from_step_to_step():
     assert len(part.causes[0].forms) == 7 and covered > 0.9
     # the mean is known no better than the single ones scatter
     assert part.causes[0].estimate == pytest.approx(1.2e-3, rel=0.3)
+
+
+def with_journals(cable, protocol):
+    """The cable in bearings whose friction grows with the force, to that of the cable at the largest one."""
+    for _ in range(6):  # each time a quarter of what is left to it or less
+        forces = np.array([abs(one.F) for one in bend(cable, protocol.displacements(LARGEST))])
+        cable = replace(cable, friction_varies=tuple(forces / forces.max()))
+    return cable
+
+
+ON_LOADING = Protocol(tuple(i / 6 for i in range(1, 7)), ("loading",) * 6)
+
+
+@pytest.mark.parametrize(("K0", "amount", "protocol"), [(2.0, 3e-3, PROTOCOLS["loop"]), (0.3, 0.015, ON_LOADING)])
+def test_friction_of_the_bearings_that_grows_with_the_force(K0, amount, protocol):
+    """Without a photo at rest a large one was taken for a cable that is bent to the other side at rest."""
+    cable = with_journals(Cable(K0=K0, bearing_friction=amount), protocol)
+    part, _, _ = diagnose(faults_of_input(hidden_test(cable, protocol, largest=LARGEST, seed=47)), None)
+    assert part.verdict == "named" and part.causes[0].name == "bearing_friction", part.headline
+    assert [form.label for form in part.causes[0].forms] == ["that grows with the force"]
+    assert part.causes[0].estimate == pytest.approx(amount, abs=4.0 * part.causes[0].std)
+    curve = part.extended
+    K, f, std = (np.array(row) for row in (curve.kappa_per_m, curve.tangent_Nm2, curve.tangent_std_Nm2))
+    assert np.mean(np.abs(f - cable.law(K - cable.K0)[1]) < 1.96 * std) > 0.9 and np.median(std / f) < 0.03
 
 
 @pytest.mark.parametrize(("protocol", "late"), [("six", 0.0), ("loop", 0.0), ("six", 0.5)])
