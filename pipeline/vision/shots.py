@@ -17,6 +17,7 @@ from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specim
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
+from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     Fixed,
     apart_px,
@@ -62,7 +63,7 @@ def find_cables(
         if _count_of_length(found, stated, most) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
-    radius = _sought(lambda: cover_radius(_with_photos(specimen, ends, settings), settings.bearings))
+    radius = _sought(lambda: cover_radius(_with_photos(specimen, ends, settings)))
     again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
@@ -117,7 +118,7 @@ def _scale_of_covers(specimen: Specimen, shots: list[Shot], settings: VisionSett
     sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
     radii = [axis.radius_px for cable in sure for axis in (cable.left, cable.right) if axis.radius_px is not None]
     diameter = specimen.rig.marker_diameter_m
-    if diameter is None or not radii or np.ptp(radii) > 2.0 * settings.bearings.same_radius * np.median(radii):
+    if diameter is None or not radii or np.ptp(radii) > 2.0 * SAME_RADIUS * np.median(radii):
         return None
     return from_number(2.0 * float(np.median(radii)) / diameter, settings.calibration)
 
@@ -150,7 +151,7 @@ def _find_again(
 ) -> RoughCable | Rejected:
     """The cable on a photo that was searched before."""
     photo = _loaded(specimen, shot.step, settings)
-    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, settings, near)
+    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, near)
 
 
 def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Photo | Rejected:
@@ -158,11 +159,9 @@ def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Pho
     return guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
 
 
-def _find(
-    specimen: Specimen, photo: Photo, cable: Cable, settings: VisionSettings, near: RoughCable | None
-) -> RoughCable | Rejected:
+def _find(specimen: Specimen, photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     hints = specimen.hints.get(photo.name)
-    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near, hints=hints))
+    return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
 
 
 def _with_covers_by_length(
@@ -182,7 +181,7 @@ def _with_covers_by_length(
     lengths = [shot.found.length_px for shot in seen if isinstance(shot.found, RoughCable)]
     expected = 0.5 * diameter_m * float(np.median(lengths)) / (specimen.length_m - diameter_m)
     ends = [seen[0], seen[-1]] if len(seen) > 1 else seen
-    radius = _sought(lambda: rim_radius(_with_photos(specimen, ends, settings), expected, settings.bearings))
+    radius = _sought(lambda: rim_radius(_with_photos(specimen, ends, settings), expected))
     if radius is None:
         return shots
     again = _find_all(specimen, from_number(2.0 * radius / diameter_m, settings.calibration), settings)
@@ -234,7 +233,7 @@ def _find_all(
             scale = 1.0 if calibration is None else calibration.scale.px_per_m
             seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
             cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-        found = _find(specimen, photo, cable, settings, near)
+        found = _find(specimen, photo, cable, near)
         if isinstance(found, RoughCable):
             near, last = found, step
         shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))

@@ -33,7 +33,6 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve
 from pipeline.vision.centerline.curve_fit import CurveFit, rms_of_bow
@@ -60,7 +59,6 @@ def continue_to_axes(
     *,
     kinds: tuple[AxisKind, AxisKind],
     width: float,
-    settings: CurveSettings,
     told: AxesTold | None = None,
 ) -> tuple[CurveFit, Array]:
     """Curve and covariance ``(p, p)`` of its parameters with what is known of the unseen ends.
@@ -94,13 +92,7 @@ def continue_to_axes(
 
 
 def sight_of_axes(
-    fit: CurveFit,
-    covariance: Array,
-    chord: ChordFrame,
-    *,
-    kinds: tuple[AxisKind, AxisKind],
-    width: float,
-    settings: CurveSettings,
+    fit: CurveFit, covariance: Array, chord: ChordFrame, *, kinds: tuple[AxisKind, AxisKind], width: float
 ) -> AxisSight | None:
     """How the curve continued as a bow passes the axes, as above.
 

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median, medians, scatter
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import Image, Standout
-from pipeline.vision.search.flanks import Flanks, find_flanks
+from pipeline.vision.search.backdrop import CELLS_ACROSS, MIN_GROUND_STD, Image, Standout
+from pipeline.vision.search.flanks import PAIR_WIDTH_DOUBT, Flanks, find_flanks
 
+SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
+SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 _TEXTURE_WIDTHS = 12.0  # widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter
 
 
@@ -94,22 +95,23 @@ def cut_across(
     standout: Standout,
     path: Array,
     width: float,
-    settings: SegmentationSettings,
     *,
     known: bool = False,
     shaded: bool = False,
+    doubt: float = PAIR_WIDTH_DOUBT,
     weights: Array | None = None,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    ``shaded`` says that a hard shadow lies on one side; ``weights`` is the colour projection if it is not to be sought.
+    ``shaded`` says that a hard shadow lies on one side; ``doubt`` is that about a known width, see `find_flanks`;
+    ``weights`` is the colour projection if it is not to be sought.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
     of edges one width apart gives middle and width of each section (`pipeline.vision.search.flanks`).
     """
-    path = smooth_path(path, settings.smoothing_widths * width)
+    path = smooth_path(path, SMOOTHING_WIDTHS * width)
     _, normal = path_normals(path)
-    straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
+    straight, rows, offsets = straighten(standout.residual, path, normal, width)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
     relief, ground = against_ground(grey, offsets / width)
@@ -117,7 +119,7 @@ def cut_across(
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
     pitch = len(path) / len(rows)
-    flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
+    flanks = find_flanks(relief, offsets, width, pitch, known=known, doubt=doubt)
     step = _core_level(relief, offsets, flanks)
     texture = _texture(grey, ground, offsets / width, _TEXTURE_WIDTHS * width / pitch, shaded=shaded)
     both = np.isfinite(flanks.left + flanks.right)
@@ -129,7 +131,7 @@ def cut_across(
         width=(flanks.right - flanks.left)[nearest],
         step=step[nearest],
         contrast=median(step),
-        texture=float(np.hypot(texture, settings.min_ground_std)),
+        texture=float(np.hypot(texture, MIN_GROUND_STD)),
         weights=weights,
         dark=sign < 0,
         known=known,
@@ -172,9 +174,7 @@ def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) ->
     return np.asarray(medians(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
 
 
-def straighten(
-    picture: Image, path: Array, normal: Array, width: float, settings: SegmentationSettings
-) -> tuple[Image, Array, Array]:
+def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array, Array]:
     """Picture ``(n, m, c)`` along the path, the places of its rows on it, and the offsets of its columns.
 
     A wide strip is averaged to as many rows and twice as many columns a width as a cable of known diameter has cells.
@@ -183,8 +183,8 @@ def straighten(
     u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
     v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
     straight = np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    rows = round(len(path) / max(1, int(width / settings.cells_across)))
-    columns = len(offsets) // max(1, int(0.5 * width / settings.cells_across))
+    rows = round(len(path) / max(1, int(width / CELLS_ACROSS)))
+    columns = len(offsets) // max(1, int(0.5 * width / CELLS_ACROSS))
     if (columns, rows) != (len(offsets), len(path)):
         straight = np.asarray(cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
     place, offset = _centres(len(path), rows), _centres(len(offsets), columns)

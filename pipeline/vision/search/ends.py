@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.median import median, scatter
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import arc_lengths, step_lengths
@@ -26,6 +25,7 @@ from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.closeup import Closeup
 from pipeline.vision.search.strips import end_direction
 
+COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
 _TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
 _CUT_STD_WIDTHS = 0.04  # widths; a cut with pliers is square and the path centred to about a twentieth
@@ -77,11 +77,9 @@ def at_border(place: Sequence[float] | Array, photo: Photo, width_px: float) -> 
     return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < reach)
 
 
-def lead_to_axes(
-    standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing], settings: BearingSettings
-) -> Array:
+def lead_to_axes(standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing]) -> Array:
     """The path (cells) with straight ends up to the rim of each cover, or to the axis where there is no cover."""
-    margin = settings.cover_margin_widths * width
+    margin = COVER_MARGIN_WIDTHS * width
     for axis in axes:
         path = path[::-1]
         center = standout.to_cells(np.array(axis.center_px))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import told_by_others
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.path import fit_along
@@ -22,7 +21,7 @@ from tests.rod.elastica import natural_chord, uniform_equilibrium
 LEAST_SCORE = 0.45
 """Standard deviations, rms: a band twice as wide as its errors leaves room for cables that go on otherwise."""
 PARALLAX = 0.003  # covers 3 mm above the plane, a metre from the camera
-SETTINGS, HIDDEN, ERROR, COUNT = CurveSettings(), 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
+HIDDEN, ERROR, COUNT = 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
 
 
 def straight_bow(rng):
@@ -69,7 +68,7 @@ def _errors(case, *, kinds=("cover", "cover"), beside=0.0, apart=0.0, known=True
     fit, curve = case
     covariance = fit.smooth.covariance
     if known:
-        known_of = {"kinds": kinds, "width": DIAMETER, "settings": SETTINGS, "told": told}
+        known_of = {"kinds": kinds, "width": DIAMETER, "told": told}
         fit, covariance = continue_to_axes(*_seen(case, beside, apart), **known_of)
     ends = np.array([0.0, LENGTH])
     basis = fit.curve.curvature_basis(ends)
@@ -116,7 +115,7 @@ def test_axes_of_visible_ends_tell_roughly_where_the_curve_ends(cases):
 def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
     """Twelve bows taken for photos of one camera: what they share is found, and the ends come out better for it."""
     off = {"beside": 0.0, "apart": 0.0} | off
-    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
+    known = {"kinds": ("cover", "cover"), "width": DIAMETER}
     together = told_by_others([sight_of_axes(*_seen(case, **off), **known) for case in cases])
     alone = _rms([_errors(case, **off)[0] for case in cases])
     found = [_errors(case, **off, told=told) for case, told in zip(cases, together, strict=True)]
@@ -127,6 +126,6 @@ def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
 
 def test_a_photo_of_unknown_errors_tells_the_others_nothing(cases):
     fit, covariance, chord = _seen(cases[0], 0.0, 0.0)
-    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
+    known = {"kinds": ("cover", "cover"), "width": DIAMETER}
     assert sight_of_axes(fit, covariance, chord, **known) is not None
     assert sight_of_axes(fit, np.full_like(covariance, np.nan), chord, **known) is None

@@ -207,7 +207,7 @@ def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
     traces = trace_series(series(tmp_path, given=given, covers=False, camera=camera), SETTINGS)
     for line, curve in zip(lines(traces), CURVES, strict=True):
         assert line.chord_m == pytest.approx(curve.chord)
-        assert line.axis_std_px == pytest.approx(SETTINGS.bearings.given_std_px)
+        assert line.axis_std_px == pytest.approx(1.0)
 
 
 def test_a_cable_seen_far_from_a_given_axis_only_is_refused(tmp_path: Path) -> None:
