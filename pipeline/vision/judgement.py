@@ -180,13 +180,10 @@ def _axes(
         find_end(strip.path[::-1], reading, standout, cover),
         find_end(strip.path, reading, standout, cover),
     )
-    hidden = cover is not None or cable.bearings.given_px is not None
-    leaving = [end.place for end in ends if at_border(end.place, photo, width)]
-    if leaving and not hidden:
-        return _leaves(photo, leaving[0])
     first, second = find_bearings(photo, ends, width, cable.bearings)
     if first is not None and second is not None:
         return first, second
+    leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving:
         return _leaves(photo, leaving[0])
     place = ends[0 if first is None else 1].place
@@ -228,7 +225,7 @@ def _assemble(
     width = cut.usual_width * standout.reduction
     closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width)
     ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
-    leaving = [place for place in ends if at_border(place, photo, width)]
+    leaving = [place for place in ends if at_border(place, photo, standout.reduction, width)]
     if leaving:
         return _leaves(photo, leaving[0])
     path, visible = between_axes(path, axes, COVER_MARGIN_WIDTHS * width)

@@ -20,7 +20,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.vision.median import median, medians, quantile, scatter
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.rough import Bearing
 
 RADIUS_STD = 0.01  # relative; of a cover's radius in px where the scale is known: 0.1 mm on 12 mm, and light
@@ -160,12 +160,12 @@ def _radial_slopes(
         return _Slopes(offsets, nothing, nothing, 0.0, np.zeros(len(ray), bool))
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32)
     part *= np.float32(1.0 / photo.full_scale)
-    u, v = (np.outer(ray[:, k], distance).astype(np.float32) + np.float32(parameters[k] - low[k]) for k in (0, 1))
-    profile = np.asarray(cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    slope = _smoothed_slope(profile.reshape(*u.shape, -1), pooled_rays * softness, 2.0 * softness)
+    places = distance[:, None] * ray[:, None] + (parameters[:2] - low)
+    profile = sampled(part, places).reshape(*places.shape[:2], -1)
+    slope = _smoothed_slope(profile, pooled_rays * softness, 2.0 * softness)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
-    outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
+    outside = ((places < 1) | (places > np.array(part.shape[1::-1]) - 2)).any(axis=2)
     if one_sign:
         colour = np.broadcast_to(slope[:, np.abs(offsets) < 0.75].mean(axis=(0, 1)), (len(ray), slope.shape[2]))
     else:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from pipeline.records import Array
@@ -26,7 +25,7 @@ from pipeline.vision.bearings.rim import (
     fit_circle,
 )
 from pipeline.vision.median import median
-from pipeline.vision.photo import Photo, reduce_area
+from pipeline.vision.photo import Photo, reduce_area, sampled
 
 MARK_CELLS = 12.0  # cells; a mark's largest radius in the picture it is searched on: a line stays a cell wide
 SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: a sticker, a hole beside it
@@ -139,12 +138,9 @@ def _slopes(photo: Photo, centers: Array, radius: float, step: float) -> Array:
     low = np.maximum(np.floor(centers.min(axis=0) - 1.1 * radius).astype(int) - 1, 0)
     high = np.minimum(np.ceil(centers.max(axis=0) + 1.1 * radius).astype(int) + 2, photo.size)
     part = photo.pixels[low[1] : high[1], low[0] : high[0]]
+    rays = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])[:, None]
     # all centres in one picture: a row for each ray of each
-    u, v = (
-        (np.outer(turn, distance) + (centers[:, k, None, None] - low[k])).astype(np.float32).reshape(-1, len(distance))
-        for k, turn in enumerate((np.cos(angle), np.sin(angle)))
-    )
-    values = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values = sampled(part, (rays + (centers - low)[:, None, None]).reshape(-1, len(distance), 2))
     mean = values.reshape(len(centers), len(angle), len(distance), -1).mean(axis=1) / photo.full_scale
     return np.asarray(np.diff(mean, axis=1) / step)
 

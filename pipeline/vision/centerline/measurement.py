@@ -40,7 +40,7 @@ from pipeline.vision.centerline.refusal import (
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.rough import AxisKind, RoughCable
+from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
 from rod.measurement import MeasuredShape
@@ -99,15 +99,11 @@ class Followed:
 
     def sight(self) -> AxisSight | None:
         """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
-        return sight_of_axes(
-            self.fit, self.covariance, self.chord, kinds=self._kinds, width=middle_width(self.width)[0]
-        )
+        return sight_of_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0])
 
     def tied(self, told: AxesTold | None) -> tuple[CurveFit, Array]:
         """Curve and covariance with what is known of the axes."""
-        return continue_to_axes(
-            self.fit, self.covariance, self.chord, kinds=self._kinds, width=middle_width(self.width)[0], told=told
-        )
+        return continue_to_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0], told=told)
 
     def half_widths(self) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
@@ -136,13 +132,9 @@ class Followed:
         A visible end lies on the curve: what is open is where along it, and that moves it across the chord by the
         slope of the curve there.
         """
-        if self._kinds[0] in ("cover", "given"):
+        if self.chord.marked:
             return self.chord.axis_std
         return self.chord.axis_std * float(np.sqrt(np.mean(np.sin(fit.curve.at(feet)[1]) ** 2)))
-
-    @property
-    def _kinds(self) -> tuple[AxisKind, AxisKind]:
-        return self.rough.left.kind, self.rough.right.kind
 
 
 def follow_cable(
@@ -286,7 +278,7 @@ def centerline_of(
         width_std_m=scatter * middle,
         mirrored=chord.mirrored,
         quality=quality,
-        findings=rough.findings + beside_axis(float(misses.max()), middle),
+        findings=rough.findings + (beside_axis(float(misses.max()), middle) if chord.marked else ()),
     )
 
 

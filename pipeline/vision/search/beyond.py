@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.vision.median import median
+from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
@@ -262,8 +263,6 @@ def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDA
 def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     """Step of each section by the brightness of its ground."""
     _, normal = path_normals(cut.path)
-    beside = (cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]).astype(np.float32)
-    ground = cv2.remap(
-        standout.picture, beside[..., 0], beside[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    beside = cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]
+    ground = sampled(standout.picture, beside)
     return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _BEYOND_DARKEST))

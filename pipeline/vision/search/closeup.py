@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.search.crosscut import path_normals
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
@@ -118,10 +118,8 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
     offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
     spreads = []
     for side in (-0.5, 0.5):
-        away = side * width + offsets
-        u, v = ((centre[:, k, None] + across[:, k, None] * away).astype(np.float32) for k in (0, 1))
-        profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets, outward=side > 0.0))
+        profile = sampled(grey, centre[:, None] + across[:, None] * (side * width + offsets)[:, None])
+        spreads.append(_spread_of_groups(profile, offsets, outward=side > 0.0))
     along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
     return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
 

@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from pipeline.records import Array
 from pipeline.vision.median import median, medians, scatter
+from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import CELLS_ACROSS, MIN_GROUND_STD, Image, Standout
 from pipeline.vision.search.flanks import PAIR_WIDTH_DOUBT, Flanks, find_flanks
@@ -180,9 +181,7 @@ def straighten(picture: Image, path: Array, normal: Array, width: float) -> tupl
     A wide strip is averaged to as many rows and twice as many columns a width as a cable of known diameter has cells.
     """
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
-    u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
-    v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
-    straight = np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    straight = sampled(picture, path[:, None] + normal[:, None] * offsets[:, None])
     rows = round(len(path) / max(1, int(width / CELLS_ACROSS)))
     columns = len(offsets) // max(1, int(0.5 * width / CELLS_ACROSS))
     if (columns, rows) != (len(offsets), len(path)):
