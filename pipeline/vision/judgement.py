@@ -16,7 +16,6 @@ from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.evidence import Course, weigh
-from pipeline.vision.median import scatter
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
@@ -38,11 +37,9 @@ from pipeline.vision.search.strips import Strip
 from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
-_FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
 _LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
-_SURE_WIDTH_SCATTER = 0.04  # relative, robust; a cable's edges keep their distance, a texture's vary by 0.1
 _ACCEPTED_WIDTH_RATIO = (0.65, 1.35)  # ratio of the edges' distance to the diameter; a sheath may be dark at its flanks
 
 
@@ -72,18 +69,6 @@ def refused(photo: Photo, key: str, **figure: float) -> Rejected:
     return Rejected(photo.name, Message(key, **figure))
 
 
-def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable) -> CrossCut:
-    """Cross-cuts along a path (cells); where their width is not constant, those of edges a known diameter apart."""
-    if cable.diameter_px is None:
-        return cut_across(standout, path, reading.width)
-    if not reading.banded:
-        cut = cut_across(standout, path, reading.width, known=True)
-        width = cut.seen_widths
-        if len(width) and scatter(width) < _SURE_WIDTH_SCATTER * cut.usual_width:
-            return cut
-    return cut_across(standout, path, reading.width, known=True, shaded=reading.banded, doubt=0.0)
-
-
 def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable
 ) -> RoughCable | Rejected:
@@ -92,7 +77,7 @@ def judge_strip(
     going_on = outcome.code == "photo/hidden-end" if isinstance(outcome, Rejected) else outcome.goes_on
     if not going_on:
         return outcome
-    cut = _cut(standout, strip.path, reading, cable)
+    cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
     path = follow(standout, cut, cut.usual_width)
     if path is None:
         return outcome
@@ -103,7 +88,7 @@ def judge_strip(
 
 
 def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable) -> RoughCable | Rejected:
-    cut = _cut(standout, strip.path, reading, cable)
+    cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
     if approaches_itself(strip.path, reading.width):
         return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
@@ -113,14 +98,12 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     if isinstance(axes, Rejected):
         if branching:  # which of its arms leaves the picture nobody can tell
             return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
-        if cut.contrast < _FAINT * cut.texture:  # a fold of the cloth may leave the picture
-            return refused(photo, "photo/contrast.faint", contrast_to_noise=cut.contrast / cut.texture)
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
     short = short_of_axis(standout, cut, axes)
     if short is not None:
         return _goes_on_beyond(photo, short)
     path = lead_to_axes(standout, strip.path, reading.width, axes)
-    cut = _cut(standout, path, reading, cable)
+    cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     refusal = _check_width(photo, cut, standout.reduction, cable)
@@ -180,10 +163,12 @@ def _axes(
         find_end(strip.path[::-1], reading, standout, cover),
         find_end(strip.path, reading, standout, cover),
     )
+    leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
+    if leaving and cover is None and cable.bearings.given_px is None:
+        return _leaves(photo, leaving[0])
     first, second = find_bearings(photo, ends, width, cable.bearings)
     if first is not None and second is not None:
         return first, second
-    leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving:
         return _leaves(photo, leaving[0])
     place = ends[0 if first is None else 1].place
@@ -234,7 +219,6 @@ def _assemble(
     moved = _moved(photo, closeup, width)
     if moved is not None:
         return moved
-    ratio = cut.contrast / float(np.hypot(cut.texture, closeup.noise))
     return RoughCable(
         image=photo.name,
         path_px=path,
@@ -246,11 +230,9 @@ def _assemble(
         origin_px=closeup.origin_px,
         dark=cut.dark,
         contrast=cut.contrast,
-        noise=closeup.noise,
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         grid_px=photo.grid_px,
-        quality={"contrast_to_noise": ratio, "width_scatter": scatter(cut.seen_widths) / cut.usual_width},
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
 

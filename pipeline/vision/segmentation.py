@@ -18,7 +18,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array, PhotoHints, Rejected
-from pipeline.vision.bearings.axes import SoughtCovers
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
@@ -91,7 +90,7 @@ def _is_settled(found: RoughCable) -> bool:
 
 def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     """Find the cable where a neighbour photo lets it be expected, then anywhere."""
-    cable = replace(cable, bearings=replace(cable.bearings, sought=SoughtCovers()))
+    cable = replace(cable, bearings=replace(cable.bearings, sought=[]))
     if cable.path_px:
         return _along_clicks(photo, cable)
     if near is not None and cable.region is None:
@@ -109,7 +108,7 @@ def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
         reading = reading_along(standout, cable.path_px, width)
         outcome = judge_strip(photo, standout, reading, reading.strips[0], cable)
         judged.append(_Judged([outcome], [standout.to_pixels(reading.strips[0].path)], [width]))
-    return _chosen(photo, judged, _RIVAL_SHARE)
+    return _chosen(photo, judged)
 
 
 def _is_slender(found: RoughCable | Rejected, slenderness: float) -> bool:
@@ -177,10 +176,10 @@ def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> Rou
                 break
             return _blank(photo) or _nothing(photo, standout, readings[0], known=wanted.width is not None)
         judged += [_judged(photo, standout, reading, wanted, cable) for reading in readings]
-        outcome = _chosen(photo, judged, _RIVAL_SHARE)
+        outcome = _chosen(photo, judged)
         if isinstance(outcome, RoughCable) and _is_settled(outcome):
             return outcome
-    return _chosen(photo, judged, _RIVAL_SHARE)
+    return _chosen(photo, judged)
 
 
 def _find_alone(photo: Photo, cable: Cable, reduction: int, window: Window | None) -> RoughCable | None:
@@ -198,7 +197,7 @@ def _find_alone(photo: Photo, cable: Cable, reduction: int, window: Window | Non
     reading = read_alone(standout, wanted)
     if reading is None:
         return None
-    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable)], _RIVAL_SHARE)
+    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable)])
     return found if isinstance(found, RoughCable) and _is_settled(found) else None
 
 
@@ -218,12 +217,12 @@ def _judged(photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, 
     return _Judged(judged, paths, [strip.length * reading.width for strip in strips])
 
 
-def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCable | Rejected:
+def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     """The strip of all readings with the most evidence, or why there is none."""
     likely = [found for reading in judged for found in reading.outcomes if isinstance(found, RoughCable)]
     # a shadow that lies apart from the cable is as long and fainter
     strongest = max((found.contrast for found in likely), default=0.0)
-    likely = [found for found in likely if found.contrast >= rival_share * strongest]
+    likely = [found for found in likely if found.contrast >= _RIVAL_SHARE * strongest]
     likely.sort(key=lambda found: -found.evidence.value)
     refusals = [
         (area, outcome, path)

@@ -40,7 +40,7 @@ from pipeline.vision.scale.calibration import (
 from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
-from pipeline.vision.single import shown, trace_photo
+from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
 
 Line = Centerline | Rejected
@@ -69,7 +69,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         The calibration photos cannot be used.
     """
     traces = _traces(specimen, settings)
-    return with_width_seen(specimen, traces, settings, retrace=_traces, trace=trace_photo)
+    return with_width_seen(specimen, traces, settings, _traces)
 
 
 def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:

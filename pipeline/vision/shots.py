@@ -16,7 +16,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
-from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
+from pipeline.vision.bearings.cover_size import cover_radius
 from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     Fixed,
@@ -51,8 +51,6 @@ def find_cables(
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
     shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
-    if calibration is None and specimen.rig.marker_diameter_m is not None:
-        return _with_covers_by_length(specimen, specimen.rig.marker_diameter_m, shots, settings), ()
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
         return shots, ()
@@ -162,31 +160,6 @@ def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Pho
 def _find(specimen: Specimen, photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     hints = specimen.hints.get(photo.name)
     return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
-
-
-def _with_covers_by_length(
-    specimen: Specimen, diameter_m: float, shots: list[Shot], settings: VisionSettings
-) -> list[Shot]:
-    """Where most photos show no cover of the expected size: searched again with what the cable's length tells of it.
-
-    Without a scale the covers are expected in widths of the cable, and a shadow beside it makes it seem wider.
-    """
-    refused = sum(isinstance(shot.found, Rejected) and shot.found.code == "photo/bearing" for shot in shots)
-    if 2 * refused <= len(shots):
-        return shots
-    bare = replace(specimen, rig=replace(specimen.rig, marker_diameter_m=None))
-    seen = [shot for shot in _find_all(bare, None, settings) if isinstance(shot.found, RoughCable)]
-    if not seen:
-        return shots
-    lengths = [shot.found.length_px for shot in seen if isinstance(shot.found, RoughCable)]
-    expected = 0.5 * diameter_m * float(np.median(lengths)) / (specimen.length_m - diameter_m)
-    ends = [seen[0], seen[-1]] if len(seen) > 1 else seen
-    radius = _sought(lambda: rim_radius(_with_photos(specimen, ends, settings), expected))
-    if radius is None:
-        return shots
-    again = _find_all(specimen, from_number(2.0 * radius / diameter_m, settings.calibration), settings)
-    better = sum(isinstance(shot.found, RoughCable) for shot in again) > len(shots) - refused
-    return again if better else shots
 
 
 def _with_axes_shown(shot: Shot) -> Shot:

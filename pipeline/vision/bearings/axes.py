@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_again, find_cover
-from pipeline.vision.bearings.rim import RADIUS_STD, SAME_RADIUS, Circle, Radius
+from pipeline.vision.bearings.rim import RADIUS_STD, Circle, Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
@@ -24,33 +24,8 @@ PixelPair = tuple[tuple[float, float], tuple[float, float]]
 VERTICAL_DEG = 10.0  # degrees; a chord nearer to the vertical has no left end that a person would agree on
 _GIVEN_STD_PX = 1.0  # px; how well a person reads an axis off a screen
 _RADIUS_STD_BY_CABLE = 0.05  # relative; where only the cable's width on the photo tells the scale
-_SAME_END_RADII = 0.1
-"""Radii of a cover, and rad; strips of one photo that end so near and alike show one cover or none: a tenth of what a
-mask's end is allowed to be off.
-"""
+_SAME_END = 0.1  # radii of a cover, rad and relative; strips that end so near and alike show one cover or none
 _END_STD_WIDTHS = 0.1  # widths; a cut or clamped end is found to about a tenth of the cable's width
-
-
-@dataclass
-class SoughtCovers:
-    """Covers sought on one photo: the strips of all its readings end at a few places, each is searched once."""
-
-    done: list[tuple[CableEnd, Radius, float, Circle | None]] = field(default_factory=list)
-
-    def at(self, photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
-        """As `find_cover`, or what it said of an end that is the same within ``_SAME_END_RADII``."""
-        near, about = _SAME_END_RADII, SAME_RADIUS
-        for other, sought, width, circle in self.done:
-            if (
-                np.hypot(*(end.place - other.place)) < near * radius.px
-                and np.hypot(*(end.outward - other.outward)) < near
-                and abs(sought.px - radius.px) < about * radius.px
-                and abs(width - width_px) < 2.0 * about * width_px
-            ):
-                return circle
-        circle = find_cover(photo, end, radius, width_px)
-        self.done.append((end, radius, width_px, circle))
-        return circle
 
 
 @dataclass(frozen=True)
@@ -67,15 +42,15 @@ class BearingHints:
         Axes by the user.
     seen : tuple of Bearing
         Covers of a neighbouring photo, where they are to be expected on this one.
-    sought : SoughtCovers
-        What was found or not on this photo already.
+    sought : list
+        Where strips end on this photo, and the cover found there or not.
     """
 
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
     seen: tuple[Bearing, ...] = ()
-    sought: SoughtCovers = field(default_factory=SoughtCovers, compare=False)
+    sought: list[tuple[Array, Circle | None]] = field(default_factory=list, compare=False)
 
     def cover_radius(self, width_px: float) -> float | None:
         """Expected radius of a cover in px; None if there are no covers."""
@@ -98,7 +73,13 @@ def find_bearings(
     axes: list[Bearing | None] = [None, None]
     for k, end in enumerate(ends):
         circle = find_again(photo, end, hints.seen, expected)
-        circle = circle or hints.sought.at(photo, end, expected, width_px)
+        # strips of all readings of a photo end at a few places: each is searched once
+        known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
+        alike = [found for other, found in hints.sought if np.abs(known - other).max() < _SAME_END]
+        if circle is None and not alike:
+            alike = [find_cover(photo, end, expected, width_px)]
+            hints.sought.append((known, alike[0]))
+        circle = circle or alike[0]
         if circle is None:
             break  # one is not enough, whatever the other would be
         axes[k] = circle.as_bearing()

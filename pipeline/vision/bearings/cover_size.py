@@ -23,7 +23,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_rim
-from pipeline.vision.bearings.rim import MIN_RIM, SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
+from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
 from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
@@ -88,27 +88,6 @@ def _same(lost: _LostEnd, radius: float) -> float | None:
         if abs(circle.radius - radius) <= SAME_RADIUS * radius:
             return circle.radius
     return None
-
-
-def rim_radius(seen: Iterable[tuple[Photo, RoughCable]], expected_px: float) -> float | None:
-    """Radius of covers about as large as expected; None unless half the ends show one, of one radius.
-
-    Parameters
-    ----------
-    seen : iterable of (Photo, RoughCable)
-        As in `cover_radius`.
-    expected_px : px
-        Radius, to a tenth.
-    """
-    expected = Radius(expected_px, 0.5 * SEARCH_RADII)
-    rims = [
-        find_rim(photo, end, expected, 2.0 * cable.half_width_px)
-        for photo, cable in seen
-        for end in visible_ends(cable)
-    ]
-    radii = [rim.radius for rim in rims if rim is not None and rim.rim >= MIN_RIM]
-    alike = _alike(radii) if 2 * len(radii) >= max(len(rims), 4) else None
-    return None if alike is None else median(alike)
 
 
 def _alike(values: Iterable[float | None]) -> list[float] | None:

@@ -10,7 +10,7 @@ Units: px of the photo as displayed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -101,7 +101,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
     # a sharp rim, what is soft and round is the shadow.
     partial: Circle | None = None
-    fits = _Fits(photo, radius)
+    fits: list[tuple[float, Array, Circle | None]] = []
     sharp, soft = (1.0, MIN_RIM), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
     for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
         if softness > 1.0 and partial is not None:
@@ -109,7 +109,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             votes = _votes(window, radius.px / window.reduction, on_cable, sectors=sectors) * prior
-            found = _best_circle(fits, window, votes, softness)
+            found = _best_circle(photo, radius, fits, window, votes, softness)
             if found is not None and found.rim >= SURE_RIM:
                 return found
             if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
@@ -117,7 +117,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
     votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool)) * ahead
-    farther = _best_circle(fits, window, votes, 1.0)
+    farther = _best_circle(photo, radius, fits, window, votes, 1.0)
     return farther if farther is not None and farther.rim >= SURE_RIM else partial
 
 
@@ -180,36 +180,34 @@ def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | Non
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-@dataclass
-class _Fits:
-    """Circles fitted on one photo: votes counted in several ways lead to the same few centres, each is fitted once."""
-
-    photo: Photo
-    radius: Radius
-    done: list[tuple[float, Array, Circle | None]] = field(default_factory=list)
-
-    def at(self, center: Array, softness: float) -> Circle | None:
-        same = 0.5 * SEARCH_RADII * self.radius.px  # well within what a fit searches
-        for other, place, circle in self.done:
-            if other == softness and np.hypot(*(place - center)) < same:
-                return circle
-        circle = fit_circle(self.photo, center, self.radius, softness=softness)
-        self.done.append((softness, center, circle))
-        return circle
-
-
-def _best_circle(fits: _Fits, window: _Window, votes: NDArray[np.float32], softness: float) -> Circle | None:
+def _best_circle(
+    photo: Photo,
+    radius: Radius,
+    fits: list[tuple[float, Array, Circle | None]],
+    window: _Window,
+    votes: NDArray[np.float32],
+    softness: float,
+) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     votes = votes.copy()
     best: Circle | None = None
     for _ in range(_CANDIDATES):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fits.at(window.to_pixels(np.array([u, v], float)), softness)
+        center = window.to_pixels(np.array([u, v], float))
+        # votes counted in several ways lead to the same few centres: each is fitted once, within what a fit searches
+        same = [
+            known
+            for soft, place, known in fits
+            if soft == softness and np.hypot(*(place - center)) < 0.5 * SEARCH_RADII * radius.px
+        ]
+        circle = same[0] if same else fit_circle(photo, center, radius, softness=softness)
+        if not same:
+            fits.append((softness, center, circle))
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
         if best is not None and best.rim > SURE_RIM:
             break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * fits.radius.px / window.reduction)), 0.0, cv2.FILLED)
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
     return best
 
 

@@ -257,7 +257,7 @@ def centerline_of(
     own_std = length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
-    quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
+    quality = _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
     if followed.diameter_m is not None:
         quality["width_over_diameter"] = middle / followed.diameter_m
     return Centerline(

@@ -23,7 +23,7 @@ from scipy.special import erf
 
 from pipeline.records import Array
 
-CORNER_STEP_PX = 1e-3  # px; a tenth of what noise leaves at best
+_CORNER_STEP_PX = 1e-3  # px; a tenth of what noise leaves at best
 _ROUNDS = 15
 _CORNER_REACH = 0.4  # squares; how far from a corner its edges are fitted: before the next corner's
 _CORNER_MARGIN = 0.9  # share of the white margin beside a ChArUco marker; the rest is the marker's blur
@@ -95,11 +95,11 @@ def _refined(grey: Array, start: Array, cell: Array, window: Window) -> Array:
         move = np.clip(step[:2], -1.0, 1.0)
         at, turn = at + move, turn + np.clip(step[2:4], -0.1, 0.1)
         log_sigma += float(np.clip(step[4], -0.5, 0.5))
-        if np.abs(move).max() < CORNER_STEP_PX:
+        if np.abs(move).max() < _CORNER_STEP_PX:
             break
     clear = abs(amount[1]) > _CORNER_CONTRAST * float(np.std(left))
     stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < window.reach * square
-    return at if clear and stayed and np.abs(move).max() < 10.0 * CORNER_STEP_PX else lost
+    return at if clear and stayed and np.abs(move).max() < 10.0 * _CORNER_STEP_PX else lost
 
 
 def _pixels(grey: Array, start: Array, cell: Array, window: Window, reach_px: float) -> tuple[Array, Array]:

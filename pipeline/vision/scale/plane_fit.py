@@ -21,10 +21,10 @@ from scipy.optimize import least_squares
 from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.vision.median import scatter
-from pipeline.vision.scale.corners import CORNER_STEP_PX
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
 USUAL_LENS = 0.02  # relative; standard deviation of k1 at half the diagonal among lenses nobody corrected
+_LEAST_STD_PX = 1e-3  # px; of corners: a tenth of what noise leaves at best
 _LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
 _DISTANCE_STD = 0.3  # relative; a distance known worse tells no more than a usual one
 _CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
@@ -214,7 +214,7 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float) -> _So
         found = least_squares(residual, q, x_scale="jac", loss="soft_l1", f_scale=3.0 * used, max_nfev=60)
         q, error = np.asarray(found.x), corners(np.asarray(found.x))
         # of most of them: a corner mistaken for another thing shall not widen what it is judged by
-        std = max(scatter(error, 0.0), CORNER_STEP_PX)
+        std = max(scatter(error, 0.0), _LEAST_STD_PX)
     rms = float(np.sqrt(error @ error / max(len(error) - len(q), 1)))
     slopes = np.asarray(found.jac)
     slopes[-1] *= rms / used

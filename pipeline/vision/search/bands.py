@@ -55,7 +55,7 @@ def _cable_within(picture: Image, band: Strip, width: float, search: float) -> S
         return None
     _, normal = path_normals(path)
     straight, rows, offsets = straighten(picture, path, normal, width)
-    flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), known=True, doubt=0.0, search=search)
+    flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), known=True, search=search)
     both = np.isfinite(flanks.left + flanks.right)
     if both.mean() < _MIN_BAND_EDGES:
         return None

@@ -18,10 +18,9 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array
 from pipeline.vision.median import median
 from pipeline.vision.photo import sampled
-from pipeline.vision.polyline import step_lengths
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
-from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, against_ground, cut_across, path_normals, straighten
+from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, straight_body
 from pipeline.vision.search.strips import JOINT_ANGLE_DEG, THICK_WIDTHS, Strip, end_direction, thick_part
 
@@ -75,10 +74,7 @@ def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) ->
     _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0])
     if len(ahead) < near.stop or before <= 0.0:
         return False
-    ahead = ahead[: near.stop + round(width)]
-    if not _may_fade(standout, cut, ahead, near, width, _FADING_SHARE * before):
-        return False
-    more = cut_across(standout, ahead, width, known=True, weights=cut.weights)
+    more = cut_across(standout, ahead[: near.stop + round(width)], width, known=True, weights=cut.weights)
     same = np.abs(more.width[near] / width - 1.0) < _BEYOND_WIDTH_OFF
     faint = median(more.step[near]) > _FADING_SHARE * before
     return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
@@ -108,10 +104,9 @@ def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_sta
         if other.length > MIN_PARTNER_WIDTHS * width and _arc_joins(path[-1], leaving, rest, width)
     ]
     for gap, rest in sorted(facing, key=lambda found: found[0]):
-        for known in {True, cut.known}:
-            more = cut_across(standout, rest, width, known=known, weights=cut.weights)
-            if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
-                return gap
+        more = cut_across(standout, rest, width, known=True, weights=cut.weights)
+        if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
+            return gap
     return None
 
 
@@ -173,27 +168,25 @@ def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Stri
 def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tuple[Array | None, int]:
     """The path and the more of the same beyond its last point, None if there is none; and how much in all there is.
 
-    A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place; and
-    the width of a mask, by which the strip's edges were sought, may be that of the cable or not.
+    A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place.
     """
     usual = median(_weber(standout, cut, width))
     best, scraps = None, 0
     for lead in _BEYOND_LEADS_WIDTHS:
         led, ahead = _led_into_picture(standout, path, width, lead)
-        if not _may_go_on(standout, cut, ahead, width, usual):
+        if len(ahead) < LEAST_MORE_WIDTHS * width:
             continue
-        for known in {True, cut.known}:
-            more = cut_across(standout, ahead, width, known=known, weights=cut.weights)
-            if more.dark != cut.dark:
-                continue
-            alike = _alike(standout, more, width, usual)
-            scraps = max(scraps, int(alike.sum()))
-            # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
-            stop = min(_end_of_more(more, alike, width, cut.contrast), len(ahead))
-            if stop and (best is None or len(led) + stop > len(best)):
-                best = np.vstack([led, more.path[:stop]])
-                if stop > 0.8 * len(ahead):
-                    return best, scraps  # no other lead is much better
+        more = cut_across(standout, ahead, width, known=True, weights=cut.weights)
+        if more.dark != cut.dark:
+            continue
+        alike = _alike(standout, more, width, usual)
+        scraps = max(scraps, int(alike.sum()))
+        # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
+        stop = min(_end_of_more(more, alike, width, cut.contrast), len(ahead))
+        if stop and (best is None or len(led) + stop > len(best)):
+            best = np.vstack([led, more.path[:stop]])
+            if stop > 0.8 * len(ahead):
+                break  # no other lead is much better
     return best, scraps
 
 
@@ -207,40 +200,6 @@ def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, contras
     # edges are lost at the rounded corners of an end, a width of it at most
     faint = np.flatnonzero(more.step[stop : stop + round(width)] < SEEN_SHARE * contrast)
     return min(stop + (int(faint[0]) if len(faint) else round(width)), len(alike))
-
-
-def _may_go_on(standout: Standout, cut: CrossCut, ahead: Array, width: float, usual: float) -> bool:
-    """False where so little stands out of the ground about a lead that, cut across, it could show no more of the same.
-
-    Sections alike hold a core, at least half a width broad, that stands out as `_alike` asks in its median: a quarter
-    of a width then stands out so far, wherever it lies.
-    """
-    least = LEAST_MORE_WIDTHS * width
-    if len(ahead) < least:
-        return False
-    straight, _, _ = straighten(standout.picture, ahead, path_normals(ahead)[1], width)
-    darkest = np.maximum(straight.mean(axis=2).min(axis=1), _BEYOND_DARKEST)
-    strong = _standing_out(standout, cut, ahead, width, (_BEYOND_CONTRAST[0] * usual) * darkest[:, None])
-    length = float(step_lengths(ahead).sum())
-    return bool(np.count_nonzero(strong >= 0.25) * length / (len(strong) - 1) > least)
-
-
-def _may_fade(standout: Standout, cut: CrossCut, ahead: Array, near: slice, width: float, least: float) -> bool:
-    """False where so little stands out of the ground by ``least`` about a lead that it shows no cable that only fades.
-
-    Half of the sections ``near`` would hold a core half a width broad (edges a width apart to 15 %, a pair's to 20 % of
-    that) that stands out so far in its median: a fifth of a width does then, on two fifths of them at the very least.
-    """
-    strong = _standing_out(standout, cut, ahead, width, least)
-    return bool(np.count_nonzero(strong >= 0.2) * len(ahead) / len(strong) >= 0.4 * (near.stop - near.start))
-
-
-def _standing_out(standout: Standout, cut: CrossCut, ahead: Array, width: float, least: float | Array) -> Array:
-    """How much (widths) of each section of a lead (n,) stands out of its ground by ``least`` as the strip does."""
-    straight, _, offsets = straighten(standout.residual, ahead, path_normals(ahead)[1], width)
-    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
-    strong = (-relief if cut.dark else relief) > least
-    return np.asarray(strong.sum(axis=1) * (offsets[1] - offsets[0]) / width)
 
 
 def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple[float, float]) -> tuple[Array, Array]:

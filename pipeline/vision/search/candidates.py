@@ -56,7 +56,6 @@ class Reading:
     thick: Mask
     width: float
     level: float
-    banded: bool = False  # the cable was sought within wider bands
 
     @property
     def longest(self) -> float:
@@ -206,7 +205,7 @@ def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Readin
             strips = strips_in_bands(picture, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
-                yield Reading(tuple(strips), mask, thick, width, level, banded=True)
+                yield Reading(tuple(strips), mask, thick, width, level)
 
 
 def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) -> Reading:

@@ -13,18 +13,17 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.vision.median import median, medians, scatter
+from pipeline.vision.median import median, medians
 from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import CELLS_ACROSS, MIN_GROUND_STD, Image, Standout
-from pipeline.vision.search.flanks import PAIR_WIDTH_DOUBT, Flanks, find_flanks
+from pipeline.vision.search.backdrop import CELLS_ACROSS, Image, Standout
+from pipeline.vision.search.flanks import Flanks, find_flanks
 
 SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
 SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
-_TEXTURE_WIDTHS = 12.0  # widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter
 
 
 @dataclass(frozen=True)
@@ -41,24 +40,18 @@ class CrossCut:
         Core minus ground along ``weights``, positive where the section looks like the cable.
     contrast : float
         Median of ``step``.
-    texture : float
-        Standard deviation of the ground beside the cable along ``weights``, at least that of rounding.
     weights : (c,)
         Colour projection in which the cable stands out best, sum of absolute values 1.
     dark : bool
         Cable darker than the ground along ``weights``.
-    known : bool
-        Whether the width that the edges were sought by is the cable's, not that of a mask.
     """
 
     path: Array
     width: Array
     step: Array
     contrast: float
-    texture: float
     weights: Array
     dark: bool
-    known: bool
 
     @cached_property
     def seen_widths(self) -> Array:
@@ -98,13 +91,10 @@ def cut_across(
     width: float,
     *,
     known: bool = False,
-    shaded: bool = False,
-    doubt: float = PAIR_WIDTH_DOUBT,
     weights: Array | None = None,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    ``shaded`` says that a hard shadow lies on one side; ``doubt`` is that about a known width, see `find_flanks`;
     ``weights`` is the colour projection if it is not to be sought.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
@@ -115,14 +105,13 @@ def cut_across(
     straight, rows, offsets = straighten(standout.residual, path, normal, width)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
-    relief, ground = against_ground(grey, offsets / width)
+    relief = grey - medians(grey[:, _beside(offsets / width)], axis=1)[:, None]
     core = np.abs(offsets) < 0.35 * width
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
     pitch = len(path) / len(rows)
-    flanks = find_flanks(relief, offsets, width, pitch, known=known, doubt=doubt)
+    flanks = find_flanks(relief, offsets, width, pitch, known=known)
     step = _core_level(relief, offsets, flanks)
-    texture = _texture(grey, ground, offsets / width, _TEXTURE_WIDTHS * width / pitch, shaded=shaded)
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")
@@ -132,39 +121,14 @@ def cut_across(
         width=(flanks.right - flanks.left)[nearest],
         step=step[nearest],
         contrast=median(step),
-        texture=float(np.hypot(texture, MIN_GROUND_STD)),
         weights=weights,
         dark=sign < 0,
-        known=known,
     )
-
-
-def against_ground(grey: Image, offset_widths: Array) -> tuple[Image, Image]:
-    """A straightened picture ``(n, m)`` less the ground on each section, and that ground ``(n,)``: beside the cable."""
-    ground = medians(grey[:, _beside(offset_widths)], axis=1)
-    return grey - ground[:, None], ground
 
 
 def _beside(offset_widths: Array) -> NDArray[np.bool_]:
     """Columns of the ground beside the cable."""
     return np.asarray((np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7))
-
-
-def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, shaded: bool) -> float:
-    """Scatter of the ground ``(n, m)`` beside the cable about what changes along it over less than ``light`` rows.
-
-    A shadow runs along the cable: it is no texture, and what texture does along the path it does across, too. The
-    border of a hard shadow (``shaded``) wanders over the columns of its side, and the other side tells.
-    """
-    beside = _beside(offset_widths)
-    values = grey[:, beside] if shaded else grey[:, beside] - ground[:, None]
-    # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
-    # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
-    values = values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="reflect")
-    values = values - medians(values, axis=0)
-    right = offset_widths[beside] > 0.0
-    sides = (values[:, right], values[:, ~right]) if shaded else (values,)
-    return min(scatter(side, 0.0) for side in sides)
 
 
 def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:

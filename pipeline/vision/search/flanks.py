@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 from pipeline.records import Array
 from pipeline.vision.median import median
 
-PAIR_WIDTH_DOUBT = 0.6  # weight of a pair far off a known width: diameters are mistyped
 PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
 _PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
 _PAIR_WIDTHS = 26  # widths tried, 5 % apart; the edges are then sought in 15 %
-_PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off before the edges count for less
+_PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off: scales and sheaths are
 _PAIR_WIDTH_SHARE = 0.9  # ratio to the best pair's score from which a wider pair is preferred
 _EDGE_REACH_WIDTHS = 0.1  # widths; an edge is sought so near to the pair's place; glare is farther
 _LEAST_EDGE_SHARE = 0.15  # ratio to the usual steepest slope; a flatter place is no edge: half is shade
@@ -48,7 +47,6 @@ def find_flanks(
     pitch: float,
     *,
     known: bool,
-    doubt: float = PAIR_WIDTH_DOUBT,
     search: float = PAIR_SEARCH_WIDTHS,
 ) -> Flanks:
     """Edges of the cable.
@@ -64,8 +62,6 @@ def find_flanks(
     pitch : cells
         Distance of neighbouring sections.
     known : bool
-    doubt : float
-        Weight of a pair far off a known width; 0 where a shadow's edges are as strong as the cable's.
     search : widths
         How far beside the middle of the picture the pair's middle may lie.
 
@@ -86,7 +82,7 @@ def find_flanks(
     # Pooled sections repeat each other: every half width of them is enough for width and course.
     every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
     rise, fall = rise[every], fall[every]
-    best = spacing * _pair_width(rise, fall, near, width / spacing, doubt if known else None)
+    best = spacing * _pair_width(rise, fall, near, width / spacing, known)
     score = _pair_score(rise, fall, near, np.array([best / spacing]))[:, 0]
     course = offsets[near][_best_course(score, _PAIR_WANDER_COST)]
     middle = np.interp(np.arange(len(relief)), every, course)
@@ -147,18 +143,18 @@ def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
     return np.array(course[::-1])
 
 
-def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, doubt: float | None) -> float:
+def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool) -> float:
     """Distance in columns of the edges that fits best along the whole strip; ``near`` are the columns of its middle.
 
-    Of an unknown width (no ``doubt``) it is the largest of nearly the best: a highlight splits a cable, nothing doubles
+    Of an unknown width it is the largest of nearly the best: a highlight splits a cable, nothing doubles
     it.
     """
     tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = _pair_score(rise, fall, near, tried).max(axis=2).mean(axis=0)
-    if doubt is not None:
+    if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / _PAIR_WIDTH_STD) ** 2)
-        return float(tried[np.argmax(totals * (doubt + (1.0 - doubt) * trust))])
+        return float(tried[np.argmax(totals * trust)])
     return float(tried[np.flatnonzero(totals >= _PAIR_WIDTH_SHARE * totals.max())[-1]])
 
 

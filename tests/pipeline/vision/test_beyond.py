@@ -12,7 +12,6 @@ from pipeline.vision import judgement
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search import beyond
 from pipeline.vision.search.backdrop import stand_out
 from pipeline.vision.search.beyond import fades
 from pipeline.vision.search.crosscut import cut_across
@@ -126,8 +125,8 @@ def test_glare_that_takes_the_contrast_makes_no_end(bright):
 
 
 @pytest.mark.parametrize(("left", "fading"), [(0.0, False), (0.4, False), (0.6, True), (0.8, True)])
-def test_the_quick_look_beyond_an_end_denies_no_cable_that_fades(left, fading, monkeypatch):
-    """A strip that ends where glare leaves a part of the cable's contrast: told with the quick look as without it."""
+def test_a_cable_that_fades_does_not_end(left, fading):
+    """A strip that ends where glare leaves a part of the cable's contrast: told, until too little is left."""
 
     def across(picture):
         return picture + (215.0 - picture) * (1.0 - left) / (1.0 + np.exp((700.0 - np.arange(SIZE[1])) / 2.0))
@@ -135,9 +134,7 @@ def test_the_quick_look_beyond_an_end_denies_no_cable_that_fades(left, fading, m
     standout = stand_out(_photo(across), 2)
     path = standout.to_cells(_bow()[_bow()[:, 0] < 697.0])
     cut = cut_across(standout, path, 0.5 * WIDTH, known=True)
-    quick = fades(standout, cut, 0.5 * WIDTH, at_start=False)
-    monkeypatch.setattr(beyond, "_may_fade", lambda *_: True)
-    assert quick == fades(standout, cut, 0.5 * WIDTH, at_start=False) == fading
+    assert fades(standout, cut, 0.5 * WIDTH, at_start=False) == fading
 
 
 @pytest.mark.parametrize("slender", [10.0, 0.1])

@@ -289,7 +289,7 @@ def found(left: float, right: float, radius: float | None = None, std: float = 0
     path = np.column_stack([np.linspace(left, right, 50), np.full(50, middle)])
     bearings = [Bearing((u, middle), std, radius, 0.02 if radius else None) for u in (left, right)]
     grey = np.zeros((1, 1), np.float32)
-    return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 0.01, 1.0)
+    return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 1.0)
 
 
 def specimen(*, marker_m: float | None = 0.012, length_m: float = 0.18) -> Specimen:

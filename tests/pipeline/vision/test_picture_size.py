@@ -22,7 +22,7 @@ def shot(number: int, size: tuple[int, int], length: float | None = 900.0) -> Sh
     path = np.column_stack([np.linspace(50.0, 50.0 + length, 50), np.full(50, 200.0)])
     ends = [Bearing((float(u), 200.0), 0.1) for u in path[[0, -1], 0]]
     grey = np.zeros((1, 1), np.float32)
-    return Shot(step, RoughCable(name, path, (0, 49), *ends, 10.0, grey, (0, 0), True, 0.5, 0.01, 1.0), None, size)
+    return Shot(step, RoughCable(name, path, (0, 49), *ends, 10.0, grey, (0, 0), True, 0.5, 1.0), None, size)
 
 
 @pytest.mark.parametrize("length", [450.0, None])

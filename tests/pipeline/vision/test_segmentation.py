@@ -219,7 +219,6 @@ def test_figures_of_the_photo_are_true() -> None:
     for noise, blur in ((0.01, 0.8), (0.03, 1.5)):
         rough, _ = find(scene(cable=flat, sensor=Sensor(noise=noise, blur_px=blur), light=Light(ambient=1.0)))
         assert isinstance(rough, RoughCable)
-        assert rough.noise == pytest.approx(noise, rel=0.1)  # it decides whether contrast suffices: a tenth does
         assert rough.dark
         # ambient light leaves a matt cylinder at its full colour in the middle and half of it at the flanks
         assert 0.75 - 0.17 <= rough.contrast <= 0.75 - 0.5 * 0.17
