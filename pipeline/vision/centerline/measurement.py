@@ -50,6 +50,7 @@ LIGHT_LENGTH_SHARE = 0.35
 end to end; over 135 scenes 0.35 was likelier than 0.25 and 0.5.
 """
 _HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
+_CORNER_WIDTHS = 0.5  # widths; so far aside of the cable a corner of its mask lies at most
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
 _LEAST_BALANCE = 0.8
 """Of both edges in a section (1: they count alike) for its width to tell how long errors last: one edge then has four
@@ -163,6 +164,11 @@ def follow_cable(
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     fit = _fit(sections, chord, width)
+    feet, misses = feet_of_axes(fit, chord)
+    if not chord.marked and misses.max() < _CORNER_WIDTHS * middle_width(width)[0]:
+        rough = _with_ends(rough, chord.to_pixels(fit.curve.at(feet)[0]))
+        chord = chord_frame(rough, plane, axis_parallax_std)
+        fit = _fit(sections, chord, width)
     refused = refusal(rough, sections, fit, chord, width, diameter_m)
     if refused is not None:
         return refused
@@ -170,6 +176,15 @@ def follow_cable(
     light = sections.systematic_std * metres, LIGHT_LENGTH_SHARE * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
+
+
+def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
+    """The cable with its visible ends (2, 2) px on its curve: the search put them into corners of a mask."""
+    left, right = (
+        replace(axis, center_px=(float(u), float(v)))
+        for axis, (u, v) in zip((rough.left, rough.right), ends_px, strict=True)
+    )
+    return replace(rough, left=left, right=right)
 
 
 def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | float = 0.0) -> CurveFit:
@@ -278,7 +293,7 @@ def centerline_of(
         width_std_m=scatter * middle,
         mirrored=chord.mirrored,
         quality=quality,
-        findings=rough.findings + (beside_axis(float(misses.max()), middle) if chord.marked else ()),
+        findings=rough.findings + beside_axis(float(misses.max()), middle),
     )
 
 
