@@ -116,7 +116,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     found = _assemble(photo, standout, cut, axes, cable)
     if isinstance(found, Rejected):
         return found
-    told = found.findings if more is None else (*found.findings, _partial(more))
+    told = found.findings
+    if more is not None:
+        told = (*told, doubtful("photo/hidden-end.partial", u_px=more[0], v_px=more[1]))
     widths = cut.seen_widths * standout.reduction
     share = len(cut.seen_widths) / len(cut.width)
     first, last = found.visible
@@ -193,10 +195,6 @@ def _check_width(photo: Photo, cut: CrossCut, reduction: int, cable: Cable) -> R
 
 def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
     return refused(photo, "photo/hidden-end.goes-on", u_px=float(place[0]), v_px=float(place[1]))
-
-
-def _partial(place: tuple[float, float]) -> Finding:
-    return doubtful("photo/hidden-end.partial", u_px=place[0], v_px=place[1])
 
 
 def _assemble(

@@ -80,7 +80,9 @@ def find_cable(
         again = _find_near(photo, replace(cable, diameter_px=width), near)
         if _is_slender(again, cable.slenderness):
             return again
-    return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
+    if isinstance(found, Rejected):
+        return found
+    return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=cable.slenderness)
 
 
 def _is_settled(found: RoughCable) -> bool:
@@ -121,10 +123,6 @@ def _is_slender(found: RoughCable | Rejected, slenderness: float) -> bool:
 
 def _slenderness(found: RoughCable) -> float:
     return 0.5 * found.length_px / found.half_width_px
-
-
-def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
-    return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=slenderness)
 
 
 def _widths(photo: Photo, slenderness: float) -> list[float]:
@@ -238,7 +236,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
         length = float(step_lengths(path).sum())
         # blur is judged last: a strip refused for it looks like a cable in all else
         if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
-            return _two_candidates(photo, best.length_px, length)
+            return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=length)
         if length > best.length_px and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
@@ -259,11 +257,7 @@ def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
     met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
     if met:
         return crossing(photo, met[0])
-    return _two_candidates(photo, best.length_px, other.length_px)
-
-
-def _two_candidates(photo: Photo, one: float, other: float) -> Rejected:
-    return refused(photo, "photo/two-candidates", one_px=one, other_px=other)
+    return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
 
 
 def _widest_alike(likely: list[RoughCable]) -> RoughCable:

@@ -6,7 +6,7 @@ stands still, those in the minority are searched again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -58,32 +58,22 @@ def find_cables(
     if calibration is not None:
         # Ends lost here and there under covers leave the right length on the median too, not on each photo.
         stated = calibration.scale.px_per_m * specimen.length_m
-        if _count_of_length(found, stated, most) == len(found):
+        if _count_alike(found, most, stated) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
-    radius = _sought(lambda: cover_radius(_with_photos(specimen, ends, settings)))
+    radius = guarded("", lambda: cover_radius(_with_photos(specimen, ends, settings)))
+    radius = None if isinstance(radius, Rejected) else radius  # where the search breaks on a photo, it tells none
     again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
     return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
 
 
-def _sought(work: Callable[[], float | None]) -> float | None:
-    """Radius of the covers that the ends of cables tell; where the search breaks on a photo, they tell none."""
-    radius = guarded("", work)
-    return None if isinstance(radius, Rejected) else radius
-
-
-def _count_alike(shots: list[Shot], most: float) -> int:
-    """Number of photos whose cable is as long as on the median photo, to a relative deviation."""
-    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
-    return _count_of_length(shots, float(np.median(lengths)), most) if lengths else 0
-
-
-def _count_of_length(shots: list[Shot], length_px: float, most: float) -> int:
-    """Number of photos whose cable has a length (px) to a relative deviation."""
-    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
-    return sum(abs(length / length_px - 1.0) <= most for length in lengths)
+def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:
+    """Number of photos whose cable has a length, or that of the median photo, to a relative deviation."""
+    lengths = np.array([shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)])
+    usual = float(np.median(lengths)) if length_px is None and len(lengths) else length_px
+    return 0 if usual is None else int(np.count_nonzero(np.abs(lengths / usual - 1.0) <= most))
 
 
 def _once_more(

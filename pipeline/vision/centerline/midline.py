@@ -171,7 +171,8 @@ def measure_sections(
     width = place.sum(axis=1) + 2.0 * half_width
     step = edges.step[:, keep]
     smooth_width = _running_median(width)
-    doubt = _by_light(profiles, s, _ROUNDNESS * 2.0 * half_width)
+    # half of what changes between two models that both have some right is the standard deviation of an edge by light
+    doubt = (0.5 * profiles.at(s, "shift")) ** 2 + (_ROUNDNESS * 2.0 * half_width) ** 2
     trust = doubt[::-1] / doubt.sum(axis=0)
     likely = float(np.average(smooth_width, weights=1.0 / doubt.sum(axis=0)))
     inward = 0.5 * likely - half_width - place.T
@@ -253,14 +254,6 @@ def _consistent(
             2.0 * std[lost, other]
         )  # the same error again, with the other sign: midpoint moves by all of it
     return out, spread, good
-
-
-def _by_light(profiles: Profiles, s: Array, floor: float) -> Array:
-    """Variances (px^2) of both edges' places ``(2, n)`` by shadow and shading, at least ``floor`` squared.
-
-    Half the width of the change between two models that both have some right is its standard deviation.
-    """
-    return np.asarray((0.5 * profiles.at(s, "shift")) ** 2 + floor**2)
 
 
 def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None) -> float:

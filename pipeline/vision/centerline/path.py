@@ -102,11 +102,6 @@ def fit_along(
     return fit(None, 8)
 
 
-def _path_intervals(length: float, diameter: float) -> int:
-    wanted = length / (_PATH_KNOT_DIAMETERS * diameter)
-    return int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
-
-
 def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | Rejected:
     """Sections of the cable, laid on a path in px that follows its midline.
 
@@ -123,7 +118,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
     points, s = _guides(rough, along, half_width)
-    intervals = _path_intervals(float(along[-1]), 2.0 * half_width)
+    wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
+    intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)

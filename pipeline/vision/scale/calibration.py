@@ -193,7 +193,9 @@ def check_scale(
     found_by = calibration.scale
     parallax_std = axis_parallax_std(specimen, found, settings)
     travel = _by_travel_on_plane(calibration, found, displacements, parallax_std)
-    covers = _relative(_by_covers(found, specimen, settings), _local_scale(calibration, found))
+    covers = _by_covers(found, specimen, settings)
+    if covers is not None:  # in units of the scale used
+        covers = replace(covers, px_per_m=covers.px_per_m / _local_scale(calibration, found))
     findings = []
     if covers is not None and covers.source != found_by.source and _off(covers, found_by):
         witnesses = [
@@ -212,11 +214,6 @@ def check_scale(
     if travel is not None and travel.source != found_by.source and _off(travel, found_by):
         findings.append(Finding("scale/displacement", "warning", _away(travel, found_by)))
     return tuple(findings)
-
-
-def _relative(scale: Scale | None, used: float) -> Scale | None:
-    """A scale in units of the one used."""
-    return None if scale is None else replace(scale, px_per_m=scale.px_per_m / used)
 
 
 def _std(other: Scale, used: Scale) -> float:
