@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
+from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import step_lengths
 
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
@@ -155,9 +155,8 @@ def _straightened(course: Course, width: float) -> tuple[NDArray[np.float32], Ar
     spacing = max(1.0, width / _PER_WIDTH)
     offset = np.arange(-np.ceil(2.1 * width / spacing), np.ceil(2.1 * width / spacing) + 1.0) * spacing
     at = (course.middle - course.origin_px)[:, None, :] + offset[None, :, None] * course.across[:, None, :]
-    u, v = (at[..., k].astype(np.float32) for k in (0, 1))
-    grey = cv2.remap(course.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(grey if course.dark else -grey, np.float32), offset
+    grey = sampled(course.grey, at)
+    return grey if course.dark else -grey, offset
 
 
 def _blocks(picture: NDArray[np.float32], each: int) -> Array:

@@ -14,21 +14,18 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.evidence import Course, weigh
-from pipeline.vision.median import scatter
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
-from pipeline.vision.search.bands import by_diameter
 from pipeline.vision.search.beyond import follow, followed_in
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
-from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
+    COVER_MARGIN_WIDTHS,
     at_border,
     between_axes,
     find_end,
@@ -39,11 +36,10 @@ from pipeline.vision.search.ends import (
 from pipeline.vision.search.strips import Strip
 from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
-_FAINT = 5.0  # times the texture beside it; folds and shadows reach 4
+_LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
 _LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
-_SURE_WIDTH_SCATTER = 0.04  # relative, robust; a cable's edges keep their distance, a texture's vary by 0.1
 _ACCEPTED_WIDTH_RATIO = (0.65, 1.35)  # ratio of the edges' distance to the diameter; a sheath may be dark at its flanks
 
 
@@ -73,74 +69,56 @@ def refused(photo: Photo, key: str, **figure: float) -> Rejected:
     return Rejected(photo.name, Message(key, **figure))
 
 
-def _cut(standout: Standout, path: Array, reading: Reading, cable: Cable, stage: SegmentationSettings) -> CrossCut:
-    """Cross-cuts along a path (cells); where their width is not constant, those of edges a known diameter apart."""
-    if cable.diameter_px is None:
-        return cut_across(standout, path, reading.width, stage)
-    if not reading.banded:
-        cut = cut_across(standout, path, reading.width, stage, known=True)
-        width = cut.seen_widths
-        if len(width) and scatter(width) < _SURE_WIDTH_SCATTER * cut.usual_width:
-            return cut
-    return cut_across(standout, path, reading.width, by_diameter(stage), known=True, shaded=reading.banded)
-
-
 def judge_strip(
-    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
+    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable
 ) -> RoughCable | Rejected:
     """One strip: is it the cable? One that is a piece of it is followed beyond its ends and judged again."""
-    outcome = _judge(photo, standout, reading, strip, cable, settings)
+    outcome = _judge(photo, standout, reading, strip, cable)
     going_on = outcome.code == "photo/hidden-end" if isinstance(outcome, Rejected) else outcome.goes_on
     if not going_on:
         return outcome
-    stage = settings.segmentation
-    cut = _cut(standout, strip.path, reading, cable, stage)
-    path = follow(standout, cut, cut.usual_width, stage)
+    cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
+    path = follow(standout, cut, cut.usual_width)
     if path is None:
         return outcome
     whole = replace(strip, path=path)
-    masks = followed_in(standout, cut, reading, strip, whole, stage)
-    followed = _judge(photo, standout, masks, whole, cable, settings)
+    masks = followed_in(standout, cut, reading, strip, whole)
+    followed = _judge(photo, standout, masks, whole, cable)
     return outcome if isinstance(followed, Rejected) else followed
 
 
-def _judge(
-    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable, settings: VisionSettings
-) -> RoughCable | Rejected:
-    stage = settings.segmentation
-    cut = _cut(standout, strip.path, reading, cable, stage)
+def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable) -> RoughCable | Rejected:
+    cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
     if approaches_itself(strip.path, reading.width):
         return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
-    axes = _axes(photo, standout, reading, strip, cut, cable, settings)
-    branching = branches(strip, reading, stage)
+    axes = _axes(photo, standout, reading, strip, cut, cable)
+    branching = branches(strip, reading)
     if isinstance(axes, Rejected):
         if branching:  # which of its arms leaves the picture nobody can tell
             return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
-        if cut.contrast < _FAINT * cut.texture:  # a fold of the cloth may leave the picture
-            return refused(photo, "photo/contrast.faint", contrast_to_noise=cut.contrast / cut.texture)
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
-    short = short_of_axis(standout, cut, axes, stage)
+    short = short_of_axis(standout, cut, axes)
     if short is not None:
         return _goes_on_beyond(photo, short)
-    path = lead_to_axes(standout, strip.path, reading.width, axes, settings.bearings)
-    cut = _cut(standout, path, reading, cable, stage)
+    path = lead_to_axes(standout, strip.path, reading.width, axes)
+    cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
-    refusal = _check_width(photo, cut, standout.reduction, cable, stage)
+    refusal = _check_width(photo, cut, standout.reduction, cable)
     if refusal is not None:
         return refusal
     others = [other for other in reading.strips if other is not strip]
-    more = goes_on_at(standout, cut, axes, stage) or rest_faced_at(
-        standout, cut, axes, others, stage, length_px=cable.length_px
-    )
+    more = goes_on_at(standout, cut, axes) or rest_faced_at(standout, cut, axes, others, length_px=cable.length_px)
     if more is not None and not cable.any_length:
         return _goes_on_beyond(photo, more)
-    found = _assemble(photo, standout, cut, axes, cable, settings)
+    found = _assemble(photo, standout, cut, axes, cable)
     if isinstance(found, Rejected):
         return found
-    told = found.findings if more is None else (*found.findings, _partial(more))
+    told = found.findings
+    if more is not None:
+        told = (*told, doubtful("photo/hidden-end.partial", u_px=more[0], v_px=more[1]))
     widths = cut.seen_widths * standout.reduction
     share = len(cut.seen_widths) / len(cut.width)
     first, last = found.visible
@@ -176,13 +154,7 @@ def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
 
 
 def _axes(
-    photo: Photo,
-    standout: Standout,
-    reading: Reading,
-    strip: Strip,
-    cut: CrossCut,
-    cable: Cable,
-    settings: VisionSettings,
+    photo: Photo, standout: Standout, reading: Reading, strip: Strip, cut: CrossCut, cable: Cable
 ) -> tuple[Bearing, Bearing] | Rejected:
     """The bearing axes in the order of the strip's path."""
     width = reading.width * standout.reduction
@@ -193,11 +165,10 @@ def _axes(
         find_end(strip.path[::-1], reading, standout, cover),
         find_end(strip.path, reading, standout, cover),
     )
-    hidden = cover is not None or cable.bearings.given_px is not None
-    leaving = [end.place for end in ends if at_border(end.place, photo, width)]
-    if leaving and not hidden:
+    leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
+    if leaving and cover is None and cable.bearings.given_px is None:
         return _leaves(photo, leaving[0])
-    first, second = find_bearings(photo, ends, width, cable.bearings, settings.bearings)
+    first, second = find_bearings(photo, ends, width, cable.bearings)
     if first is not None and second is not None:
         return first, second
     if leaving:
@@ -210,13 +181,11 @@ def _leaves(photo: Photo, place: Sequence[float] | Array) -> Rejected:
     return refused(photo, "photo/leaves-frame", u_px=float(place[0]), v_px=float(place[1]))
 
 
-def _check_width(
-    photo: Photo, cut: CrossCut, reduction: int, cable: Cable, stage: SegmentationSettings
-) -> Rejected | None:
+def _check_width(photo: Photo, cut: CrossCut, reduction: int, cable: Cable) -> Rejected | None:
     """Refuse a strip whose width is not that of a cable of known diameter, and one too short for a cable."""
     width = cut.usual_width * reduction
     slender = float(step_lengths(cut.path).sum()) / cut.usual_width
-    if cable.diameter_px is None and slender < stage.least_slenderness:
+    if cable.diameter_px is None and slender < _LEAST_SLENDERNESS:
         return refused(photo, "photo/width.short", slenderness=slender)
     low, high = _ACCEPTED_WIDTH_RATIO
     if cable.diameter_px is not None and not low <= width / cable.diameter_px <= high:
@@ -228,37 +197,26 @@ def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
     return refused(photo, "photo/hidden-end.goes-on", u_px=float(place[0]), v_px=float(place[1]))
 
 
-def _partial(place: tuple[float, float]) -> Finding:
-    return doubtful("photo/hidden-end.partial", u_px=place[0], v_px=place[1])
-
-
 def _assemble(
-    photo: Photo,
-    standout: Standout,
-    cut: CrossCut,
-    axes: tuple[Bearing, Bearing],
-    cable: Cable,
-    settings: VisionSettings,
+    photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], cable: Cable
 ) -> RoughCable | Rejected:
-    stage = settings.segmentation
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.step > stage.seen_share * cut.contrast, cut.usual_width)
+    kept = without_specks(cut.step > SEEN_SHARE * cut.contrast, cut.usual_width)
     unlike = unlike_from(path, kept, axes, cut.usual_width)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)
     width = cut.usual_width * standout.reduction
-    closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width, settings)
+    closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width)
     ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
-    leaving = [place for place in ends if at_border(place, photo, width)]
+    leaving = [place for place in ends if at_border(place, photo, standout.reduction, width)]
     if leaving:
         return _leaves(photo, leaving[0])
-    path, visible = between_axes(path, axes, settings.bearings.cover_margin_widths * width)
+    path, visible = between_axes(path, axes, COVER_MARGIN_WIDTHS * width)
     if visible is None:
         return refused(photo, "photo/bearing.nothing")
     moved = _moved(photo, closeup, width)
     if moved is not None:
         return moved
-    ratio = cut.contrast / float(np.hypot(cut.texture, closeup.noise))
     return RoughCable(
         image=photo.name,
         path_px=path,
@@ -270,20 +228,18 @@ def _assemble(
         origin_px=closeup.origin_px,
         dark=cut.dark,
         contrast=cut.contrast,
-        noise=closeup.noise,
         blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         grid_px=photo.grid_px,
-        quality={"contrast_to_noise": ratio, "width_scatter": scatter(cut.seen_widths) / cut.usual_width},
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
 
 
 def _settled(
-    photo: Photo, path: Array, axes: tuple[Bearing, Bearing], weights: Array, width: float, settings: VisionSettings
+    photo: Photo, path: Array, axes: tuple[Bearing, Bearing], weights: Array, width: float
 ) -> tuple[Closeup, tuple[Bearing, Bearing], Array]:
     """The strip from close by, its axes with the left one first, and its path (n, 2) px between them."""
-    if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px), settings.bearings):
+    if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px)):
         path, axes = path[::-1], axes[::-1]
     closeup = take_closeup(photo, path, width, weights)
     right, path = settle_end(axes[1], path, closeup, width)

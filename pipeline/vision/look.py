@@ -23,7 +23,7 @@ def look_at_photos(specimen: Specimen, settings: VisionSettings) -> tuple[Findin
         The calibration photos cannot be used.
     """
     shots, covers = find_cables(specimen, next(iter(given_calibration(specimen, settings)), None), settings)
-    shots, sizes = of_one_size(shots, settings.series)
+    shots, sizes = of_one_size(shots)
     refused = [shot.found for shot in shots if isinstance(shot.found, Rejected)]
     level: Level = "error" if len(refused) == len(shots) else "warning"
     return (*covers, *sizes, *(of_photo(one.image, level, one.said) for one in refused))

@@ -13,6 +13,7 @@ import errno
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -141,6 +142,12 @@ def reduce_area(pixels: Pixels, size: tuple[int, int], *, measured: bool = True)
     if not measured and pixels.shape[1] < 2 * size[0] and pixels.shape[0] < 2 * size[1]:
         return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_LINEAR), pixels.dtype)
     return _mean_over(pixels, size)
+
+
+def sampled(picture: NDArray[Any], points: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Values ``(..., c)`` of a picture at points ``(..., 2)``, linear between pixels; its border goes on."""
+    u, v = (np.ascontiguousarray(points[..., k], np.float32) for k in (0, 1))
+    return np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
 def levels(photo: Photo) -> tuple[float, float]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Finding, Rejected, inferred
-from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.shots import Shot
 
@@ -23,13 +22,12 @@ scales a photo by less.
 """
 
 
-def of_one_size(shots: list[Shot], settings: SeriesSettings) -> tuple[list[Shot], tuple[Finding, ...]]:
+def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Refuse photos of another size than most that were not merely cropped.
 
     Parameters
     ----------
     shots : list of Shot
-    settings : SeriesSettings
 
     Returns
     -------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision.photo import PreviewSettings
 from pipeline.vision.median import quantile
-from pipeline.vision.photo import Photo, reduce_area
+from pipeline.vision.photo import Photo, reduce_area, sampled
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.crosscut import path_normals
@@ -52,10 +52,8 @@ def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSet
     _, normal = path_normals(points)
     normal *= -1.0 if line.mirrored else 1.0
     half = _STRIP_WIDTHS * 2.0 * rough.half_width_px
-    across = np.linspace(-half, half, _STRIP_HEIGHT_PX, dtype=np.float32)[:, None]
-    place, sideways = (points - rough.origin_px).astype(np.float32), normal.astype(np.float32)
-    u, v = (place[:, axis] + across * sideways[:, axis] for axis in (0, 1))
-    strip = np.asarray(cv2.remap(rough.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    across = np.linspace(-half, half, _STRIP_HEIGHT_PX)[:, None, None]
+    strip = sampled(rough.grey, points - rough.origin_px + across * normal)
     picture = np.asarray(cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR), np.uint8)
     zoom = (_STRIP_HEIGHT_PX - 1) / (2.0 * half)
     middle = 0.5 * (_STRIP_HEIGHT_PX - 1)

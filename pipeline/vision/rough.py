@@ -72,16 +72,12 @@ class RoughCable:
         True if the cable is darker than the ground in ``grey``.
     contrast : grey
         Median step between ground and cable, positive.
-    noise : grey
-        Standard deviation of one pixel: sensor noise and fine texture, without what varies slowly.
     blur_px : px
         Standard deviation of the edge spread, estimated on the window's edges along the cable.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
     grid_px : float
         Of the photo that ``grey`` is of; see `pipeline.vision.photo.Photo`.
-    quality : dict
-        Figures for the report: contrast_to_noise, width_scatter, ...
     findings : tuple of Finding
     branching : bool
         Something of the cable's width seems to leave it: its course may be ambiguous.
@@ -101,11 +97,9 @@ class RoughCable:
     origin_px: tuple[int, int]
     dark: bool
     contrast: float
-    noise: float
     blur_px: float
     weights: tuple[float, ...] = (1.0,)
     grid_px: float = 1.0
-    quality: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     branching: bool = False
     goes_on: bool = False

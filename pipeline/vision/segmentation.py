@@ -18,8 +18,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array, PhotoHints, Rejected
-from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings.axes import SoughtCovers
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
@@ -27,7 +25,7 @@ from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
+from pipeline.vision.search.backdrop import CELLS_ACROSS, Standout, choose_reduction, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
 from pipeline.vision.search.one_colour import in_colour_of, in_one_colour
 
@@ -52,19 +50,13 @@ _BLANK_RANGE = 0.03  # of the full range; a picture whose broad parts differ by 
 
 
 def find_cable(
-    photo: Photo,
-    settings: VisionSettings,
-    *,
-    cable: Cable | None = None,
-    near: RoughCable | None = None,
-    hints: PhotoHints | None = None,
+    photo: Photo, *, cable: Cable | None = None, near: RoughCable | None = None, hints: PhotoHints | None = None
 ) -> RoughCable | Rejected:
     """Find the cable.
 
     Parameters
     ----------
     photo : Photo
-    settings : VisionSettings
     cable : Cable, optional
         What is known of it.
     near : RoughCable, optional
@@ -79,16 +71,18 @@ def find_cable(
     cable = Cable() if cable is None else cable
     if hints is not None:
         photo, cable = with_hints(photo, cable, hints)
-    found = _find_near(photo, settings, cable, near)
+    found = _find_near(photo, cable, near)
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness):
         return found
     # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
-    widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness, settings)
+    widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness)
     for width in widths:
-        again = _find_near(photo, settings, replace(cable, diameter_px=width), near)
+        again = _find_near(photo, replace(cable, diameter_px=width), near)
         if _is_slender(again, cable.slenderness):
             return again
-    return found if isinstance(found, Rejected) else _too_thin(photo, found, cable.slenderness)
+    if isinstance(found, Rejected):
+        return found
+    return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=cable.slenderness)
 
 
 def _is_settled(found: RoughCable) -> bool:
@@ -96,27 +90,27 @@ def _is_settled(found: RoughCable) -> bool:
     return found.evidence.clear and not found.goes_on
 
 
-def _find_near(photo: Photo, settings: VisionSettings, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
+def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     """Find the cable where a neighbour photo lets it be expected, then anywhere."""
-    cable = replace(cable, bearings=replace(cable.bearings, sought=SoughtCovers()))
+    cable = replace(cable, bearings=replace(cable.bearings, sought=[]))
     if cable.path_px:
-        return _along_clicks(photo, settings, cable)
+        return _along_clicks(photo, cable)
     if near is not None and cable.region is None:
-        found = _find_in(photo, settings, cable, _surroundings(near, photo))
+        found = _find_in(photo, cable, _surroundings(near, photo))
         if isinstance(found, RoughCable):
             return found
-    return _find_in(photo, settings, cable, cable.region)
+    return _find_in(photo, cable, cable.region)
 
 
-def _along_clicks(photo: Photo, settings: VisionSettings, cable: Cable) -> RoughCable | Rejected:
+def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
     """The cable along a person's clicks, of the width that has the most evidence."""
     judged = []
     for width in widths_tried(cable):
-        standout = stand_out(photo, choose_reduction(photo.size, width, settings.segmentation), settings.segmentation)
+        standout = stand_out(photo, choose_reduction(photo.size, width))
         reading = reading_along(standout, cable.path_px, width)
-        outcome = judge_strip(photo, standout, reading, reading.strips[0], cable, settings)
+        outcome = judge_strip(photo, standout, reading, reading.strips[0], cable)
         judged.append(_Judged([outcome], [standout.to_pixels(reading.strips[0].path)], [width]))
-    return _chosen(photo, judged, _RIVAL_SHARE)
+    return _chosen(photo, judged)
 
 
 def _is_slender(found: RoughCable | Rejected, slenderness: float) -> bool:
@@ -131,42 +125,37 @@ def _slenderness(found: RoughCable) -> float:
     return 0.5 * found.length_px / found.half_width_px
 
 
-def _too_thin(photo: Photo, found: RoughCable, slenderness: float) -> Rejected:
-    return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=slenderness)
-
-
-def _widths(photo: Photo, slenderness: float, settings: VisionSettings) -> list[float]:
+def _widths(photo: Photo, slenderness: float) -> list[float]:
     """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
-    standout = stand_out(photo, choose_reduction(photo.size, None, settings.segmentation), settings.segmentation)
+    standout = stand_out(photo, choose_reduction(photo.size, None))
     wanted = _wanted(standout, Cable())
-    for readings in read_photo(standout, wanted, settings.segmentation):
+    for readings in read_photo(standout, wanted):
         longest = max(reading.longest for reading in readings)
         if longest >= wanted.least_length:
             return [longest * standout.reduction / slenderness]
     return []
 
 
-def _find_in(photo: Photo, settings: VisionSettings, cable: Cable, window: Window | None) -> RoughCable | Rejected:
-    stage = settings.segmentation
-    reduction = choose_reduction(photo.size, cable.diameter_px, stage)
+def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | Rejected:
+    reduction = choose_reduction(photo.size, cable.diameter_px)
     if cable.diameter_px is None:
-        alone = _find_alone(photo, settings, cable, reduction, window)
+        alone = _find_alone(photo, cable, reduction, window)
         if alone is not None:
             return alone
-    standout = stand_out(photo, reduction, stage, window=window)
+    standout = stand_out(photo, reduction, window=window)
     wanted = _wanted(standout, cable)
 
     def read_whole(alike: Photo | None) -> RoughCable | None:
         """The cable in a photo of one colour: a piece of it may be anything that has that colour too."""
         if alike is None:
             return None
-        found = _read(alike, stand_out(alike, reduction, stage, window=window), wanted, cable, settings)
+        found = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
         return None if isinstance(found, Rejected) or _is_piece(found) else found
 
     first = read_whole(in_one_colour(photo, standout))
     its_own = None if first is None else in_colour_of(photo, standout, first)
     if first is None or its_own is None:
-        return _read(photo, standout, wanted, cable, settings)
+        return _read(photo, standout, wanted, cable)
     second = read_whole(its_own)
     return first if second is None or second.evidence.value < first.evidence.value else second
 
@@ -176,42 +165,37 @@ def _is_piece(found: RoughCable) -> bool:
     return any(finding.code == "photo/hidden-end" for finding in found.findings)
 
 
-def _read(
-    photo: Photo, standout: Standout, wanted: Wanted, cable: Cable, settings: VisionSettings
-) -> RoughCable | Rejected:
+def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> RoughCable | Rejected:
     """The strip with the most evidence of the readings up to one that leaves nothing to be looked for."""
     judged: list[_Judged] = []
-    for readings in read_photo(standout, wanted, settings.segmentation):
+    for readings in read_photo(standout, wanted):
         if readings[0].longest < wanted.least_length:
             if judged:
                 break
             return _blank(photo) or _nothing(photo, standout, readings[0], known=wanted.width is not None)
-        judged += [_judged(photo, standout, reading, wanted, cable, settings) for reading in readings]
-        outcome = _chosen(photo, judged, _RIVAL_SHARE)
+        judged += [_judged(photo, standout, reading, wanted, cable) for reading in readings]
+        outcome = _chosen(photo, judged)
         if isinstance(outcome, RoughCable) and _is_settled(outcome):
             return outcome
-    return _chosen(photo, judged, _RIVAL_SHARE)
+    return _chosen(photo, judged)
 
 
-def _find_alone(
-    photo: Photo, settings: VisionSettings, cable: Cable, reduction: int, window: Window | None
-) -> RoughCable | None:
+def _find_alone(photo: Photo, cable: Cable, reduction: int, window: Window | None) -> RoughCable | None:
     """A cable of unknown width on fewer cells, if it is all there is to see; what is refused needs a closer look."""
-    stage = settings.segmentation
     coarser = _FIRST_COARSER
-    standout = stand_out(photo, coarser * reduction, stage, window=window)
-    enough = int(coarser * narrowest(standout) / stage.cells_across)
+    standout = stand_out(photo, coarser * reduction, window=window)
+    enough = int(coarser * narrowest(standout) / CELLS_ACROSS)
     if enough < 2:
         return None
     if enough < coarser:
-        standout = stand_out(photo, enough * reduction, stage, window=window)
+        standout = stand_out(photo, enough * reduction, window=window)
     if in_one_colour(photo, standout) is not None:
         return None
     wanted = _wanted(standout, cable)
-    reading = read_alone(standout, wanted, stage)
+    reading = read_alone(standout, wanted)
     if reading is None:
         return None
-    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable, settings)], _RIVAL_SHARE)
+    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable)])
     return found if isinstance(found, RoughCable) and _is_settled(found) else None
 
 
@@ -223,22 +207,20 @@ class _Judged(NamedTuple):
     areas: list[float]
 
 
-def _judged(
-    photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable, settings: VisionSettings
-) -> _Judged:
+def _judged(photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable) -> _Judged:
     least = max(wanted.least_length, _RIVAL_SHARE * reading.longest)
     strips = [strip for strip in reading.strips if strip.length >= least]
-    judged = [judge_strip(photo, standout, reading, strip, cable, settings) for strip in strips]
+    judged = [judge_strip(photo, standout, reading, strip, cable) for strip in strips]
     paths = [standout.to_pixels(strip.path) for strip in strips]
     return _Judged(judged, paths, [strip.length * reading.width for strip in strips])
 
 
-def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCable | Rejected:
+def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     """The strip of all readings with the most evidence, or why there is none."""
     likely = [found for reading in judged for found in reading.outcomes if isinstance(found, RoughCable)]
     # a shadow that lies apart from the cable is as long and fainter
     strongest = max((found.contrast for found in likely), default=0.0)
-    likely = [found for found in likely if found.contrast >= rival_share * strongest]
+    likely = [found for found in likely if found.contrast >= _RIVAL_SHARE * strongest]
     likely.sort(key=lambda found: -found.evidence.value)
     refusals = [
         (area, outcome, path)
@@ -254,7 +236,7 @@ def _chosen(photo: Photo, judged: list[_Judged], rival_share: float) -> RoughCab
         length = float(step_lengths(path).sum())
         # blur is judged last: a strip refused for it looks like a cable in all else
         if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
-            return _two_candidates(photo, best.length_px, length)
+            return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=length)
         if length > best.length_px and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
@@ -275,11 +257,7 @@ def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
     met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
     if met:
         return crossing(photo, met[0])
-    return _two_candidates(photo, best.length_px, other.length_px)
-
-
-def _two_candidates(photo: Photo, one: float, other: float) -> Rejected:
-    return refused(photo, "photo/two-candidates", one_px=one, other_px=other)
+    return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
 
 
 def _widest_alike(likely: list[RoughCable]) -> RoughCable:

@@ -19,6 +19,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Finding, Rejected, Scale, Specimen, Traces, doubtful
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
+from pipeline.vision.bearings.axes import VERTICAL_DEG
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
 from pipeline.vision.centerline.lay import without_lay
@@ -39,7 +40,7 @@ from pipeline.vision.scale.calibration import (
 from pipeline.vision.scale.chord import chord_frame
 from pipeline.vision.scale.doubt import with_doubt_of_plane
 from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
-from pipeline.vision.single import shown, trace_photo
+from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
 
 Line = Centerline | Rejected
@@ -68,7 +69,7 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
         The calibration photos cannot be used.
     """
     traces = _traces(specimen, settings)
-    return with_width_seen(specimen, traces, settings, retrace=_traces, trace=trace_photo)
+    return with_width_seen(specimen, traces, settings, _traces)
 
 
 def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
@@ -76,7 +77,7 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     planes = given_calibration(specimen, settings)
     calibration = next(iter(planes), None)
     shots, cover_findings = find_cables(specimen, calibration, settings)
-    shots, sized = _together(shots, lambda some: of_one_size(some, settings.series))
+    shots, sized = _together(shots, lambda some: of_one_size(some))
     shots, size_findings = sized or (shots, (_UNTOLD,))
     if calibration is None or len(planes) > 1:
         shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, planes, settings),))
@@ -91,7 +92,7 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     shots, lines, side_findings = _measure_all(specimen, shots, calibration, parallax_std, settings)
     pairs = list(zip(shots, lines, strict=True))
     lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
-    lines, bow_findings = _alike(shots, lines, specimen, settings)
+    lines, bow_findings = _alike(shots, lines, specimen)
     lines = tuple(_doubted(line, calibration) for line in lines)
     lines, check_findings = _checked(specimen, shots, lines, calibration, settings)
     untold = () if settled is not None else (_UNTOLD,)
@@ -122,13 +123,13 @@ def _by_what_is_seen(
 
 
 def _alike(
-    shots: Sequence[Shot], lines: tuple[Line, ...], specimen: Specimen, settings: VisionSettings
+    shots: Sequence[Shot], lines: tuple[Line, ...], specimen: Specimen
 ) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
     """Centerlines with one positive side; a photo that breaks it is refused.
 
     Lines that break it whichever of them is left out stay as they are, and a finding says so.
     """
-    side = partial(on_one_side, diameter_m=specimen.diameter_m, settings=settings.series)
+    side = partial(on_one_side, diameter_m=specimen.diameter_m)
     lines, turned = jointly([shot.found.image for shot in shots], lines, side)
     return (lines, (_UNTOLD,)) if turned is None else turned
 
@@ -188,9 +189,7 @@ def _measure_all(
         if isinstance(found, Rejected):
             return found
         plane, diameter = calibration.plane, specimen.diameter_m
-        work = partial(
-            follow_cable, found, plane=plane, diameter_m=diameter, settings=settings, axis_parallax_std=parallax_std
-        )
+        work = partial(follow_cable, found, plane=plane, diameter_m=diameter, axis_parallax_std=parallax_std)
         return guarded(found.image, work)
 
     def sides(cables: Sequence[Followed | Rejected]) -> tuple[bool, tuple[Finding, ...], float]:
@@ -206,7 +205,7 @@ def _measure_all(
         cables = tuple(c if isinstance(c, Rejected) else follow(shot.found) for shot, c in pairs)
     if wandering > 0.0:
         cables = tuple(c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables)
-    lay = partial(without_lay, diameter_m=specimen.diameter_m, settings=settings)
+    lay = partial(without_lay, diameter_m=specimen.diameter_m)
     cables, even = jointly([shot.found.image for shot in shots], cables, lay)
     return shots, _tied(shots, even or cables, settings), findings if even else (*findings, _UNTOLD)
 
@@ -222,14 +221,11 @@ def _tied(
     shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings
 ) -> tuple[Centerline | Rejected, ...]:
     """Centerlines of the cables, each tied to its axes by what the others tell of how a cable passes them."""
-    sights = [
-        cable if isinstance(cable, Rejected) else guarded(cable.rough.image, partial(cable.sight, settings))
-        for cable in cables
-    ]
+    sights = [cable if isinstance(cable, Rejected) else guarded(cable.rough.image, cable.sight) for cable in cables]
     images = [shot.found.image for shot in shots]
     # a photo on which that breaks is measured by itself
     _, told = jointly(images, sights, _told)
-    _, waves = jointly(images, cables, partial(waves_of, settings=settings))
+    _, waves = jointly(images, cables, partial(waves_of))
     return tuple(
         guarded(shot.found.image, partial(shown, cable, shot.preview, settings, axes, waves))
         for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
@@ -268,7 +264,7 @@ def _name_sides(
     findings = []
     if moving != specimen.rig.moving_bearing:
         du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
-        if du <= np.tan(np.radians(settings.bearings.vertical_deg)) * dv:
+        if du <= np.tan(np.radians(VERTICAL_DEG)) * dv:
             return True, _fixed_moved(steps, moving, found, calibration, settings.series)
         findings.append(doubtful("rig/moving-bearing", moving=moving, stated=specimen.rig.moving_bearing))
     return False, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))

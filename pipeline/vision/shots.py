@@ -6,7 +6,7 @@ stands still, those in the minority are searched again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,7 +16,8 @@ from pipeline.messages import Message
 from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
-from pipeline.vision.bearings.cover_size import cover_radius, rim_radius
+from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     Fixed,
     apart_px,
@@ -50,8 +51,6 @@ def find_cables(
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
     shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
-    if calibration is None and specimen.rig.marker_diameter_m is not None:
-        return _with_covers_by_length(specimen, specimen.rig.marker_diameter_m, shots, settings), ()
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
         return shots, ()
@@ -59,32 +58,22 @@ def find_cables(
     if calibration is not None:
         # Ends lost here and there under covers leave the right length on the median too, not on each photo.
         stated = calibration.scale.px_per_m * specimen.length_m
-        if _count_of_length(found, stated, most) == len(found):
+        if _count_alike(found, most, stated) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
-    radius = _sought(lambda: cover_radius(_with_photos(specimen, ends, settings), settings.bearings))
+    radius = guarded("", lambda: cover_radius(_with_photos(specimen, ends, settings)))
+    radius = None if isinstance(radius, Rejected) else radius  # where the search breaks on a photo, it tells none
     again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
     return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
 
 
-def _sought(work: Callable[[], float | None]) -> float | None:
-    """Radius of the covers that the ends of cables tell; where the search breaks on a photo, they tell none."""
-    radius = guarded("", work)
-    return None if isinstance(radius, Rejected) else radius
-
-
-def _count_alike(shots: list[Shot], most: float) -> int:
-    """Number of photos whose cable is as long as on the median photo, to a relative deviation."""
-    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
-    return _count_of_length(shots, float(np.median(lengths)), most) if lengths else 0
-
-
-def _count_of_length(shots: list[Shot], length_px: float, most: float) -> int:
-    """Number of photos whose cable has a length (px) to a relative deviation."""
-    lengths = [shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)]
-    return sum(abs(length / length_px - 1.0) <= most for length in lengths)
+def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:
+    """Number of photos whose cable has a length, or that of the median photo, to a relative deviation."""
+    lengths = np.array([shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)])
+    usual = float(np.median(lengths)) if length_px is None and len(lengths) else length_px
+    return 0 if usual is None else int(np.count_nonzero(np.abs(lengths / usual - 1.0) <= most))
 
 
 def _once_more(
@@ -117,7 +106,7 @@ def _scale_of_covers(specimen: Specimen, shots: list[Shot], settings: VisionSett
     sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
     radii = [axis.radius_px for cable in sure for axis in (cable.left, cable.right) if axis.radius_px is not None]
     diameter = specimen.rig.marker_diameter_m
-    if diameter is None or not radii or np.ptp(radii) > 2.0 * settings.bearings.same_radius * np.median(radii):
+    if diameter is None or not radii or np.ptp(radii) > 2.0 * SAME_RADIUS * np.median(radii):
         return None
     return from_number(2.0 * float(np.median(radii)) / diameter, settings.calibration)
 
@@ -150,7 +139,7 @@ def _find_again(
 ) -> RoughCable | Rejected:
     """The cable on a photo that was searched before."""
     photo = _loaded(specimen, shot.step, settings)
-    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, settings, near)
+    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, near)
 
 
 def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Photo | Rejected:
@@ -158,36 +147,9 @@ def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Pho
     return guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
 
 
-def _find(
-    specimen: Specimen, photo: Photo, cable: Cable, settings: VisionSettings, near: RoughCable | None
-) -> RoughCable | Rejected:
+def _find(specimen: Specimen, photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     hints = specimen.hints.get(photo.name)
-    return guarded(photo.name, partial(find_cable, photo, settings, cable=cable, near=near, hints=hints))
-
-
-def _with_covers_by_length(
-    specimen: Specimen, diameter_m: float, shots: list[Shot], settings: VisionSettings
-) -> list[Shot]:
-    """Where most photos show no cover of the expected size: searched again with what the cable's length tells of it.
-
-    Without a scale the covers are expected in widths of the cable, and a shadow beside it makes it seem wider.
-    """
-    refused = sum(isinstance(shot.found, Rejected) and shot.found.code == "photo/bearing" for shot in shots)
-    if 2 * refused <= len(shots):
-        return shots
-    bare = replace(specimen, rig=replace(specimen.rig, marker_diameter_m=None))
-    seen = [shot for shot in _find_all(bare, None, settings) if isinstance(shot.found, RoughCable)]
-    if not seen:
-        return shots
-    lengths = [shot.found.length_px for shot in seen if isinstance(shot.found, RoughCable)]
-    expected = 0.5 * diameter_m * float(np.median(lengths)) / (specimen.length_m - diameter_m)
-    ends = [seen[0], seen[-1]] if len(seen) > 1 else seen
-    radius = _sought(lambda: rim_radius(_with_photos(specimen, ends, settings), expected, settings.bearings))
-    if radius is None:
-        return shots
-    again = _find_all(specimen, from_number(2.0 * radius / diameter_m, settings.calibration), settings)
-    better = sum(isinstance(shot.found, RoughCable) for shot in again) > len(shots) - refused
-    return again if better else shots
+    return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
 
 
 def _with_axes_shown(shot: Shot) -> Shot:
@@ -234,7 +196,7 @@ def _find_all(
             scale = 1.0 if calibration is None else calibration.scale.px_per_m
             seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
             cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
-        found = _find(specimen, photo, cable, settings, near)
+        found = _find(specimen, photo, cable, near)
         if isinstance(found, RoughCable):
             near, last = found, step
         shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))

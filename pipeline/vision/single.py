@@ -56,11 +56,11 @@ def _traced(
     photo: Photo, diameter_px: float | None, hints: PhotoHints | None, settings: VisionSettings
 ) -> Centerline | Rejected:
     preview = reduce_photo(photo, settings.preview)
-    rough = find_cable(photo, settings, cable=Cable(diameter_px=diameter_px), hints=hints)
+    rough = find_cable(photo, cable=Cable(diameter_px=diameter_px), hints=hints)
     if isinstance(rough, Rejected):
         return shown(rough, preview, settings)
     plane = PlaneMap.from_scale(1.0)
-    return shown(follow_cable(rough, plane=plane, diameter_m=diameter_px, settings=settings), preview, settings)
+    return shown(follow_cable(rough, plane=plane, diameter_m=diameter_px), preview, settings)
 
 
 def shown(

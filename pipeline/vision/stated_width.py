@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from pipeline.messages import Message
 from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.guard import guarded
+from pipeline.vision.single import trace_photo
 
 MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
 """What photos are refused for when a strip of another width is looked for: edges beside the cable, or half of it."""
@@ -39,9 +38,7 @@ def with_width_seen(
     specimen: Specimen,
     traces: Traces,
     settings: VisionSettings,
-    *,
     retrace: Callable[[Specimen, VisionSettings], Traces],
-    trace: Callable[..., Centerline | Rejected],
 ) -> Traces:
     """The traces as they are, or those with the width that the photos show.
 
@@ -51,8 +48,8 @@ def with_width_seen(
     traces : Traces
         With the diameter as stated.
     settings : VisionSettings
-    retrace, trace : callable
-        Trace a series, and a single photo without a diameter.
+    retrace : callable
+        Trace a series.
 
     Returns
     -------
@@ -62,7 +59,7 @@ def with_width_seen(
     refused = [photo for photo in traces.photos if isinstance(photo, Rejected) and photo.code in MISLED]
     if 2 * len(refused) < max(len(traces.photos), 1):
         return traces
-    width_m = _width_seen(specimen, traces, settings, trace)
+    width_m = _width_seen(specimen, traces, settings)
     if width_m is None:
         return traces
     again = retrace(replace(specimen, diameter_m=width_m), settings)
@@ -81,13 +78,11 @@ def with_width_seen(
     return replace(traces, photos=photos, findings=(finding, *traces.findings))
 
 
-def _width_seen(
-    specimen: Specimen, traces: Traces, settings: VisionSettings, trace: Callable[..., Centerline | Rejected]
-) -> float | None:
+def _width_seen(specimen: Specimen, traces: Traces, settings: VisionSettings) -> float | None:
     """Width (m) on which a few photos agree that are traced without a diameter; None if it may be the stated one."""
     paths: list[Path] = [specimen.images[photo.image] for photo in traces.photos if photo.image in specimen.images]
     places = {round(place) for place in np.linspace(0, len(paths) - 1, LOOKED_AT)} if paths else set()
-    lines = [guarded(paths[i].name, partial(trace, paths[i], settings=settings)) for i in sorted(places)]
+    lines = [trace_photo(paths[i], settings=settings) for i in sorted(places)]
     free = [line for line in lines if isinstance(line, Centerline)]
     px_per_m = specimen.camera.scale_px_per_m or traces.scale.px_per_m
     # where no photo could be measured, 1 px/m stands for a scale that nobody knows

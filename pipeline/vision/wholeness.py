@@ -8,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
-from pipeline.vision.search.beyond import fades, goes_on, rest_ahead
+from pipeline.vision.search.beyond import LEAST_MORE_WIDTHS, fades, goes_on, rest_ahead
 from pipeline.vision.search.crosscut import CrossCut
 from pipeline.vision.search.strips import Strip
 
@@ -25,25 +24,19 @@ _CLAMP_TAIL_SHARE = 0.1  # of the strip's length; a cable's tail beyond a clamp 
 _WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is the whole cable
 
 
-def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes, stage: SegmentationSettings) -> Place | None:
+def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
     """A visible end beyond which there is more of the same close by, or at which the cable only fades."""
     width = cut.usual_width
     for axis, at_start in zip(axes, (True, False), strict=True):
-        if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, stage, at_start=at_start):
+        if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, at_start=at_start):
             return axis.center_px
-        if axis.kind == "end" and fades(standout, cut, width, stage, at_start=at_start):
+        if axis.kind == "end" and fades(standout, cut, width, at_start=at_start):
             return axis.center_px
     return None
 
 
 def rest_faced_at(
-    standout: Standout,
-    cut: CrossCut,
-    axes: Axes,
-    others: list[Strip],
-    stage: SegmentationSettings,
-    *,
-    length_px: float | None,
+    standout: Standout, cut: CrossCut, axes: Axes, others: list[Strip], *, length_px: float | None
 ) -> Place | None:
     """The visible end that faces another strip like this one nearest: the rest of the cable beyond what hides it.
 
@@ -58,16 +51,16 @@ def rest_faced_at(
         # beyond a clamp the tail of the cable comes out again
         tail = _CLAMP_TAIL_SHARE * length if axis.kind == "clamp" else 0.0
         rest = [other for other in others if other.length > tail]
-        gap = rest_ahead(standout, cut, rest, stage, at_start=at_start) if axis.kind in ("end", "clamp") else None
+        gap = rest_ahead(standout, cut, rest, at_start=at_start) if axis.kind in ("end", "clamp") else None
         gaps += [] if gap is None else [(gap, axis.center_px)]
     return min(gaps)[1] if gaps else None
 
 
-def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes, stage: SegmentationSettings) -> Place | None:
+def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
     """The end of a strip that lies before an axis that the user gave: far from it, or while the cable goes on."""
     width = cut.usual_width
     path = standout.to_pixels(cut.path)
-    near, far = stage.beyond_least_widths * width * standout.reduction, _HIDDEN_WIDTHS * width * standout.reduction
+    near, far = LEAST_MORE_WIDTHS * width * standout.reduction, _HIDDEN_WIDTHS * width * standout.reduction
     for axis, at_start in zip(axes, (True, False), strict=True):
         distance = np.hypot(*(path - axis.center_px).T)
         end = 0 if at_start else len(path) - 1
@@ -75,7 +68,7 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes, stage: Segmenta
         ahead = abs(int(np.argmin(distance)) - end) * standout.reduction < 0.5 * distance[end]
         if axis.kind != "given" or not ahead or distance[end] < near:
             continue
-        if distance[end] > far or goes_on(standout, cut, width, stage, at_start=at_start):
+        if distance[end] > far or goes_on(standout, cut, width, at_start=at_start):
             return float(path[end, 0]), float(path[end, 1])
     return None
 

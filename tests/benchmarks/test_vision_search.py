@@ -48,11 +48,11 @@ def test_search_takes_less_than_three_times_the_decoding(benchmark, case, told):
     known = known if told else Cable()
     photo = decode_photo(data, SETTINGS.photo, name="a.png")
     assert isinstance(photo, Photo)
-    assert isinstance(benchmark(lambda: find_cable(photo, SETTINGS, cable=known)), RoughCable)
+    assert isinstance(benchmark(lambda: find_cable(photo, cable=known)), RoughCable)
     if benchmark.enabled:
         encoded = np.frombuffer(data, np.uint8)
         decoding = min(repeat(lambda: cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED), timer=process_time, number=1))
-        search = min(repeat(lambda: find_cable(photo, SETTINGS, cable=known), timer=process_time, number=1))
+        search = min(repeat(lambda: find_cable(photo, cable=known), timer=process_time, number=1))
         assert search < 3.0 * decoding
 
 
@@ -62,7 +62,7 @@ def test_search_needs_a_few_bytes_a_pixel():
     photo = decode_photo(data, SETTINGS.photo, name="a.png")
     assert isinstance(photo, Photo)
     tracemalloc.start()
-    find_cable(photo, SETTINGS, cable=known)
+    find_cable(photo, cable=known)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak / (photo.size[0] * photo.size[1]) < 6.0

@@ -1,7 +1,7 @@
 """The two bearing axes on a photo: round covers, pixels given by the user, or the visible ends of the cable.
 
 Left and right are those of the photo as displayed: the left axis has the smaller ``u``. Where the chord stands
-within ``settings.vertical_deg`` of the vertical (camera turned by 90 degrees), the upper axis is called left on a
+within ``VERTICAL_DEG`` of the vertical (camera turned by 90 degrees), the upper axis is called left on a
 single photo; over a series the bearing that moves decides (`pipeline.vision.series`).
 Units: px.
 """
@@ -13,45 +13,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_again, find_cover
-from pipeline.vision.bearings.rim import Circle, Radius
+from pipeline.vision.bearings.rim import RADIUS_STD, Circle, Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
 
+VERTICAL_DEG = 10.0  # degrees; a chord nearer to the vertical has no left end that a person would agree on
+_GIVEN_STD_PX = 1.0  # px; how well a person reads an axis off a screen
 _RADIUS_STD_BY_CABLE = 0.05  # relative; where only the cable's width on the photo tells the scale
-_SAME_END_RADII = 0.1
-"""Radii of a cover, and rad; strips of one photo that end so near and alike show one cover or none: a tenth of what a
-mask's end is allowed to be off.
-"""
+_SAME_END = 0.1  # radii of a cover, rad and relative; strips that end so near and alike show one cover or none
 _END_STD_WIDTHS = 0.1  # widths; a cut or clamped end is found to about a tenth of the cable's width
-
-
-@dataclass
-class SoughtCovers:
-    """Covers sought on one photo: the strips of all its readings end at a few places, each is searched once."""
-
-    done: list[tuple[CableEnd, Radius, float, Circle | None]] = field(default_factory=list)
-
-    def at(
-        self, photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
-    ) -> Circle | None:
-        """As `find_cover`, or what it said of an end that is the same within ``_SAME_END_RADII``."""
-        near, about = _SAME_END_RADII, settings.same_radius
-        for other, sought, width, circle in self.done:
-            if (
-                np.hypot(*(end.place - other.place)) < near * radius.px
-                and np.hypot(*(end.outward - other.outward)) < near
-                and abs(sought.px - radius.px) < about * radius.px
-                and abs(width - width_px) < 2.0 * about * width_px
-            ):
-                return circle
-        circle = find_cover(photo, end, radius, width_px, settings)
-        self.done.append((end, radius, width_px, circle))
-        return circle
 
 
 @dataclass(frozen=True)
@@ -68,15 +42,15 @@ class BearingHints:
         Axes by the user.
     seen : tuple of Bearing
         Covers of a neighbouring photo, where they are to be expected on this one.
-    sought : SoughtCovers
-        What was found or not on this photo already.
+    sought : list
+        Where strips end on this photo, and the cover found there or not.
     """
 
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
     seen: tuple[Bearing, ...] = ()
-    sought: SoughtCovers = field(default_factory=SoughtCovers, compare=False)
+    sought: list[tuple[Array, Circle | None]] = field(default_factory=list, compare=False)
 
     def cover_radius(self, width_px: float) -> float | None:
         """Expected radius of a cover in px; None if there are no covers."""
@@ -86,34 +60,38 @@ class BearingHints:
 
 
 def find_bearings(
-    photo: Photo, ends: tuple[CableEnd, CableEnd], width_px: float, hints: BearingHints, settings: BearingSettings
+    photo: Photo, ends: tuple[CableEnd, CableEnd], width_px: float, hints: BearingHints
 ) -> tuple[Bearing | None, Bearing | None]:
     """Axes at the two ends of the cable, in the order of ``ends``; None from the first cover on that is not found."""
     if hints.given_px is not None:
-        return _assign_given(ends, hints.given_px, settings)
+        return _assign_given(ends, hints.given_px)
     radius = hints.cover_radius(width_px)
     if radius is None:
         return _visible_end(ends[0], width_px), _visible_end(ends[1], width_px)
-    std = settings.radius_std if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
+    std = RADIUS_STD if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
     expected = Radius(radius, std)
     axes: list[Bearing | None] = [None, None]
     for k, end in enumerate(ends):
-        circle = find_again(photo, end, hints.seen, expected, settings)
-        circle = circle or hints.sought.at(photo, end, expected, width_px, settings)
+        circle = find_again(photo, end, hints.seen, expected)
+        # strips of all readings of a photo end at a few places: each is searched once
+        known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
+        alike = [found for other, found in hints.sought if np.abs(known - other).max() < _SAME_END]
+        if circle is None and not alike:
+            alike = [find_cover(photo, end, expected, width_px)]
+            hints.sought.append((known, alike[0]))
+        circle = circle or alike[0]
         if circle is None:
             break  # one is not enough, whatever the other would be
-        axes[k] = circle.as_bearing(settings.sure_rim)
+        axes[k] = circle.as_bearing()
     return axes[0], axes[1]
 
 
-def _assign_given(
-    ends: tuple[CableEnd, CableEnd], given: PixelPair, settings: BearingSettings
-) -> tuple[Bearing, Bearing]:
+def _assign_given(ends: tuple[CableEnd, CableEnd], given: PixelPair) -> tuple[Bearing, Bearing]:
     a, b = np.array(given[0], float), np.array(given[1], float)
     straight = np.hypot(*(a - ends[0].place)) + np.hypot(*(b - ends[1].place))
     crossed = np.hypot(*(b - ends[0].place)) + np.hypot(*(a - ends[1].place))
     first, second = (a, b) if straight <= crossed else (b, a)
-    bearings = [Bearing((float(p[0]), float(p[1])), settings.given_std_px, kind="given") for p in (first, second)]
+    bearings = [Bearing((float(p[0]), float(p[1])), _GIVEN_STD_PX, kind="given") for p in (first, second)]
     return bearings[0], bearings[1]
 
 
@@ -123,9 +101,9 @@ def _visible_end(end: CableEnd, width_px: float) -> Bearing:
     return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)
 
 
-def left_first(first: Array, second: Array, settings: BearingSettings) -> bool:
+def left_first(first: Array, second: Array) -> bool:
     """True if ``first`` (u, v) is the left axis by the convention of this module."""
     du, dv = np.asarray(second, float) - np.asarray(first, float)
-    if abs(du) <= np.tan(np.radians(settings.vertical_deg)) * abs(dv):
+    if abs(du) <= np.tan(np.radians(VERTICAL_DEG)) * abs(dv):
         return bool(dv > 0)
     return bool(du > 0)

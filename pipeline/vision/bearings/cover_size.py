@@ -22,10 +22,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_rim
-from pipeline.vision.bearings.rim import Circle, Radius
-from pipeline.vision.bearings.rings import find_marks
+from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
+from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
@@ -49,30 +48,25 @@ cover's size lies two of its own radii ahead.
 _LOST_CABLE_REACH = 3.1  # radii; the same where another end shows that it is a cover: as far as it is searched
 
 
-def cover_radius(seen: Iterable[tuple[Photo, RoughCable]], settings: BearingSettings) -> float | None:
+def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
     """Radius of the covers under which the cable's ends vanish.
 
     Parameters
     ----------
     seen : iterable of (Photo, RoughCable)
         Photos of one camera position with the cable from visible end to visible end; two tell as much as all.
-    settings : BearingSettings
 
     Returns
     -------
     px or None
         None unless one radius fits both ends on every photo.
     """
-    ends = [
-        _LostEnd(photo, end, 2.0 * cable.half_width_px, settings)
-        for photo, cable in seen
-        for end in visible_ends(cable)
-    ]
+    ends = [_LostEnd(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
     for radii in (_at_ends(ends), (_to_mark(end) for end in ends)):
-        alike = _alike(radii, settings)
+        alike = _alike(radii)
         if alike is not None:
             return median(alike)
-    return _common(ends, settings) if ends else None
+    return _common(ends) if ends else None
 
 
 def _at_ends(ends: list[_LostEnd]) -> Iterator[float | None]:
@@ -86,53 +80,31 @@ def _at_ends(ends: list[_LostEnd]) -> Iterator[float | None]:
 
 def _same(lost: _LostEnd, radius: float) -> float | None:
     """Radius of the circle with the cable's end on its rim that is about as large as another end's."""
-    near = [size for size in lost.sizes() if abs(size / radius - 1.0) <= lost.settings.search_radii]
+    near = [size for size in lost.sizes() if abs(size / radius - 1.0) <= SEARCH_RADII]
     for size in sorted(near, key=lambda size: abs(size - radius)):
         circle = lost.near(float(size))
         if circle is None or not lost.on_rim(circle):
             continue
-        if abs(circle.radius - radius) <= lost.settings.same_radius * radius:
+        if abs(circle.radius - radius) <= SAME_RADIUS * radius:
             return circle.radius
     return None
 
 
-def rim_radius(seen: Iterable[tuple[Photo, RoughCable]], expected_px: float, settings: BearingSettings) -> float | None:
-    """Radius of covers about as large as expected; None unless half the ends show one, of one radius.
-
-    Parameters
-    ----------
-    seen : iterable of (Photo, RoughCable)
-        As in `cover_radius`.
-    expected_px : px
-        Radius, to a tenth.
-    settings : BearingSettings
-    """
-    expected = Radius(expected_px, 0.5 * settings.search_radii)
-    rims = [
-        find_rim(photo, end, expected, 2.0 * cable.half_width_px, settings)
-        for photo, cable in seen
-        for end in visible_ends(cable)
-    ]
-    radii = [rim.radius for rim in rims if rim is not None and rim.rim >= settings.min_rim]
-    alike = _alike(radii, settings) if 2 * len(radii) >= max(len(rims), 4) else None
-    return None if alike is None else median(alike)
-
-
-def _alike(values: Iterable[float | None], settings: BearingSettings) -> list[float] | None:
+def _alike(values: Iterable[float | None]) -> list[float] | None:
     """All values, if each is known and they are the same within what covers of one rig differ; else None."""
     known: list[float] = []
     for value in values:
         if value is None:
             return None
         known.append(value)
-    return known if known and np.ptp(known) <= settings.same_radius * np.mean(known) else None
+    return known if known and np.ptp(known) <= SAME_RADIUS * np.mean(known) else None
 
 
 def _to_mark(lost: _LostEnd) -> float | None:
     """Distance (px) from the cable's end to what is turned about an axis ahead of it, as far ahead as covers reach."""
-    photo, end, width, settings = lost.photo, lost.end, lost.width_px, lost.settings
+    photo, end, width = lost.photo, lost.end, lost.width_px
     reach = _MARK_WIDTHS * width
-    step = reach / settings.mark_cells
+    step = reach / MARK_CELLS
     ahead = np.arange(_COVER_RADII_WIDTHS[0] * width, _COVER_RADII_WIDTHS[1] * width, step)
     most = _MARK_ASIDE * ahead[-1]
     aside = np.arange(-most, most + step, step)
@@ -141,7 +113,7 @@ def _to_mark(lost: _LostEnd) -> float | None:
     normal = np.array([-end.outward[1], end.outward[0]])
     places = end.place + along[near, None] * end.outward + across[near, None] * normal
     inside = (places >= reach).all(axis=1) & (places < np.array(photo.size) - reach).all(axis=1)
-    marks = find_marks(photo, places[inside], reach, settings) if inside.any() else []
+    marks = find_marks(photo, places[inside], reach) if inside.any() else []
     return float(np.hypot(*(np.array(marks[0].center) - end.place))) if marks else None
 
 
@@ -163,7 +135,6 @@ class _LostEnd:
     photo: Photo
     end: CableEnd
     width_px: float
-    settings: BearingSettings
     _known: list[Circle] = field(default_factory=list)
     _rest: Iterator[Circle] | None = None
 
@@ -185,18 +156,17 @@ class _LostEnd:
 
     def near(self, radius: float) -> Circle | None:
         """Circle of about some radius that is seen nearly all round."""
-        expected = Radius(radius, 0.5 * self.settings.search_radii)
-        circle = find_rim(self.photo, self.end, expected, self.width_px, self.settings)
-        if circle is None or circle.rim < self.settings.sure_rim:
+        expected = Radius(radius, 0.5 * SEARCH_RADII)
+        circle = find_rim(self.photo, self.end, expected, self.width_px)
+        if circle is None or circle.rim < SURE_RIM:
             return None
-        return circle if circle.radius_std <= self.settings.same_radius * circle.radius else None
+        return circle if circle.radius_std <= SAME_RADIUS * circle.radius else None
 
     def sizes(self) -> Array:
         """Radii tried."""
-        settings = self.settings
         low, high = _COVER_RADII_WIDTHS
         # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
-        steps = int(np.ceil(np.log(high / low) / np.log(1.0 + settings.search_radii)))
+        steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
         return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
 
     def _search(self) -> Iterator[Circle]:
@@ -208,15 +178,14 @@ class _LostEnd:
 
 def _at_end(lost: _LostEnd) -> float | None:
     """Radius of the smallest circle with the cable's end on its rim, or of a larger one about it that hides it too."""
-    settings = lost.settings
     at_end = (circle for circle in lost.circles() if lost.on_rim(circle))
     rim = next(at_end, None)
     if rim is None:
         return None
     for circle in at_end:
         apart = np.hypot(*np.subtract(circle.center, rim.center))
-        wider = circle.radius > (1.0 + settings.same_radius) * rim.radius
-        if wider and apart <= settings.same_axis_radii * circle.radius and _hides(lost, rim, circle):
+        wider = circle.radius > (1.0 + SAME_RADIUS) * rim.radius
+        if wider and apart <= SAME_AXIS_RADII * circle.radius and _hides(lost, rim, circle):
             rim = circle
     return rim.radius
 
@@ -248,7 +217,7 @@ def _colour(photo: Photo, center: tuple[float, float], radii: Array, angles: Arr
     return np.asarray(medians(values, axis=0) if len(values) else np.zeros(photo.channels), float)
 
 
-def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
+def _common(ends: list[_LostEnd]) -> float | None:
     """The largest circle that is seen beyond all ends, nearly all round, wherever each was lost before it.
 
     White bands, letters and shadows hide the last of a cable. At one end it must be lost so near that the circle is no
@@ -257,7 +226,7 @@ def _common(ends: list[_LostEnd], settings: BearingSettings) -> float | None:
     for radius in sorted((circle.radius for circle in ends[0].circles()), reverse=True):
         alike = [_nearest(end, radius) for end in ends]
         ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
-        radii = _alike((None if circle is None else circle.radius for circle in alike), settings)
+        radii = _alike(None if circle is None else circle.radius for circle in alike)
         if radii is not None and max(ahead) <= _LOST_CABLE_REACH and min(ahead) <= _LOST_BEFORE_RIM:
             return median(radii)
     return None

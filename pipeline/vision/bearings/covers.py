@@ -10,21 +10,33 @@ Units: px of the photo as displayed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
-from pipeline.vision.bearings.rings import find_marks, with_rings
+from pipeline.vision.bearings.rim import (
+    MIN_RIM,
+    RADIUS_STD,
+    SAME_RADIUS,
+    SEARCH_RADII,
+    SURE_RIM,
+    Circle,
+    Radius,
+    fit_circle,
+)
+from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, with_rings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.ends import CableEnd
 
+_INNER_DISC = 0.82
+"""Radii; bright middle of a cover whose rim is of the ground's look: sought between 0.72 and 0.92, smaller ones are
+marks, larger ones pass for the rim.
+"""
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
 _MARK_RADII = 0.6  # radii of a cover; largest dot, screw or bevel that marks the axis of one not seen
 _EXPECTED_REACH_RADII = 2.5
@@ -41,9 +53,7 @@ _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger
 _CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
 
 
-def find_cover(
-    photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
-) -> Circle | None:
+def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
     """The cover at the end of a cable.
 
     Parameters
@@ -59,29 +69,27 @@ def find_cover(
     Returns
     -------
     Circle or None
-        None if no circle shows at least ``settings.min_rim`` of its rim.
+        None if no circle shows at least ``MIN_RIM`` of its rim.
     """
-    found = find_rim(photo, end, radius, width_px, settings)
-    if found is not None and found.rim >= settings.sure_rim:
-        return with_rings(photo, found, radius, settings)
-    marked = _by_marks(photo, end, radius, found, settings)
-    return marked if marked is not None else _by_inner_disc(photo, end, radius, width_px, settings)
+    found = find_rim(photo, end, radius, width_px)
+    if found is not None and found.rim >= SURE_RIM:
+        return with_rings(photo, found, radius)
+    marked = _by_marks(photo, end, radius, found)
+    return marked if marked is not None else _by_inner_disc(photo, end, radius, width_px)
 
 
-def _by_inner_disc(
-    photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings
-) -> Circle | None:
+def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
     """Cover with a middle that stands out, all round, of a rim that does not: the middle tells the axis."""
-    inner = Radius(settings.inner_disc * radius.px, 0.5 * settings.search_radii)
+    inner = Radius(_INNER_DISC * radius.px, 0.5 * SEARCH_RADII)
     if inner.px < width_px:  # the end of the cable itself passes for a disc that is little wider than it
         return None
-    disc = find_rim(photo, end, inner, width_px, settings)
-    if disc is None or disc.rim < settings.sure_rim:
+    disc = find_rim(photo, end, inner, width_px)
+    if disc is None or disc.rim < SURE_RIM:
         return None
     return replace(disc, radius=radius.px, radius_std=0.1 * radius.px, marked=True)
 
 
-def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, settings: BearingSettings) -> Circle | None:
+def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
     """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
     window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
@@ -95,29 +103,27 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float, setti
     # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
     # a sharp rim, what is soft and round is the shadow.
     partial: Circle | None = None
-    fits = _Fits(photo, radius, settings)
-    sharp, soft = (1.0, settings.min_rim), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
+    fits: list[tuple[float, Array, Circle | None]] = []
+    sharp, soft = (1.0, MIN_RIM), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
     for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
         if softness > 1.0 and partial is not None:
             break
         for cable_from in (0.0, -2.4 * radius.px):
             on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
             votes = _votes(window, radius.px / window.reduction, on_cable, sectors=sectors) * prior
-            found = _best_circle(fits, window, votes, softness)
-            if found is not None and found.rim >= settings.sure_rim:
+            found = _best_circle(photo, radius, fits, window, votes, softness)
+            if found is not None and found.rim >= SURE_RIM:
                 return found
             if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
                 partial = found
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
     votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool)) * ahead
-    farther = _best_circle(fits, window, votes, 1.0)
-    return farther if farther is not None and farther.rim >= settings.sure_rim else partial
+    farther = _best_circle(photo, radius, fits, window, votes, 1.0)
+    return farther if farther is not None and farther.rim >= SURE_RIM else partial
 
 
-def find_again(
-    photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius, settings: BearingSettings
-) -> Circle | None:
+def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius) -> Circle | None:
     """The cover at the end of a cable where other photos of the series let it be expected.
 
     Parameters
@@ -128,7 +134,6 @@ def find_again(
         Covers of other photos, where they should be on this one.
     radius : Radius
         As in `find_cover`.
-    settings : BearingSettings
 
     Returns
     -------
@@ -139,21 +144,19 @@ def find_again(
         near = np.hypot(*np.subtract(cover.center_px, end.place)) <= _EXPECTED_REACH_RADII * radius.px
         if cover.radius_px is None or not near or not cover.sure:
             continue
-        rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, settings.radius_std), settings)
+        rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, RADIUS_STD))
         if rim is None:
             continue
-        play = np.hypot(settings.same_radius * cover.radius_px, np.hypot(cover.radius_std_px or 0.0, rim.radius_std))
+        play = np.hypot(SAME_RADIUS * cover.radius_px, np.hypot(cover.radius_std_px or 0.0, rim.radius_std))
         if abs(rim.radius - cover.radius_px) > play:
             continue
-        circle = with_rings(photo, rim, radius, settings)
-        if circle.marked or circle.rim >= settings.sure_rim:
+        circle = with_rings(photo, rim, radius)
+        if circle.marked or circle.rim >= SURE_RIM:
             return circle
     return None
 
 
-def _by_marks(
-    photo: Photo, end: CableEnd, radius: Radius, partial: Circle | None, settings: BearingSettings
-) -> Circle | None:
+def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | None) -> Circle | None:
     """Cover whose rim shows in parts or not at all, by the dot, screw or bevel on its axis.
 
     The border of a hard shadow passes for a part of a rim, a screw beside the axis for a mark of it: where both of one
@@ -162,54 +165,51 @@ def _by_marks(
     """
     reach, spread = _MARK_RADII * radius.px, _ASIDE_STD_RADII * radius.px
     # An end led astray by a shadow lies twice as far from where it should be.
-    across = np.arange(-3.0 * spread, 3.0 * spread, reach / settings.mark_cells)
+    across = np.arange(-3.0 * spread, 3.0 * spread, reach / MARK_CELLS)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     expected = end.place + radius.px * end.outward
-    marks = find_marks(photo, expected + grid[np.hypot(*grid.T) <= 3.0 * spread], reach, settings)
+    marks = find_marks(photo, expected + grid[np.hypot(*grid.T) <= 3.0 * spread], reach)
     both: list[Circle] = []
     for mark in marks:
-        rim = fit_circle(photo, np.array(mark.center), radius, settings)
-        if rim is not None and rim.rim >= settings.min_rim:
+        rim = fit_circle(photo, np.array(mark.center), radius)
+        if rim is not None and rim.rim >= MIN_RIM:
             off = np.hypot(*np.subtract(rim.center, mark.center))
-            both += [rim] if off < settings.same_axis_radii * radius.px else []
+            both += [rim] if off < SAME_AXIS_RADII * radius.px else []
     rims = both if both or partial is None else [partial]
     if rims:
-        return with_rings(photo, max(rims, key=lambda circle: circle.rim), radius, settings)
+        return with_rings(photo, max(rims, key=lambda circle: circle.rim), radius)
     near = [mark for mark in marks if np.hypot(*(np.array(mark.center) - expected)) < 1.5 * spread]
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-@dataclass
-class _Fits:
-    """Circles fitted on one photo: votes counted in several ways lead to the same few centres, each is fitted once."""
-
-    photo: Photo
-    radius: Radius
-    settings: BearingSettings
-    done: list[tuple[float, Array, Circle | None]] = field(default_factory=list)
-
-    def at(self, center: Array, softness: float) -> Circle | None:
-        same = 0.5 * self.settings.search_radii * self.radius.px  # well within what a fit searches
-        for other, place, circle in self.done:
-            if other == softness and np.hypot(*(place - center)) < same:
-                return circle
-        circle = fit_circle(self.photo, center, self.radius, self.settings, softness=softness)
-        self.done.append((softness, center, circle))
-        return circle
-
-
-def _best_circle(fits: _Fits, window: _Window, votes: NDArray[np.float32], softness: float) -> Circle | None:
+def _best_circle(
+    photo: Photo,
+    radius: Radius,
+    fits: list[tuple[float, Array, Circle | None]],
+    window: _Window,
+    votes: NDArray[np.float32],
+    softness: float,
+) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
-    votes, settings = votes.copy(), fits.settings
+    votes = votes.copy()
     best: Circle | None = None
     for _ in range(_CANDIDATES):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fits.at(window.to_pixels(np.array([u, v], float)), softness)
+        center = window.to_pixels(np.array([u, v], float))
+        # votes counted in several ways lead to the same few centres: each is fitted once, within what a fit searches
+        same = [
+            known
+            for soft, place, known in fits
+            if soft == softness and np.hypot(*(place - center)) < 0.5 * SEARCH_RADII * radius.px
+        ]
+        circle = same[0] if same else fit_circle(photo, center, radius, softness=softness)
+        if not same:
+            fits.append((softness, center, circle))
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
-        if best is not None and best.rim > settings.sure_rim:
+        if best is not None and best.rim > SURE_RIM:
             break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * fits.radius.px / window.reduction)), 0.0, cv2.FILLED)
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
     return best
 
 

@@ -19,11 +19,18 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
-from pipeline.vision.photo import Photo
+from pipeline.vision.median import median, medians, quantile, scatter
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.rough import Bearing
 
+RADIUS_STD = 0.01  # relative; of a cover's radius in px where the scale is known: 0.1 mm on 12 mm, and light
+SEARCH_RADII = 0.12  # radii; half range along a ray in which the rim is searched around the first guess
+NEAR_RADII = 0.045  # radii; half range in which edges are sought at last: a bevel is twice as far away
+MIN_RIM = 0.35  # share of the rim with an edge on the circle; chance alone gives a tenth
+SURE_RIM = 0.7  # share of the rim; with so much seen no other centre is tried
+SAME_RADIUS = 0.04  # relative; covers of one rig are turned alike, light and blur move a rim less
+RIM_OVER_TEXTURE = 2.5  # ratio to the median slope of the rays; weaker edges are noise and texture
+CENTER_STD_FLOOR_PX = 0.02  # px; light and rounding of the cover move the centre by so much whatever the noise
 _LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slopes are fitted with it
 _BEVEL_SPREAD_SHARE = 0.22
 """Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
@@ -47,9 +54,9 @@ class Circle:
     rim: float
     marked: bool = False
 
-    def as_bearing(self, sure_rim: float) -> Bearing:
-        """The bearing axis under this cover, sure if at least ``sure_rim`` of it or a mark is seen."""
-        sure = self.marked or self.rim >= sure_rim
+    def as_bearing(self) -> Bearing:
+        """The bearing axis under this cover, sure if nearly all of it or a mark is seen."""
+        sure = self.marked or self.rim >= SURE_RIM
         return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", sure)
 
 
@@ -62,13 +69,7 @@ class Radius:
 
 
 def fit_circle(
-    photo: Photo,
-    center: Array,
-    expected: Radius,
-    settings: BearingSettings,
-    *,
-    softness: float = 1.0,
-    on_cover: bool = False,
+    photo: Photo, center: Array, expected: Radius, *, softness: float = 1.0, on_cover: bool = False
 ) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
@@ -82,14 +83,14 @@ def fit_circle(
     count = int(np.clip(2.0 * np.pi * radius, 90, _DIRECTIONS))
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
-    span = max(4.0, settings.search_radii * radius)
+    span = max(4.0, SEARCH_RADII * radius)
     parameters = np.array([*center, radius])
     if not on_cover:
         parameters = _best_shift(photo, parameters, ray, span, softness, expected)
-    reach = max(3.0, settings.near_radii * radius)
+    reach = max(3.0, NEAR_RADII * radius)
     for beside in (False, True):
         slopes = _radial_slopes(photo, parameters, ray, reach, softness, _POOLED_RAYS, one_sign=on_cover)
-        edge, trust = _radial_edges(slopes, reach, softness, settings)
+        edge, trust = _radial_edges(slopes, reach, softness)
         if beside and not on_cover:
             edge = _without_light(slopes, edge)
         fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
@@ -100,22 +101,20 @@ def fit_circle(
     rim = float(np.mean(np.abs(miss) < max(0.75, _RIM_TOLERANCE * radius)))
     off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
     concentric = other > max(4.0 * expected.std * radius, 1.0)
-    if off > 0.5 * radius or (concentric and (rim < settings.sure_rim or other > 1.2 * span)):
+    if off > 0.5 * radius or (concentric and (rim < SURE_RIM or other > 1.2 * span)):
         return None
     if concentric:
         # A bevel or groove turned on the same axis, seen all round: it tells the centre, the radius it does not.
-        std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px))
+        std = float(np.hypot(np.sqrt(0.5 * np.trace(covariance[:2, :2])), CENTER_STD_FLOOR_PX))
         return Circle((float(parameters[0]), float(parameters[1])), radius, std, 0.1 * radius, rim)
     # A rim wrongly placed on one side moves the centre by half of what it adds to the radius.
     excess = 0.0 if on_cover else max(abs(parameters[2] - radius) - expected.std * radius, 0.0)
-    std = float(
-        np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), settings.center_std_floor_px, 0.5 * excess])
-    )
+    std = float(np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), CENTER_STD_FLOOR_PX, 0.5 * excess]))
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
-    doubt = 0.0 if rim >= settings.sure_rim else excess
+    doubt = 0.0 if rim >= SURE_RIM else excess
     # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
     bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - softness**2, 0.0)))
-    parts = [np.sqrt(covariance[2, 2]), settings.center_std_floor_px, doubt, bevel]
+    parts = [np.sqrt(covariance[2, 2]), CENTER_STD_FLOOR_PX, doubt, bevel]
     radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
 
@@ -161,12 +160,12 @@ def _radial_slopes(
         return _Slopes(offsets, nothing, nothing, 0.0, np.zeros(len(ray), bool))
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32)
     part *= np.float32(1.0 / photo.full_scale)
-    u, v = (np.outer(ray[:, k], distance).astype(np.float32) + np.float32(parameters[k] - low[k]) for k in (0, 1))
-    profile = np.asarray(cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    slope = _smoothed_slope(profile.reshape(*u.shape, -1), pooled_rays * softness, 2.0 * softness)
+    places = distance[:, None] * ray[:, None] + (parameters[:2] - low)
+    profile = sampled(part, places).reshape(*places.shape[:2], -1)
+    slope = _smoothed_slope(profile, pooled_rays * softness, 2.0 * softness)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
-    outside = (u < 1) | (v < 1) | (u > part.shape[1] - 2) | (v > part.shape[0] - 2)
+    outside = ((places < 1) | (places > np.array(part.shape[1::-1]) - 2)).any(axis=2)
     if one_sign:
         colour = np.broadcast_to(slope[:, np.abs(offsets) < 0.75].mean(axis=(0, 1)), (len(ray), slope.shape[2]))
     else:
@@ -223,7 +222,7 @@ def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softne
     return found
 
 
-def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: BearingSettings) -> tuple[Array, Array]:
+def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array, Array]:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
 
     The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
@@ -236,7 +235,7 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float, settings: Beari
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(strength)), place]
-    found = slopes.seen & (peak > settings.rim_over_texture * slopes.texture)
+    found = slopes.seen & (peak > RIM_OVER_TEXTURE * slopes.texture)
     usual = quantile(peak[found], 0.75) if found.any() else 1.0
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
 
@@ -283,7 +282,6 @@ def _robust_circle(
     u, v = (parameters[:2] + (parameters[2] + edge[found])[:, None] * ray[found]).T
     fit, scale, sure = parameters.copy(), 0.5 * span, trust[found]
     design = np.ones((3, len(u)))
-    middle = ((len(u) - 1) // 2, len(u) // 2)
     for step in range(25):
         du, dv = u - fit[0], v - fit[1]
         distance = np.sqrt(du * du + dv * dv)
@@ -294,20 +292,18 @@ def _robust_circle(
         normal = weighted @ design.T
         total = float(normal[2, 2])
         # A whole rim has the determinant W^3 / 4 (W the sum of weights), an eighth of it a thousandth of that.
-        if total <= 0.0 or _determinant(normal) < 2.5e-4 * total**3:
+        if total <= 0.0 or np.linalg.det(normal) < 2.5e-4 * total**3:
             return None
         gradient = weighted @ residual
         prior = (scale / (expected.std * expected.px)) ** 2
         normal[2, 2] += prior
         gradient[2] += prior * (expected.px - fit[2])
-        change = _solved(normal, gradient)
+        change = np.linalg.solve(normal, gradient)
         fit = fit + change
         # The scale may fall by a third a step: a robust fit that trusts its first guess too early keeps its error.
         floor = 0.67 * scale if step < 6 else 0.03
         settled = np.abs(change).max() < 1e-3 and step >= 6
-        # half of few numbers: sorting them is quicker than any function that looks for a median
-        ordered = np.sort(np.abs(residual))
-        scale = max(MAD_TO_STD * 0.5 * float(ordered[middle[0]] + ordered[middle[1]]), floor)
+        scale = max(scatter(residual, 0.0), floor)
         if settled:
             break
     spread = float(np.sqrt((tukey * residual**2).sum() / tukey.sum()))
@@ -318,26 +314,6 @@ def _robust_circle(
     covariance = np.linalg.inv(normal) * spread**2 * inflation
     covariance += _unevenness(design[:2], residual, tukey) * np.eye(3)
     return fit, covariance
-
-
-def _determinant(m: Array) -> float:
-    """Determinant of a symmetric 3 x 3 matrix; a library's takes as long as all else of a step."""
-    (a, b, c), (_, d, e), (_, _, f) = m.tolist()
-    return float(a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))
-
-
-def _solved(m: Array, right: Array) -> Array:
-    """Solution (3,) of a symmetric positive 3 x 3 system, by its Cholesky factors for the same reason."""
-    (a, b, c), (_, d, e), (_, _, f) = m.tolist()
-    x, y, z = right.tolist()
-    l10, l20 = b / a, c / a
-    d1 = d - l10 * b
-    l21 = (e - l20 * b) / d1
-    d2 = f - l20 * c - l21 * l21 * d1
-    y -= l10 * x
-    z = (z - l20 * x - l21 * y) / d2
-    y = y / d1 - l21 * z
-    return np.array([x / a - l10 * y - l20 * z, y, z])
 
 
 def _unevenness(direction: Array, residual: Array, weight: Array) -> float:

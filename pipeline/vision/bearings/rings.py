@@ -12,15 +12,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
-from pipeline.vision.bearings.rim import Circle, Radius, fit_circle
+from pipeline.vision.bearings.rim import (
+    CENTER_STD_FLOOR_PX,
+    NEAR_RADII,
+    RIM_OVER_TEXTURE,
+    SURE_RIM,
+    Circle,
+    Radius,
+    fit_circle,
+)
 from pipeline.vision.median import median
-from pipeline.vision.photo import Photo, reduce_area
+from pipeline.vision.photo import Photo, reduce_area, sampled
 
+MARK_CELLS = 12.0  # cells; a mark's largest radius in the picture it is searched on: a line stays a cell wide
+SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: a sticker, a hole beside it
 _MARK_TRIES = 4  # roundest places where a mark is fitted: edges of cover and shadow pass for round ones
 _ASTRAY_RADII = 0.16  # radii; how far a rim that is not sure may lie off the centre: half a bevel
 _SURE_CENTER_RADII = 0.004  # radii; a centre with a wider std is not sure: shadow or bevel took part of the rim
@@ -32,7 +40,7 @@ _RING_RANGE = (0.1, 0.96)  # radii; where dots, grooves and bevels lie: below is
 _RINGS = 2  # rings of a cover that are fitted at most: the strongest tell the most
 
 
-def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSettings) -> Circle:
+def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
     """The circle of a cover, its centre by rim and rings together.
 
     Parameters
@@ -41,7 +49,6 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     rim : Circle
         Fitted to the rim.
     expected : Radius
-    settings : BearingSettings
 
     Returns
     -------
@@ -49,16 +56,16 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
         As it was where no ring is seen, or the rim leaves no doubt. A rim that is not seen all round, or lies
         elsewhere, yields to the rings; else all are averaged by their variances, which are widened to what they differ.
     """
-    whole, center = rim.rim >= settings.sure_rim, np.array(rim.center)
+    whole, center = rim.rim >= SURE_RIM, np.array(rim.center)
     if whole and rim.std < _CERTAIN_CENTER_PX:
         return rim
     if not (whole and rim.std < _SURE_CENTER_RADII * expected.px):
         center = _roundest(photo, center, expected.px)
-    rings = _rings(photo, center, expected.px, settings)
+    rings = _rings(photo, center, expected.px)
     if not rings:
         return rim
     apart = max(np.hypot(*np.subtract(ring.center, rim.center)) for ring in rings)
-    agree = apart < settings.same_axis_radii * expected.px
+    agree = apart < SAME_AXIS_RADII * expected.px
     sure = whole and agree
     circles = [rim, *rings] if sure else rings
     weight = np.array([circle.std**-2.0 for circle in circles])
@@ -67,7 +74,7 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     # Their own variances count as much as two differences: an inverse gamma prior of two degrees of freedom.
     misfit = float((weight @ (centers - middle) ** 2).sum())
     std = float(np.sqrt((2.0 + misfit) / (2 * len(circles)) / weight.sum()))
-    std = max(std, settings.center_std_floor_px)  # common to all circles of a cover
+    std = max(std, CENTER_STD_FLOOR_PX)  # common to all circles of a cover
     if sure:
         return replace(rim, center=(float(middle[0]), float(middle[1])), std=std)
     # What was taken for the rim is none, or part of one: the radius is the expected one.
@@ -75,23 +82,22 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius, settings: BearingSet
     return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim, agree)
 
 
-def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSettings) -> list[Circle]:
+def find_marks(photo: Photo, places: Array, reach: float) -> list[Circle]:
     """Rings turned about some places, the surest first: dots, screws and grooves seen all round.
 
     Parameters
     ----------
     photo : Photo
     places : (k, 2) px
-        Where its centre may be, closer together than a cell of the search (``settings.mark_cells`` to the reach).
+        Where its centre may be, closer together than a cell of the search (``MARK_CELLS`` to the reach).
     reach : px
         Largest radius of the ring.
-    settings : BearingSettings
 
     Returns
     -------
     list of Circle
     """
-    reduction = max(1, int(reach / settings.mark_cells))
+    reduction = max(1, int(reach / MARK_CELLS))
     low = np.maximum(np.floor(places.min(axis=0) - 1.2 * reach).astype(int), 0)
     high = np.minimum(np.ceil(places.max(axis=0) + 1.2 * reach).astype(int) + 1, photo.size)
     size = (high - low) // reduction
@@ -108,7 +114,7 @@ def find_marks(photo: Photo, places: Array, reach: float, settings: BearingSetti
     found: list[Circle] = []
     for _ in range(_MARK_TRIES):
         place = places[int(np.argmax(roundness))]
-        found += _rings(photo, _roundest(photo, place, reach), reach, settings)
+        found += _rings(photo, _roundest(photo, place, reach), reach)
         roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
     return sorted(found, key=lambda ring: ring.std)
 
@@ -132,33 +138,30 @@ def _slopes(photo: Photo, centers: Array, radius: float, step: float) -> Array:
     low = np.maximum(np.floor(centers.min(axis=0) - 1.1 * radius).astype(int) - 1, 0)
     high = np.minimum(np.ceil(centers.max(axis=0) + 1.1 * radius).astype(int) + 2, photo.size)
     part = photo.pixels[low[1] : high[1], low[0] : high[0]]
+    rays = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])[:, None]
     # all centres in one picture: a row for each ray of each
-    u, v = (
-        (np.outer(turn, distance) + (centers[:, k, None, None] - low[k])).astype(np.float32).reshape(-1, len(distance))
-        for k, turn in enumerate((np.cos(angle), np.sin(angle)))
-    )
-    values = cv2.remap(part, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values = sampled(part, (rays + (centers - low)[:, None, None]).reshape(-1, len(distance), 2))
     mean = values.reshape(len(centers), len(angle), len(distance), -1).mean(axis=1) / photo.full_scale
     return np.asarray(np.diff(mean, axis=1) / step)
 
 
-def _rings(photo: Photo, center: Array, radius: float, settings: BearingSettings) -> list[Circle]:
+def _rings(photo: Photo, center: Array, radius: float) -> list[Circle]:
     """Circles seen nearly all round about ``center``, the rim itself not among them."""
     slope = np.hypot.reduce(_slopes(photo, center[None], radius, 1.0)[0], axis=1)
     distance = 0.06 * radius + 0.5 + np.arange(len(slope))
     slope[(distance < _RING_RANGE[0] * radius) | (distance > _RING_RANGE[1] * radius)] = 0.0
-    least = settings.rim_over_texture * median(slope[slope > 0.0]) if slope.any() else np.inf
+    least = RIM_OVER_TEXTURE * median(slope[slope > 0.0]) if slope.any() else np.inf
     found: list[Circle] = []
     for _ in range(_RINGS):
         at = int(np.argmax(slope))
         if slope[at] <= least:
             break
         expected = Radius(float(distance[at]), 1.0 / float(distance[at]))  # to a pixel, by the mean of all rays
-        ring = fit_circle(photo, center, expected, settings, on_cover=True)
-        slope[np.abs(distance - distance[at]) < max(4.0, 2.0 * settings.near_radii * radius)] = 0.0
+        ring = fit_circle(photo, center, expected, on_cover=True)
+        slope[np.abs(distance - distance[at]) < max(4.0, 2.0 * NEAR_RADII * radius)] = 0.0
         within = ring is not None and _RING_RANGE[0] <= ring.radius / radius <= _RING_RANGE[1]
-        if ring is None or not within or ring.rim < settings.sure_rim:
+        if ring is None or not within or ring.rim < SURE_RIM:
             continue
-        if np.hypot(*(np.array(ring.center) - center)) < settings.same_axis_radii * radius:
+        if np.hypot(*(np.array(ring.center) - center)) < SAME_AXIS_RADII * radius:
             found.append(ring)
     return found

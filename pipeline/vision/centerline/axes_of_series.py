@@ -89,7 +89,7 @@ def told_by_others(sights: Sequence[AxisSight]) -> list[AxesTold]:
         return [told_alone(sight) for sight in sights]
     middle = np.mean([sight.places for sight in sights], axis=(0, 1))
     commons = [_common(sight, middle) for sight in sights]
-    sizes = np.array([(far, near) for far in _sizes(_FAR) for near in _sizes(_NEAR)])
+    sizes = np.array([(0.5**far, 0.5**near) for far in range(_FAR + 1) for near in range(_NEAR + 1)])
     terms = [_terms(sight, common, sizes[:, 1]) for sight, common in zip(sights, commons, strict=True)]
     total = [np.sum(parts, axis=0) for parts in zip(*terms, strict=True)]
     others = [[all_of - own for all_of, own in zip(total, mine, strict=True)] for mine in terms]
@@ -109,10 +109,6 @@ def _common(sight: AxisSight, middle: Array) -> Array:
     common[0, _PARALLAX : _PARALLAX + 2] = sight.play * sight.normals[0]
     common[1, _PARALLAX + 2 :] = sight.play * sight.normals[1]
     return common
-
-
-def _sizes(halvings: int) -> Array:
-    return np.asarray(0.5 ** np.arange(halvings + 1), np.float64)
 
 
 def _terms(sight: AxisSight, common: Array, near: Array) -> tuple[Array, Array, Array]:

@@ -33,12 +33,10 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve
 from pipeline.vision.centerline.curve_fit import CurveFit, rms_of_bow
 from pipeline.vision.median import quantile
-from pipeline.vision.rough import AxisKind
 from pipeline.vision.scale.chord import ChordFrame
 
 _END_WIDTHS = 0.25  # widths; how far aside of the cable's middle the search puts a visible end: a corner of its mask
@@ -58,9 +56,7 @@ def continue_to_axes(
     covariance: Array,
     chord: ChordFrame,
     *,
-    kinds: tuple[AxisKind, AxisKind],
     width: float,
-    settings: CurveSettings,
     told: AxesTold | None = None,
 ) -> tuple[CurveFit, Array]:
     """Curve and covariance ``(p, p)`` of its parameters with what is known of the unseen ends.
@@ -71,21 +67,18 @@ def continue_to_axes(
     covariance : (p, p)
         Of the curve's parameters, the light's errors included.
     chord : ChordFrame
-    kinds : pair of str
-        Of the axes: a visible end tells roughly where the curve ends, where its last sections are lost.
     width : m
         Of the cable.
     told : AxesTold, optional
         What the other photos of the series tell of how the cable passes the axes.
     """
     rows, values, noise = _bow_at_ends(fit, covariance, _LEAST_DEPARTURE)
-    if _known(kinds):
-        past, misses, normals = _axes(fit, chord)
+    past, misses, normals = _axes(fit, chord)
+    if chord.marked:
         if told is None:
             told = told_alone(_sight(misses, np.eye(2), normals, chord, _AXIS_PLAY_WIDTHS * width))
         shift, loose = told.shift, told.covariance + chord.axis_std**2 * np.eye(2)
-    else:
-        past, misses, _ = _axes(fit, chord)
+    else:  # a visible end tells roughly where the curve ends, where its last sections are lost
         shift, loose = np.zeros(2), (_END_WIDTHS * width) ** 2 * np.eye(2)
     rows, values = np.vstack([rows, past]), np.concatenate([values, misses - shift])
     noise = np.block([[noise, np.zeros((2, 2))], [np.zeros((2, 2)), loose]])
@@ -93,20 +86,12 @@ def continue_to_axes(
     return replace(fit, curve=fit.curve.moved(step)), updated
 
 
-def sight_of_axes(
-    fit: CurveFit,
-    covariance: Array,
-    chord: ChordFrame,
-    *,
-    kinds: tuple[AxisKind, AxisKind],
-    width: float,
-    settings: CurveSettings,
-) -> AxisSight | None:
+def sight_of_axes(fit: CurveFit, covariance: Array, chord: ChordFrame, *, width: float) -> AxisSight | None:
     """How the curve continued as a bow passes the axes, as above.
 
-    None where these are its own ends or unknown, or where the fit is not finite.
+    None where these are its own ends, or where the fit is not finite.
     """
-    if not _known(kinds):
+    if not chord.marked:
         return None
     step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance, _LEAST_DEPARTURE))
     rows, misses, normals = _axes(fit, chord)
@@ -119,10 +104,6 @@ def sight_of_axes(
 def _sight(misses: Array, covariance: Array, normals: Array, chord: ChordFrame, play: float) -> AxisSight:
     places = chord.origin + chord.axes @ chord.rotation
     return AxisSight(misses, covariance, places, normals @ chord.rotation, chord.axis_parallax_std, play)
-
-
-def _known(kinds: tuple[AxisKind, AxisKind]) -> bool:
-    return set(kinds) <= {"cover", "given"}
 
 
 def _updated(covariance: Array, rows: Array, values: Array, noise: Array) -> tuple[Array, Array]:

@@ -21,7 +21,6 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.slow_light import steadied
 from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
 
@@ -299,7 +298,7 @@ class Edges:
     step: Array
 
 
-def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSettings, iterations: int = 5) -> Edges:
+def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 5) -> Edges:
     """Place, level and step of the edges on every section; blur and relative slopes come from the profiles."""
     shape, count = pixels.value.shape[:2], pixels.value.shape[2]
     offset, value = pixels.offset.reshape(-1, count), pixels.value.reshape(-1, count)
@@ -338,5 +337,5 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, settings: CurveSe
     faint = step < _LEAST_STEP_SIGMAS * np.sqrt(covariance[:, 1, 1])
     found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place).reshape(shape)
     light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
-    steady, std = steadied(found, light, errors, s, settings=settings)
+    steady, std = steadied(found, light, errors, s)
     return Edges(steady, std, step.reshape(shape))

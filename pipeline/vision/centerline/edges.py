@@ -26,10 +26,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
 from pipeline.vision.median import median, medians
+
+SEARCH_RADII = 0.35
+"""Of the radius; how far from its expected place an edge is sought: a path misled by a shadow is off by less, the next
+false edge (highlight, text) is mostly farther.
+"""
 
 
 @dataclass(frozen=True)
@@ -77,13 +81,7 @@ class Found:
 
 
 def search_edges(
-    ground: Ground,
-    curve: PlaneCurve,
-    *,
-    span: tuple[float, float],
-    half_width: float,
-    tolerance: float,
-    settings: CurveSettings,
+    ground: Ground, curve: PlaneCurve, *, span: tuple[float, float], half_width: float, tolerance: float
 ) -> Found:
     """Both edges on blocks along ``span``, to a few tenths of a pixel.
 
@@ -97,15 +95,15 @@ def search_edges(
     block = max(2, round(half_width / 4.0))
     count = max(8, int((span[1] - span[0]) / block))
     s = span[0] + (np.arange(count * block) + 0.5) * (span[1] - span[0]) / (count * block)
-    reach = np.ceil(half_width * (1.0 + 2.0 * settings.search_radii) + 4.0)
+    reach = np.ceil(half_width * (1.0 + 2.0 * SEARCH_RADII) + 4.0)
     t = np.arange(-reach, reach + 1.0)
     strip = straighten(ground, curve, s, t).reshape(count, block, len(t)).mean(axis=1)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
     ok = np.isfinite(strip).all(axis=1)
     usual = medians(rise, axis=0) if ok.all() else np.nanmedian(rise, axis=0)  # the latter takes ten times as long
-    middle = _offset(usual, t, half_width, tolerance, settings)
+    middle = _offset(usual, t, half_width, tolerance)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
-    sigma = settings.search_radii * half_width / 2.0 + 1.0
+    sigma = SEARCH_RADII * half_width / 2.0 + 1.0
     edges = np.empty((count, 2))
     for side, sign in ((0, -1.0), (1, 1.0)):
         near = np.exp(-0.5 * ((t - middle[side]) / sigma) ** 2)
@@ -115,11 +113,11 @@ def search_edges(
     return Found(s.reshape(count, block).mean(axis=1), edges, ok)
 
 
-def _offset(rise: Array, t: Array, half_width: float, tolerance: float, settings: CurveSettings) -> tuple[float, float]:
+def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple[float, float]:
     """The pair of a falling and a rising edge of about the right distance and place that stand out most."""
     width = t[None, :] - t[:, None]
     off = 0.5 * (t[None, :] + t[:, None])
-    prior = ((width / (2.0 * half_width) - 1.0) / tolerance) ** 2 + (off / (settings.search_radii * half_width)) ** 2
+    prior = ((width / (2.0 * half_width) - 1.0) / tolerance) ** 2 + (off / (SEARCH_RADII * half_width)) ** 2
     pair = np.sqrt(np.maximum(-rise[:, None], 0.0) * np.maximum(rise[None, :], 0.0)) * np.exp(-0.5 * prior)
     first, second = np.unravel_index(int(np.nanargmax(pair)), pair.shape)
     return float(t[first]), float(t[second])

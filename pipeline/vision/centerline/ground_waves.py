@@ -33,9 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.median import median, scatter
 
+SLOW_WIDTH_ORDER = 5  # of the polynomial of s that the width may follow by light, lens and distance of the camera
 _HIGHEST = 30
 """Degree of the finest polynomial: waves of a fifteenth of the length, which a curve through the points can follow."""
 
@@ -87,14 +87,12 @@ class Waves:
     length: float = 0.0
 
 
-def edge_waves(
-    photos: Sequence[HalfWidths], settings: CurveSettings, *, metres_per_px: float, lay: float = 0.0
-) -> Waves:
+def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float, lay: float = 0.0) -> Waves:
     """The waves, not smaller than those that every photo has.
 
     Parameters
     ----------
-    photos, settings
+    photos
         As in `seen_waves`.
     metres_per_px : m
     lay : m
@@ -102,25 +100,24 @@ def edge_waves(
     """
     if not photos:
         return Waves()
-    seen, least = seen_waves(photos, settings), _LEAST_WAVE_PX * metres_per_px
+    seen, least = seen_waves(photos), _LEAST_WAVE_PX * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
     own, common = np.hypot(seen.own, least), np.linalg.norm([seen.common, 0.5 * least, lay])
     return Waves(float(own), float(common), seen.length or _USUAL * reach)
 
 
-def seen_waves(photos: Sequence[HalfWidths], settings: CurveSettings) -> Waves:
+def seen_waves(photos: Sequence[HalfWidths]) -> Waves:
     """What the widths show of waves; none where they show none.
 
     Parameters
     ----------
     photos : sequence of HalfWidths
         Of one cable on one ground; those with too few sections tell nothing.
-    settings : CurveSettings
     """
     told = [photo for photo in photos if len(photo.s) >= 3 * _HIGHEST]
     if not told:
         return Waves()
-    coarsest = settings.slow_width_order + 1
+    coarsest = SLOW_WIDTH_ORDER + 1
     found = np.array([_components(photo)[:, coarsest:] for photo in told])  # (photos, 2, k)
     counts = np.array([len(photo.s) for photo in told], float)
     # of the waves' variances: nothing, then all up to what would be the whole of the widths' own

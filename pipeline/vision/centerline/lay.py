@@ -23,7 +23,6 @@ from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 
 from pipeline.records import Rejected
-from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.measurement import Followed
 from pipeline.vision.median import median
 
@@ -37,9 +36,7 @@ where the seen part of a cable ends. A running mean, one-sided there, moved the 
 _PASSES = 2
 
 
-def without_lay(
-    cables: Sequence[Followed | Rejected], diameter_m: float, settings: VisionSettings
-) -> tuple[Followed | Rejected, ...]:
+def without_lay(cables: Sequence[Followed | Rejected], diameter_m: float) -> tuple[Followed | Rejected, ...]:
     """Cables of a series without the fast wiggle that all photos have in common; a single one as it is."""
     first = [cable for cable in cables if isinstance(cable, Followed)]
     if len(first) < 2:
@@ -55,7 +52,7 @@ def without_lay(
         parts = zip(taken, places, at, seen.across, strict=True)
         taken = [before + np.interp(s, own, wiggle) for before, s, own, wiggle in parts]
         std, spare = max(std, seen.std), max(spare, seen.spare)
-        now = [cable.without(off, settings, spare=spare, lay_std=std) for cable, off in zip(first, taken, strict=True)]
+        now = [cable.without(off, spare=spare, lay_std=std) for cable, off in zip(first, taken, strict=True)]
     rest = iter(now)
     return tuple(next(rest) if isinstance(cable, Followed) else cable for cable in cables)
 

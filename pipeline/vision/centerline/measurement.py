@@ -23,13 +23,12 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along
-from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves
-from pipeline.vision.centerline.midline import Sections
+from pipeline.vision.centerline.ground_waves import SLOW_WIDTH_ORDER, HalfWidths, Waves, edge_waves
+from pipeline.vision.centerline.midline import LEAST_SECTIONS, Sections
 from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.centerline.refusal import (
     beside_axis,
@@ -41,12 +40,17 @@ from pipeline.vision.centerline.refusal import (
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.rough import AxisKind, RoughCable
+from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
 from rod.measurement import MeasuredShape
 
+LIGHT_LENGTH_SHARE = 0.35
+"""Of the seen length; correlation length of the light's error: it follows the cable's direction, which turns once from
+end to end; over 135 scenes 0.35 was likelier than 0.25 and 0.5.
+"""
 _HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
+_CORNER_WIDTHS = 0.5  # widths; so far aside of the cable a corner of its mask lies at most
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
 _LEAST_BALANCE = 0.8
 """Of both edges in a section (1: they count alike) for its width to tell how long errors last: one edge then has four
@@ -58,7 +62,7 @@ def measure_centerline(
     rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, settings: VisionSettings
 ) -> Centerline | Rejected:
     """Centerline of the cable on a single photo in the chord frame, or why there is none; see `follow_cable`."""
-    followed = follow_cable(rough, plane=plane, diameter_m=diameter_m, settings=settings)
+    followed = follow_cable(rough, plane=plane, diameter_m=diameter_m)
     return followed if isinstance(followed, Rejected) else centerline_of(followed, settings)
 
 
@@ -94,40 +98,25 @@ class Followed:
     diameter_m: float | None
     lay_std: float = 0.0
 
-    def sight(self, settings: VisionSettings) -> AxisSight | None:
+    def sight(self) -> AxisSight | None:
         """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
-        return sight_of_axes(
-            self.fit,
-            self.covariance,
-            self.chord,
-            kinds=self._kinds,
-            width=middle_width(self.width)[0],
-            settings=settings.curve,
-        )
+        return sight_of_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0])
 
-    def tied(self, told: AxesTold | None, settings: VisionSettings) -> tuple[CurveFit, Array]:
+    def tied(self, told: AxesTold | None) -> tuple[CurveFit, Array]:
         """Curve and covariance with what is known of the axes."""
-        return continue_to_axes(
-            self.fit,
-            self.covariance,
-            self.chord,
-            kinds=self._kinds,
-            width=middle_width(self.width)[0],
-            settings=settings.curve,
-            told=told,
-        )
+        return continue_to_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0], told=told)
 
-    def half_widths(self, options: CurveSettings) -> HalfWidths:
+    def half_widths(self) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
         used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
-    def without(self, wiggle: Array, settings: VisionSettings, *, spare: float, lay_std: float) -> Followed:
+    def without(self, wiggle: Array, *, spare: float, lay_std: float) -> Followed:
         """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
         theta = self.fit.curve.at(self.fit.s)[1]
         moved = wiggle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
-        fit = _fit(self.sections, self.chord, self.width, settings.curve, moved=moved)
+        fit = _fit(self.sections, self.chord, self.width, moved=moved)
         noise = np.sqrt(spare)
         fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
         covariance = fit.smooth.covariance + slow_errors(fit, *self.light)
@@ -144,22 +133,13 @@ class Followed:
         A visible end lies on the curve: what is open is where along it, and that moves it across the chord by the
         slope of the curve there.
         """
-        if self._kinds[0] in ("cover", "given"):
+        if self.chord.marked:
             return self.chord.axis_std
         return self.chord.axis_std * float(np.sqrt(np.mean(np.sin(fit.curve.at(feet)[1]) ** 2)))
 
-    @property
-    def _kinds(self) -> tuple[AxisKind, AxisKind]:
-        return self.rough.left.kind, self.rough.right.kind
-
 
 def follow_cable(
-    rough: RoughCable,
-    *,
-    plane: PlaneMap,
-    diameter_m: float | None,
-    settings: VisionSettings,
-    axis_parallax_std: float = 0.0,
+    rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, axis_parallax_std: float = 0.0
 ) -> Followed | Rejected:
     """The cable fitted where it is seen, or why it cannot be.
 
@@ -171,38 +151,43 @@ def follow_cable(
         Pixels to metres on the plane of the cable axis.
     diameter_m : m or None
         Of the cable, in the unit of the plane; a check on the measured width.
-    settings : VisionSettings
     axis_parallax_std : relative
         As in `pipeline.records.Traces`.
     """
-    options = settings.curve
     half_width = rough.half_width_px
     if diameter_m is not None:
         scale = median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)]))
         half_width = 0.5 * diameter_m * scale
-    sections = follow(rough, half_width=half_width, known=diameter_m is not None, settings=options)
+    sections = follow(rough, half_width=half_width, known=diameter_m is not None)
     if isinstance(sections, Rejected):
         return sections
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
-    fit = _fit(sections, chord, width, options)
+    fit = _fit(sections, chord, width)
+    feet, misses = feet_of_axes(fit, chord)
+    if not chord.marked and misses.max() < _CORNER_WIDTHS * middle_width(width)[0]:
+        rough = _with_ends(rough, chord.to_pixels(fit.curve.at(feet)[0]))
+        chord = chord_frame(rough, plane, axis_parallax_std)
+        fit = _fit(sections, chord, width)
     refused = refusal(rough, sections, fit, chord, width, diameter_m)
     if refused is not None:
         return refused
     metres = median(width / sections.width)
-    light = sections.systematic_std * metres, options.light_length_share * float(fit.s[-1] - fit.s[0])
+    light = sections.systematic_std * metres, LIGHT_LENGTH_SHARE * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
     return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
 
 
-def _fit(
-    sections: Sections,
-    chord: ChordFrame,
-    width: Array,
-    options: CurveSettings,
-    *,
-    moved: Array | float = 0.0,
-) -> CurveFit:
+def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
+    """The cable with its visible ends (2, 2) px on its curve: the search put them into corners of a mask."""
+    left, right = (
+        replace(axis, center_px=(float(u), float(v)))
+        for axis, (u, v) in zip((rough.left, rough.right), ends_px, strict=True)
+    )
+    return replace(rough, left=left, right=right)
+
+
+def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | float = 0.0) -> CurveFit:
     """Curvature spline through the midline less ``moved`` (n, 2) in the chord frame, ``s = 0`` near the left axis."""
     points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second)) - moved
     before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
@@ -215,11 +200,11 @@ def _fit(
         s=s,
         length=float(s[-1] + after),
         diameter=median(width),
-        witness=_half_widths(s, sections.balance, width, std, options),
+        witness=_half_widths(s, sections.balance, width, std),
     )
 
 
-def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: CurveSettings) -> Witness | None:
+def _half_widths(s: Array, balance: Array, width: Array, std: Array) -> Witness | None:
     """What half the width of the cable, which is constant, varies along it: errors of the edges without its bend.
 
     The errors ``a`` and ``b`` of the two edges move the midline by ``(a + b) / 2`` and half the width by
@@ -228,21 +213,21 @@ def _half_widths(s: Array, balance: Array, width: Array, std: Array, options: Cu
     bend. Sections that live on one edge tell nothing.
     """
     two = balance > _LEAST_BALANCE
-    if np.count_nonzero(two) < options.least_sections:
+    if np.count_nonzero(two) < LEAST_SECTIONS:
         return None
     s, width = s[two], width[two]
-    slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, options.slow_width_order)
+    slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, SLOW_WIDTH_ORDER)
     off = 0.5 * (width - median(width))
     spread = scatter(off, 0.0)
     return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
-def waves_of(cables: Sequence[Followed | Rejected], settings: VisionSettings) -> Waves:
+def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:
     """The waves that ground and camera make in the midlines of all photos of a series."""
-    halves = [cable.half_widths(settings.curve) for cable in cables if isinstance(cable, Followed)]
+    halves = [cable.half_widths() for cable in cables if isinstance(cable, Followed)]
     scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
     lay = max((cable.lay_std for cable in cables if isinstance(cable, Followed)), default=0.0)
-    return edge_waves(halves, settings.curve, metres_per_px=max(scales, default=0.0), lay=lay)
+    return edge_waves(halves, metres_per_px=max(scales, default=0.0), lay=lay)
 
 
 def centerline_of(
@@ -263,25 +248,31 @@ def centerline_of(
         That ground and sheath make in its midline, see `pipeline.vision.centerline.ground_waves`.
     """
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
-    options, (middle, scatter) = settings.curve, middle_width(width)
+    middle, scatter = middle_width(width)
     misses = feet_of_axes(followed.fit, chord)[1]
     metres = median(width / sections.width)
     waves = waves or Waves()
     errors = slow_errors(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
-    fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told, settings)
+    fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told)
     feet = feet_of_axes(fit, chord)[0]
-    s = np.linspace(feet[0], feet[1], max(options.points, 2 * fit.curve.frame.size))
+    s = np.linspace(feet[0], feet[1], max(settings.curve.points, 2 * fit.curve.frame.size))
     shape = _shape(
         fit, s, _with_axes(covariance, followed.axis_std(fit, feet), chord.chord), followed.light, waves, width=middle
     )
     kappa_std = std_along(shape.basis_kappa, shape.covariance)
-    useless = refusal_of_band(rough.image, shape.kappa[shape.seen], kappa_std[shape.seen], float(s[-1] - s[0]), options)
+    useless = refusal_of_band(
+        rough.image,
+        shape.kappa[shape.seen],
+        kappa_std[shape.seen],
+        length=float(s[-1] - s[0]),
+        most_percent=settings.curve.max_band_percent,
+    )
     if useless is not None:
         return useless
     own_std = length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
     used = fit.weight > 0.0
-    quality = rough.quality | _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
+    quality = _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
     if followed.diameter_m is not None:
         quality["width_over_diameter"] = middle / followed.diameter_m
     return Centerline(

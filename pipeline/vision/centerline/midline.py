@@ -39,12 +39,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
 from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
 from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 
+LEAST_SECTIONS = 12  # measured, or found in the search, at all; fewer do not fix a curve that bends both ways
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
 _TOGETHER = 4  # sections
@@ -142,14 +142,7 @@ def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cov
 
 
 def measure_sections(
-    ground: Ground,
-    curve: PlaneCurve,
-    s: Array,
-    *,
-    half_width: float,
-    diameter: float | None,
-    blur: float,
-    settings: CurveSettings,
+    ground: Ground, curve: PlaneCurve, s: Array, *, half_width: float, diameter: float | None, blur: float
 ) -> Sections | None:
     """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
     inside = min(_INSIDE_RADII * half_width, _LONGEST_SIDE_PX)
@@ -161,16 +154,16 @@ def measure_sections(
     thin = half_width < _SMALL_RADIUS_PX
     shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), thin=thin)
     profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter) else shaded
-    edges = fit_edges(pixels, s, profiles, settings=settings)
+    edges = fit_edges(pixels, s, profiles)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
-    if good.sum(axis=0).min() < settings.least_sections:
+    if good.sum(axis=0).min() < LEAST_SECTIONS:
         return None
     place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
     keep = _from_stretch_to_stretch(keep)
-    if np.count_nonzero(keep) < settings.least_sections:
+    if np.count_nonzero(keep) < LEAST_SECTIONS:
         return None
     s, place, std = s[keep], place[keep], std[keep]
     where, angle = curve.at(s)
@@ -178,7 +171,8 @@ def measure_sections(
     width = place.sum(axis=1) + 2.0 * half_width
     step = edges.step[:, keep]
     smooth_width = _running_median(width)
-    doubt = _by_light(profiles, s, _ROUNDNESS * 2.0 * half_width)
+    # half of what changes between two models that both have some right is the standard deviation of an edge by light
+    doubt = (0.5 * profiles.at(s, "shift")) ** 2 + (_ROUNDNESS * 2.0 * half_width) ** 2
     trust = doubt[::-1] / doubt.sum(axis=0)
     likely = float(np.average(smooth_width, weights=1.0 / doubt.sum(axis=0)))
     inward = 0.5 * likely - half_width - place.T
@@ -260,14 +254,6 @@ def _consistent(
             2.0 * std[lost, other]
         )  # the same error again, with the other sign: midpoint moves by all of it
     return out, spread, good
-
-
-def _by_light(profiles: Profiles, s: Array, floor: float) -> Array:
-    """Variances (px^2) of both edges' places ``(2, n)`` by shadow and shading, at least ``floor`` squared.
-
-    Half the width of the change between two models that both have some right is its standard deviation.
-    """
-    return np.asarray((0.5 * profiles.at(s, "shift")) ** 2 + floor**2)
 
 
 def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None) -> float:

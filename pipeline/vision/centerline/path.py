@@ -8,11 +8,10 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Rejected
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import Ground, in_picture, search_edges
-from pipeline.vision.centerline.midline import Cover, Sections, free_of_covers, measure_sections
+from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, search_edges
+from pipeline.vision.centerline.midline import LEAST_SECTIONS, Cover, Sections, free_of_covers, measure_sections
 from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
@@ -103,12 +102,7 @@ def fit_along(
     return fit(None, 8)
 
 
-def _path_intervals(length: float, diameter: float) -> int:
-    wanted = length / (_PATH_KNOT_DIAMETERS * diameter)
-    return int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
-
-
-def follow(rough: RoughCable, *, half_width: float, known: bool, settings: CurveSettings) -> Sections | Rejected:
+def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | Rejected:
     """Sections of the cable, laid on a path in px that follows its midline.
 
     Parameters
@@ -124,7 +118,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
     points, s = _guides(rough, along, half_width)
-    intervals = _path_intervals(float(along[-1]), 2.0 * half_width)
+    wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
+    intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER, iterations=1)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
@@ -133,11 +128,11 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
     if span is None:
         return _lost(rough, 0.0)
     tolerance = _WIDTH_TOLERANCE * (1.0 if known else 2.0)
-    found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance, settings=settings)
+    found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance)
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = median(width[found.usable]) if found.usable.any() else np.nan
-    usable = found.usable & (np.abs(width - middle) < settings.search_radii * half_width)
-    if np.count_nonzero(usable) < settings.least_sections:
+    usable = found.usable & (np.abs(width - middle) < SEARCH_RADII * half_width)
+    if np.count_nonzero(usable) < LEAST_SECTIONS:
         return _lost(rough, float(np.mean(usable)))
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
@@ -150,16 +145,10 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, settings: Curve
         free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)
         & in_picture(ground, path, s, 1.2 * half_width + 3.0 * rough.blur_px + 4.0)
     ]
-    if len(s) < settings.least_sections:
+    if len(s) < LEAST_SECTIONS:
         return _lost(rough, 0.0)
     sections = measure_sections(
-        ground,
-        path,
-        s,
-        half_width=half_width,
-        diameter=diameter if known else None,
-        blur=rough.blur_px,
-        settings=settings,
+        ground, path, s, half_width=half_width, diameter=diameter if known else None, blur=rough.blur_px
     )
     return _lost(rough, 0.0) if sections is None else sections
 

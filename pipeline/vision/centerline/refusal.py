@@ -13,7 +13,6 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.evidence import Course, Evidence, unlike_a_cable, weigh
@@ -92,12 +91,12 @@ def _bent(fit: CurveFit, middle: float) -> Message | None:
     return None if bend <= _BEND else Message("photo/outline.bend", radius_diameters=1.0 / bend)
 
 
-def refusal_of_band(image: str, kappa: Array, std: Array, length: float, options: CurveSettings) -> Rejected | None:
-    """Refuse a curve whose band is of no use: half of it wider than a share of the range of curvature.
+def refusal_of_band(image: str, kappa: Array, std: Array, *, length: float, most_percent: float) -> Rejected | None:
+    """Refuse a curve whose band is of no use: half of it wider than ``most_percent`` of the range of curvature.
 
     The range of a nearly straight cable is that of a bend by one radian over its ``length`` (m).
     """
-    band, most = 1.96 * median(std) / max(float(np.abs(kappa).max()), 1.0 / length), 0.01 * options.max_band_percent
+    band, most = 1.96 * median(std) / max(float(np.abs(kappa).max()), 1.0 / length), 0.01 * most_percent
     return None if band <= most else Rejected(image, Message("photo/contrast.band", band=min(band, 9.99), most=most))
 
 

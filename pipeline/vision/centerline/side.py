@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from pipeline.messages import Message
 from pipeline.records import Centerline, Finding, Rejected, of_photo
-from pipeline.settings.vision.series import SeriesSettings
 from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
@@ -25,7 +24,7 @@ _OTHER_SIDE_WIDTHS = 0.5  # widths; a bow that anyone sees: a smaller one to the
 
 
 def on_one_side(
-    lines: tuple[Centerline | Rejected, ...], diameter_m: float, settings: SeriesSettings
+    lines: tuple[Centerline | Rejected, ...], diameter_m: float
 ) -> tuple[tuple[Centerline | Rejected, ...], tuple[Finding, ...]]:
     """Centerlines with y of all chord frames toward one side of the photo.
 
@@ -34,7 +33,6 @@ def on_one_side(
     lines : tuple of Centerline or Rejected
         As measured, every y toward the photo's own bow; left and right are the same bearings on all photos.
     diameter_m : m
-    settings : SeriesSettings
 
     Returns
     -------

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.median import median, scatter
 
+LEAST_SLOW_SECTIONS = 80  # edges of a side; fewer do not tell how far level and step depart from the polynomial
 _BLOCK = 8  # sections: short beside the bends of the polynomial, long beside texture
 _LASTING = 4.0  # blocks that a misfit lasts at most, before the polynomial follows it
 # Of the errors' variance: where nothing is off 1.0 is found from section to section and 1.2 to 1.35 over blocks, with a
@@ -39,9 +39,7 @@ a curve that looked right, 20 px beside the cable.
 """
 
 
-def steadied(
-    place: Array, light: Array, covariance: Array, s: Array, *, settings: CurveSettings
-) -> tuple[Array, Array]:
+def steadied(place: Array, light: Array, covariance: Array, s: Array) -> tuple[Array, Array]:
     """Places of edges and their standard deviations ``(2, n)``, with level and step of each side slow along s.
 
     Parameters
@@ -53,11 +51,10 @@ def steadied(
     covariance : (2, n, 3, 3)
         Of level, step and place.
     s : (n,) px
-    settings : CurveSettings
     """
     free = np.sqrt(covariance[..., 2, 2])
     known = np.isfinite(place)
-    if known.sum(axis=1).min() < settings.least_slow_sections or known.mean(axis=1).min() < _LEAST_SLOW_SHARE:
+    if known.sum(axis=1).min() < LEAST_SLOW_SECTIONS or known.mean(axis=1).min() < _LEAST_SLOW_SHARE:
         return place, free
     slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, _SLOW_LIGHT_ORDER)
     off, extra, plain = np.zeros(light.shape), np.zeros((2, 2)), known.copy()

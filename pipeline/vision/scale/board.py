@@ -37,6 +37,7 @@ _DICTIONARIES = (
 )
 _BOARD_STD = 3e-4  # relative; a printed board measured with a ruler: 0.1 mm on 300 mm
 _BOARD_SEARCH_PX = 2000  # px; long side at which the board is searched, corners are refined at full resolution
+MAX_BORDER_STD = 0.002  # relative, scale at the border against the middle; curvature is off by half of it, 0.1 %
 _MAX_BOARD_RMS_PX = 0.5  # px; real boards reach 0.12 to 0.16 px, bent ones do not
 
 
@@ -54,7 +55,7 @@ def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSe
     stage = settings.calibration
     views, findings = _read_views(camera.calibration, camera.board, settings)
     try:
-        fits = fit_views(views, stage)
+        fits = fit_views(views)
     except (np.linalg.LinAlgError, cv2.error) as error:
         raise InputError(Message("calibration/no-board.plane"), path=camera.calibration) from error
     return [_calibration_of(fit, views, findings, camera, diameter_m, stage) for fit in fits]
@@ -78,7 +79,7 @@ def _calibration_of(
     findings = list(read)
     if fit.rms_px > _MAX_BOARD_RMS_PX:
         findings.append(doubtful("calibration/residual", rms_px=fit.rms_px))
-    if fit.border_std > settings.max_border_std:
+    if fit.border_std > MAX_BORDER_STD:
         findings.append(doubtful("calibration/border", std=fit.border_std))
     if fit.photo:
         findings.append(inferred("calibration/planes", image=fit.photo))
@@ -91,7 +92,7 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
     findings: list[Finding] = []
     for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES):
         photo = load_photo(path, settings.photo)
-        view = photo if isinstance(photo, Rejected) else find_board(photo, board, settings.calibration)
+        view = photo if isinstance(photo, Rejected) else find_board(photo, board)
         if isinstance(view, Rejected):
             findings.append(doubtful("calibration/photo", image=view.image, said=view.said))
         else:
@@ -103,7 +104,7 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
     return views, findings
 
 
-def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> BoardView | Rejected:
+def find_board(photo: Photo, board: Board) -> BoardView | Rejected:
     """Corners of the board on a photo, sub-pixel; rejected with ``calibration/no-corners`` if it is not there."""
     grey = _grey8(photo)
     factor = max(1, round(max(photo.size) / _BOARD_SEARCH_PX))
@@ -115,7 +116,7 @@ def find_board(photo: Photo, board: Board, settings: CalibrationSettings) -> Boa
     if found is None or not _tells_plane(found[0], board):
         return missing
     points, uv = found
-    uv = _refined(photo, board, points, uv * factor + 0.5 * (factor - 1), settings)
+    uv = _refined(photo, board, points, uv * factor + 0.5 * (factor - 1))
     clear = np.isfinite(uv[:, 0])
     if not _tells_plane(points[clear], board):
         return missing
@@ -130,15 +131,15 @@ def _tells_plane(points: Array, board: Board) -> bool:
     return bool(spread > 0.25 * board.square_m)
 
 
-def _refined(photo: Photo, board: Board, points: Array, uv: Array, settings: CalibrationSettings) -> Array:
+def _refined(photo: Photo, board: Board, points: Array, uv: Array) -> Array:
     """Corners ``(n, 2)`` fitted to the photo at its full size and depth, NaN where it shows none."""
     pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
     middle, size = uv.mean(axis=0), float(np.ptp(uv))
     to_picture = np.asarray(np.linalg.inv(homography_of((uv - middle) / size, points)), np.float64)
     half = 0.5 * board.square_m * np.eye(2)
     cells = [size * (project(to_picture, points + step) - project(to_picture, points - step)) for step in half]
-    window = Window.of(_marker_m(board) / board.square_m if board.charuco else 0.0, settings)
-    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), window, settings)
+    window = Window.of(_marker_m(board) / board.square_m if board.charuco else 0.0)
+    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), window)
 
 
 def _marker_m(board: Board) -> float:

@@ -22,6 +22,8 @@ from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
 _LENGTH = Message("scale.length")
+_MAX_SCALE_STD = 0.01  # relative; a source of scale worse than that is no better than the cable's length
+_CHECK_SIGMAS = 3.0  # sigmas; one false finding in 400 checks
 _COVER_DIAMETER_STD = 0.004  # relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit
 _COVER_HEIGHT_M = 1e-3  # m; top of a cover or marker above the cable's upper side: a lid and its screw
 _CHECK_FLOOR = 0.005  # relative; smaller deviations change the stiffness by less than one percent
@@ -79,7 +81,7 @@ def from_found(
     parallax_std = axis_parallax_std(specimen, found, settings)
     estimates = [_by_travel(found, displacements, parallax_std), _by_covers(found, specimen, settings)]
     known = [estimate for estimate in estimates if estimate is not None]
-    precise = [scale for scale in known if scale.std_relative < settings.max_scale_std]
+    precise = [scale for scale in known if scale.std_relative < _MAX_SCALE_STD]
     if precise:
         scale = min(precise, key=lambda estimate: estimate.std_relative)
     else:
@@ -191,39 +193,36 @@ def check_scale(
     found_by = calibration.scale
     parallax_std = axis_parallax_std(specimen, found, settings)
     travel = _by_travel_on_plane(calibration, found, displacements, parallax_std)
-    covers = _relative(_by_covers(found, specimen, settings), _local_scale(calibration, found))
+    covers = _by_covers(found, specimen, settings)
+    if covers is not None:  # in units of the scale used
+        covers = replace(covers, px_per_m=covers.px_per_m / _local_scale(calibration, found))
     findings = []
-    if covers is not None and covers.source != found_by.source and _off(covers, found_by, settings):
+    if covers is not None and covers.source != found_by.source and _off(covers, found_by):
         witnesses = [
             witness
             for witness in (travel, _by_length(calibration, found, specimen, settings))
             if witness is not None
             and witness.source != found_by.source
-            and abs(covers.px_per_m - 1.0) > settings.check_sigmas * _std(witness, found_by)
+            and abs(covers.px_per_m - 1.0) > _CHECK_SIGMAS * _std(witness, found_by)
         ]
-        confirmed = witnesses and not any(_off(witness, found_by, settings) for witness in witnesses)
+        confirmed = witnesses and not any(_off(witness, found_by) for witness in witnesses)
         if confirmed:
             both = {"used": found_by.source, "other": witnesses[0].source}
             findings.append(inferred("scale/covers", width=covers.px_per_m, **both))
         else:
             findings.append(Finding("scale/covers", "warning", _away(covers, found_by)))
-    if travel is not None and travel.source != found_by.source and _off(travel, found_by, settings):
+    if travel is not None and travel.source != found_by.source and _off(travel, found_by):
         findings.append(Finding("scale/displacement", "warning", _away(travel, found_by)))
     return tuple(findings)
-
-
-def _relative(scale: Scale | None, used: float) -> Scale | None:
-    """A scale in units of the one used."""
-    return None if scale is None else replace(scale, px_per_m=scale.px_per_m / used)
 
 
 def _std(other: Scale, used: Scale) -> float:
     return math.hypot(other.std_relative, used.std_relative)
 
 
-def _off(other: Scale, used: Scale, settings: CalibrationSettings) -> bool:
+def _off(other: Scale, used: Scale) -> bool:
     """True if a scale in units of the one used differs from it by more than both allow."""
-    return abs(other.px_per_m - 1.0) > max(settings.check_sigmas * _std(other, used), _CHECK_FLOOR)
+    return abs(other.px_per_m - 1.0) > max(_CHECK_SIGMAS * _std(other, used), _CHECK_FLOOR)
 
 
 def _away(other: Scale, used: Scale) -> Message:

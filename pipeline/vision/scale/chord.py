@@ -32,6 +32,8 @@ class ChordFrame:
         True if y points up on the photo.
     axis_parallax_std : relative
         As in `pipeline.records.Traces`; no part of ``axis_std``.
+    marked : bool
+        Covers or a person mark both axes; else they are where the cable is seen to end.
     """
 
     plane: PlaneMap
@@ -41,6 +43,7 @@ class ChordFrame:
     axis_std: float
     mirrored: bool
     axis_parallax_std: float = 0.0
+    marked: bool = True
 
     @property
     def axes(self) -> Array:
@@ -75,4 +78,5 @@ def chord_frame(rough: RoughCable, plane: PlaneMap, axis_parallax_std: float = 0
         axis_std=float(std / np.median(plane.local_scale(pixels))),
         mirrored=bool(toward[1] < 0.0),
         axis_parallax_std=axis_parallax_std,
+        marked={rough.left.kind, rough.right.kind} <= {"cover", "given"},
     )

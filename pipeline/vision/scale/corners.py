@@ -22,8 +22,8 @@ import numpy as np
 from scipy.special import erf
 
 from pipeline.records import Array
-from pipeline.settings.vision.scale import CalibrationSettings
 
+_CORNER_STEP_PX = 1e-3  # px; a tenth of what noise leaves at best
 _ROUNDS = 15
 _CORNER_REACH = 0.4  # squares; how far from a corner its edges are fitted: before the next corner's
 _CORNER_MARGIN = 0.9  # share of the white margin beside a ChArUco marker; the rest is the marker's blur
@@ -50,13 +50,13 @@ class Window:
     margin: float
 
     @classmethod
-    def of(cls, marker_share: float, settings: CalibrationSettings) -> Window:
+    def of(cls, marker_share: float) -> Window:
         """Window beside markers that are ``marker_share`` of a square wide (0 without any)."""
         reach = _CORNER_REACH
         return cls(reach, min(reach, _CORNER_MARGIN * 0.5 * (1.0 - marker_share)))
 
 
-def refine_corners(grey: Array, uv: Array, cells: Array, window: Window, settings: CalibrationSettings) -> Array:
+def refine_corners(grey: Array, uv: Array, cells: Array, window: Window) -> Array:
     """Corners fitted to the picture.
 
     Parameters
@@ -74,10 +74,10 @@ def refine_corners(grey: Array, uv: Array, cells: Array, window: Window, setting
     (n, 2) px
         NaN where the picture shows no such crossing.
     """
-    return np.array([_refined(grey, at, cell, window, settings) for at, cell in zip(uv, cells, strict=True)])
+    return np.array([_refined(grey, at, cell, window) for at, cell in zip(uv, cells, strict=True)])
 
 
-def _refined(grey: Array, start: Array, cell: Array, window: Window, settings: CalibrationSettings) -> Array:
+def _refined(grey: Array, start: Array, cell: Array, window: Window) -> Array:
     lost = np.full(2, np.nan)
     place, value = _pixels(grey, start, cell, window, _CORNER_REACH_PX)
     square = float(np.hypot(*cell).min())
@@ -95,11 +95,11 @@ def _refined(grey: Array, start: Array, cell: Array, window: Window, settings: C
         move = np.clip(step[:2], -1.0, 1.0)
         at, turn = at + move, turn + np.clip(step[2:4], -0.1, 0.1)
         log_sigma += float(np.clip(step[4], -0.5, 0.5))
-        if np.abs(move).max() < settings.corner_step_px:
+        if np.abs(move).max() < _CORNER_STEP_PX:
             break
     clear = abs(amount[1]) > _CORNER_CONTRAST * float(np.std(left))
     stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < window.reach * square
-    return at if clear and stayed and np.abs(move).max() < 10.0 * settings.corner_step_px else lost
+    return at if clear and stayed and np.abs(move).max() < 10.0 * _CORNER_STEP_PX else lost
 
 
 def _pixels(grey: Array, start: Array, cell: Array, window: Window, reach_px: float) -> tuple[Array, Array]:

@@ -20,10 +20,11 @@ from scipy.optimize import least_squares
 
 from pipeline.messages import Message
 from pipeline.records import Array
-from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.median import scatter
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
+USUAL_LENS = 0.02  # relative; standard deviation of k1 at half the diagonal among lenses nobody corrected
+_LEAST_STD_PX = 1e-3  # px; of corners: a tenth of what noise leaves at best
 _LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
 _DISTANCE_STD = 0.3  # relative; a distance known worse tells no more than a usual one
 _CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
@@ -72,21 +73,21 @@ class PlaneFit:
     photo: str = ""
 
 
-def fit_views(views: list[BoardView], settings: CalibrationSettings) -> list[PlaneFit]:
+def fit_views(views: list[BoardView]) -> list[PlaneFit]:
     """Plane maps of the board's surface from one photo or more: one for all, or that of each photo."""
-    flat = _fit_plane_views(views, settings)
+    flat = _fit_plane_views(views)
     if len(views) < _LENS_PHOTOS:
         return [flat]
-    free = _fit_free_views(views, settings)
+    free = _fit_free_views(views)
     # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
     return free if flat.rms_px > _ONE_PLANE_RATIO * free[0].rms_px else [flat]
 
 
-def _fit_plane_views(views: list[BoardView], settings: CalibrationSettings) -> PlaneFit:
+def _fit_plane_views(views: list[BoardView]) -> PlaneFit:
     """All photos show the board in one plane: one homography, one radial term, a rigid move for each further photo."""
     middle, radius = _picture(views[0])
     start, moves = _start(views, middle, radius)
-    fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), settings.usual_lens, settings)
+    fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), USUAL_LENS)
     homography, lens = _plane_parts(fit.x, middle, radius)
     source = Message("lens.fitted", k1=fit.x[0], std=np.sqrt(fit.covariance[0, 0]))
     aside = tuple(PlaneMap(*_plane_parts(fit.x + step, middle, radius)) for step in _steps_aside(fit))
@@ -178,7 +179,7 @@ def _rotation(turn: float) -> Array:
     return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
 
-def _least_squares(views: list[BoardView], start: Array, lens_std: float, settings: CalibrationSettings) -> _Solution:
+def _least_squares(views: list[BoardView], start: Array, lens_std: float) -> _Solution:
     """Corners against the model, in px; the first parameter is k1.
 
     A board that hardly tells the lens would have it bend the picture outside the board at will: lenses have k1 about
@@ -213,14 +214,14 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float, settin
         found = least_squares(residual, q, x_scale="jac", loss="soft_l1", f_scale=3.0 * used, max_nfev=60)
         q, error = np.asarray(found.x), corners(np.asarray(found.x))
         # of most of them: a corner mistaken for another thing shall not widen what it is judged by
-        std = max(scatter(error, 0.0), settings.corner_step_px)
+        std = max(scatter(error, 0.0), _LEAST_STD_PX)
     rms = float(np.sqrt(error @ error / max(len(error) - len(q), 1)))
     slopes = np.asarray(found.jac)
     slopes[-1] *= rms / used
     return _Solution(q * scale, scale, np.asarray(np.linalg.pinv(slopes.T @ slopes)) * rms**2, rms)
 
 
-def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> list[PlaneFit]:
+def _fit_free_views(views: list[BoardView]) -> list[PlaneFit]:
     """Any positions: camera matrix and lens from all, the plane of each photo."""
     objects = [np.column_stack([v.board_m, np.zeros(len(v.board_m))]).astype(np.float32) for v in views]
     images = [v.uv.astype(np.float32).reshape(-1, 1, 2) for v in views]
@@ -242,7 +243,7 @@ def _fit_free_views(views: list[BoardView], settings: CalibrationSettings) -> li
         # The board's z axis points away from or toward the camera; the distance from the plane is the same.
         distance = float(abs(cv2.Rodrigues(turn)[0][:, 2] @ np.ravel(shift)))
         start = np.append(0.0, _start([ideal], middle, radius)[0])
-        fit = _least_squares([ideal], start, float(stds[4]) * (radius / focal) ** 2, settings)
+        fit = _least_squares([ideal], start, float(stds[4]) * (radius / focal) ** 2)
         plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
         # OpenCV counts distances, here as above coordinates.
         made = PlaneFit(

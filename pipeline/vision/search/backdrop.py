@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
+CELLS_ACROSS = 8.0  # cells across a cable of known diameter in the reduced photo: a highlight of a fifth is still one
+MIN_GROUND_STD = 0.002  # of full range; half a level of 8 bits: no ground is calmer than its rounding
 _HIGHER_LEVELS = 2  # levels above Otsu's, each splits what stands above the last: shadow, then cable
 _REDUCED_SIDE_CELLS = 1000
 """Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
@@ -80,17 +81,15 @@ class Standout:
         return np.asarray(cells) * self.reduction + (self.reduction - 1) / 2.0 + self.offset_px
 
 
-def choose_reduction(size: tuple[int, int], diameter_px: float | None, settings: SegmentationSettings) -> int:
+def choose_reduction(size: tuple[int, int], diameter_px: float | None) -> int:
     """Photo pixels per cell: a few cells across the cable if its diameter is known, a set picture size if not."""
     by_size = max(1, round(max(size) / _REDUCED_SIDE_CELLS))
     if diameter_px is None:
         return by_size
-    return max(1, int(diameter_px / settings.cells_across))
+    return max(1, int(diameter_px / CELLS_ACROSS))
 
 
-def stand_out(
-    photo: Photo, reduction: int, settings: SegmentationSettings, *, window: tuple[int, int, int, int] | None = None
-) -> Standout:
+def stand_out(photo: Photo, reduction: int, *, window: tuple[int, int, int, int] | None = None) -> Standout:
     """Reduce the photo (or the ``window`` u0, v0, u1, v1 of it) and take the ground away."""
     width, height = photo.size
     u0, v0, u1, v1 = window if window is not None else (0, 0, width, height)
@@ -101,7 +100,7 @@ def stand_out(
     small = small[..., None] if small.ndim == 2 else small
     small *= np.float32(1.0 / photo.full_scale)
     residual = _above_ground(small)
-    return Standout(reduction, (u0, v0), residual, _covariance(residual, settings), small)
+    return Standout(reduction, (u0, v0), residual, _covariance(residual), small)
 
 
 def _above_ground(small: Image) -> Image:
@@ -139,17 +138,17 @@ def _robust_fit(terms: Array, values: Array) -> Array:
     return coefficients
 
 
-def _covariance(residual: Image, settings: SegmentationSettings) -> Array:
+def _covariance(residual: Image) -> Array:
     """Covariance of the ground's colours, without cable and objects."""
     # some ten thousand cells tell a standard deviation to one percent
     stride = max(1, int(np.sqrt(residual.shape[0] * residual.shape[1] / 3e4)))
     sample = residual[::stride, ::stride].reshape(-1, residual.shape[2]).T.copy()  # each channel in one piece
     off = np.abs(sample)
-    spread = MAD_TO_STD * medians(off, axis=1) + settings.min_ground_std
+    spread = MAD_TO_STD * medians(off, axis=1) + MIN_GROUND_STD
     calm = sample[:, (off < 3.0 * spread[:, None]).all(axis=0)]
     enough = calm.shape[1] > len(calm) + 1
     covariance = np.atleast_2d(np.cov(calm, dtype=np.float64)) if enough else 0.0
-    return covariance + settings.min_ground_std**2 * np.eye(len(sample))
+    return covariance + MIN_GROUND_STD**2 * np.eye(len(sample))
 
 
 def otsu_levels(picture: Image) -> list[float]:

@@ -16,19 +16,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median, scatter
 from pipeline.vision.search.backdrop import Image
-from pipeline.vision.search.crosscut import path_normals, smooth_path, straighten
+from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
 from pipeline.vision.search.flanks import find_flanks
-from pipeline.vision.search.strips import Mask, Strip, find_strips
+from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, WIDTH_RATIO_RANGE, Mask, Strip, find_strips
 
 _MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 
 
-def strips_in_bands(
-    picture: Image, mask: Mask, thick: Mask, width: float, most: float, settings: SegmentationSettings
-) -> list[Strip]:
+def strips_in_bands(picture: Image, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
     """Strips of the cable's width within the bands of a mask, longest first.
 
     Parameters
@@ -42,32 +39,23 @@ def strips_in_bands(
         The cable's.
     most : widths
         Of the widest band.
-    settings : SegmentationSettings
     """
-    bands = find_strips(mask, thick, width, settings, ratios=(settings.width_ratio_range[0], most))
-    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0), settings) for band in bands]
+    bands = find_strips(mask, thick, width, ratios=(WIDTH_RATIO_RANGE[0], most))
+    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0)) for band in bands]
     return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
 
 
-def by_diameter(settings: SegmentationSettings) -> SegmentationSettings:
-    """Settings by which the diameter alone tells the pair of edges: the shadow's are as strong as the cable's."""
-    return settings.model_copy(update={"pair_width_doubt": 0.0})
-
-
-def _cable_within(
-    picture: Image, band: Strip, width: float, search: float, settings: SegmentationSettings
-) -> Strip | None:
+def _cable_within(picture: Image, band: Strip, width: float, search: float) -> Strip | None:
     """The cable's strip in a band; None where most sections show no pair of edges."""
-    path = smooth_path(band.path, settings.smoothing_widths * width)
+    path = smooth_path(band.path, SMOOTHING_WIDTHS * width)
     # a skeleton runs into a corner of the band over its last half width
     corner = round(0.5 * band.width)
     path = path[corner : len(path) - corner]
-    if len(path) < settings.min_piece_widths * width:
+    if len(path) < MIN_PIECE_WIDTHS * width:
         return None
     _, normal = path_normals(path)
-    straight, rows, offsets = straighten(picture, path, normal, width, settings)
-    wide = by_diameter(settings).model_copy(update={"pair_search_widths": search})
-    flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), wide, known=True)
+    straight, rows, offsets = straighten(picture, path, normal, width)
+    flanks = find_flanks(straight[..., 0], offsets, width, len(path) / len(rows), known=True, search=search)
     both = np.isfinite(flanks.left + flanks.right)
     if both.mean() < _MIN_BAND_EDGES:
         return None

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
-from pipeline.vision.polyline import step_lengths
+from pipeline.vision.photo import sampled
 from pipeline.vision.search.backdrop import Standout
-from pipeline.vision.search.candidates import Reading
-from pipeline.vision.search.crosscut import CrossCut, against_ground, cut_across, path_normals, straighten
+from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
+from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, straight_body
-from pipeline.vision.search.strips import Strip, end_direction, thick_part
+from pipeline.vision.search.strips import JOINT_ANGLE_DEG, THICK_WIDTHS, Strip, end_direction, thick_part
 
+LEAST_MORE_WIDTHS = 2.5  # widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter
 _BEYOND_WIDTHS = 10.0  # widths; so far beyond a visible end more of the cable is looked for
 _BEYOND_LEADS_WIDTHS = ((1.5, 4.0), (1.5, 10.0), (6.0, 10.0))
 """Widths; pieces by which a path is led on, how far before its end they end and how long they are: a short one follows
@@ -46,7 +46,7 @@ do not; covers and clamps differ by more.
 """
 
 
-def goes_on(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
+def goes_on(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
     """True if beyond the first or the last point of a strip, led on as it ends, there is more of the same.
 
     Parameters
@@ -56,37 +56,31 @@ def goes_on(standout: Standout, cut: CrossCut, width: float, settings: Segmentat
         The strip's cross-cuts.
     width : cells
         Of the strip.
-    settings : SegmentationSettings
     at_start : bool
         The first point, else the last.
     """
     path = cut.path[::-1] if at_start else cut.path
-    return _ahead(standout, cut, path, width, settings)[0] is not None
+    return _ahead(standout, cut, path, width)[0] is not None
 
 
-def fades(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings, *, at_start: bool) -> bool:
+def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
     """True if a strip goes on beyond its end hardly fainter than before: glare takes its contrast, it does not end.
 
     Parameters as in `goes_on`.
     """
     path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
-    near = slice(round(0.75 * width), round(settings.beyond_least_widths * width))
+    near = slice(round(0.75 * width), round(LEAST_MORE_WIDTHS * width))
     before = median(step[::-1][near])
     _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0])
     if len(ahead) < near.stop or before <= 0.0:
         return False
-    ahead = ahead[: near.stop + round(width)]
-    if not _may_fade(standout, cut, ahead, near, width, _FADING_SHARE * before, settings):
-        return False
-    more = cut_across(standout, ahead, width, settings, known=True, weights=cut.weights)
+    more = cut_across(standout, ahead[: near.stop + round(width)], width, known=True, weights=cut.weights)
     same = np.abs(more.width[near] / width - 1.0) < _BEYOND_WIDTH_OFF
     faint = median(more.step[near]) > _FADING_SHARE * before
     return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
 
 
-def rest_ahead(
-    standout: Standout, cut: CrossCut, others: list[Strip], settings: SegmentationSettings, *, at_start: bool
-) -> float | None:
+def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_start: bool) -> float | None:
     """Gap in cells to another strip of the same look where an arc that leaves this one's end would go on, if any.
 
     A sheet of paper hides more than `goes_on` looks across, and is no larger thing where it has the ground's colour.
@@ -97,7 +91,6 @@ def rest_ahead(
     cut : CrossCut
         The strip's cross-cuts.
     others : list of Strip
-    settings : SegmentationSettings
     at_start : bool
         The first point, else the last.
     """
@@ -108,17 +101,16 @@ def rest_ahead(
         (float(np.hypot(*(rest[0] - path[-1]))), rest)
         for other in others
         for rest in (other.path, other.path[::-1])
-        if other.length > settings.min_partner_widths * width and _arc_joins(path[-1], leaving, rest, width, settings)
+        if other.length > MIN_PARTNER_WIDTHS * width and _arc_joins(path[-1], leaving, rest, width)
     ]
     for gap, rest in sorted(facing, key=lambda found: found[0]):
-        for known in {True, cut.known}:
-            more = cut_across(standout, rest, width, settings, known=known, weights=cut.weights)
-            if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
-                return gap
+        more = cut_across(standout, rest, width, known=True, weights=cut.weights)
+        if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
+            return gap
     return None
 
 
-def _arc_joins(end: Array, leaving: Array, rest: Array, width: float, settings: SegmentationSettings) -> bool:
+def _arc_joins(end: Array, leaving: Array, rest: Array, width: float) -> bool:
     """True if an arc from an end (2,), which it leaves along ``leaving``, arrives at the start of ``rest`` along it.
 
     An arc leaves its chord by the angle by which it comes back to it; a cable that bends unevenly by about that.
@@ -127,10 +119,10 @@ def _arc_joins(end: Array, leaving: Array, rest: Array, width: float, settings: 
     if np.hypot(*gap) > _SHEET_WIDTHS * width:
         return False
     out, back = (np.degrees(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)) for a, b in ((leaving, gap), (gap, arriving)))
-    return bool(max(abs(out), abs(back)) < _SHEET_TURN_DEG and abs(out - back) < settings.joint_angle_deg)
+    return bool(max(abs(out), abs(back)) < _SHEET_TURN_DEG and abs(out - back) < JOINT_ANGLE_DEG)
 
 
-def follow(standout: Standout, cut: CrossCut, width: float, settings: SegmentationSettings) -> Array | None:
+def follow(standout: Standout, cut: CrossCut, width: float) -> Array | None:
     """The path of a strip, led on beyond both ends for as long as there is more of the same; as `goes_on`.
 
     None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
@@ -139,18 +131,16 @@ def follow(standout: Standout, cut: CrossCut, width: float, settings: Segmentati
     most = (1.0 + _BEYOND_MOST_SHARE) * len(path)
     for _ in range(2):
         path = path[::-1]
-        longer, scraps = _ahead(standout, cut, path, width, settings)
+        longer, scraps = _ahead(standout, cut, path, width)
         while longer is not None and len(longer) < most:
             path = longer
-            longer, scraps = _ahead(standout, cut, path, width, settings)
-        if scraps > settings.beyond_least_widths * width:
+            longer, scraps = _ahead(standout, cut, path, width)
+        if scraps > LEAST_MORE_WIDTHS * width:
             return None
     return path if len(path) > len(cut.path) else None
 
 
-def followed_in(
-    standout: Standout, cut: CrossCut, reading: Reading, piece: Strip, whole: Strip, settings: SegmentationSettings
-) -> Reading:
+def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Strip, whole: Strip) -> Reading:
     """A reading with the ``whole`` in place of the ``piece``, whose cross-cuts are ``cut``, and of other pieces of it.
 
     What hid the rest, such as a shadow, is taken out of the masks around it, but for things that stand out like the
@@ -166,7 +156,7 @@ def followed_in(
         cv2.circle(around, point, round(2.5 * width), 1, cv2.FILLED)
     relief = (standout.residual @ cut.weights.astype(np.float32)) * (-1.0 if cut.dark else 1.0)
     strong = (relief > _BEYOND_OBJECT_CONTRAST * cut.contrast).astype(np.uint8)
-    thick = reading.thick & thick_part(strong, settings.thick_widths * width)
+    thick = reading.thick & thick_part(strong, THICK_WIDTHS * width)
     return replace(
         reading,
         strips=(whole, *others),
@@ -175,93 +165,41 @@ def followed_in(
     )
 
 
-def _ahead(
-    standout: Standout, cut: CrossCut, path: Array, width: float, settings: SegmentationSettings
-) -> tuple[Array | None, int]:
+def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tuple[Array | None, int]:
     """The path and the more of the same beyond its last point, None if there is none; and how much in all there is.
 
-    A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place; and
-    the width of a mask, by which the strip's edges were sought, may be that of the cable or not.
+    A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place.
     """
     usual = median(_weber(standout, cut, width))
     best, scraps = None, 0
     for lead in _BEYOND_LEADS_WIDTHS:
         led, ahead = _led_into_picture(standout, path, width, lead)
-        if not _may_go_on(standout, cut, ahead, width, usual, settings):
+        if len(ahead) < LEAST_MORE_WIDTHS * width:
             continue
-        for known in {True, cut.known}:
-            more = cut_across(standout, ahead, width, settings, known=known, weights=cut.weights)
-            if more.dark != cut.dark:
-                continue
-            alike = _alike(standout, more, width, usual)
-            scraps = max(scraps, int(alike.sum()))
-            # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
-            stop = min(_end_of_more(more, alike, width, cut.contrast, settings), len(ahead))
-            if stop and (best is None or len(led) + stop > len(best)):
-                best = np.vstack([led, more.path[:stop]])
-                if stop > 0.8 * len(ahead):
-                    return best, scraps  # no other lead is much better
+        more = cut_across(standout, ahead, width, known=True, weights=cut.weights)
+        if more.dark != cut.dark:
+            continue
+        alike = _alike(standout, more, width, usual)
+        scraps = max(scraps, int(alike.sum()))
+        # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
+        stop = min(_end_of_more(more, alike, width, cut.contrast), len(ahead))
+        if stop and (best is None or len(led) + stop > len(best)):
+            best = np.vstack([led, more.path[:stop]])
+            if stop > 0.8 * len(ahead):
+                break  # no other lead is much better
     return best, scraps
 
 
-def _end_of_more(
-    more: CrossCut, alike: NDArray[np.bool_], width: float, contrast: float, settings: SegmentationSettings
-) -> int:
+def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, contrast: float) -> int:
     """How many sections there are to the end of the last long run of those alike; 0 without a long one."""
     edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
-    long = np.flatnonzero(edges[1::2] - edges[::2] > settings.beyond_least_widths * width)
+    long = np.flatnonzero(edges[1::2] - edges[::2] > LEAST_MORE_WIDTHS * width)
     if not len(long):
         return 0
     stop = int(edges[1::2][long[-1]])
     # edges are lost at the rounded corners of an end, a width of it at most
-    faint = np.flatnonzero(more.step[stop : stop + round(width)] < settings.seen_share * contrast)
+    faint = np.flatnonzero(more.step[stop : stop + round(width)] < SEEN_SHARE * contrast)
     return min(stop + (int(faint[0]) if len(faint) else round(width)), len(alike))
-
-
-def _may_go_on(
-    standout: Standout, cut: CrossCut, ahead: Array, width: float, usual: float, settings: SegmentationSettings
-) -> bool:
-    """False where so little stands out of the ground about a lead that, cut across, it could show no more of the same.
-
-    Sections alike hold a core, at least half a width broad, that stands out as `_alike` asks in its median: a quarter
-    of a width then stands out so far, wherever it lies.
-    """
-    least = settings.beyond_least_widths * width
-    if len(ahead) < least:
-        return False
-    straight, _, _ = straighten(standout.picture, ahead, path_normals(ahead)[1], width, settings)
-    darkest = np.maximum(straight.mean(axis=2).min(axis=1), _BEYOND_DARKEST)
-    strong = _standing_out(standout, cut, ahead, width, (_BEYOND_CONTRAST[0] * usual) * darkest[:, None], settings)
-    length = float(step_lengths(ahead).sum())
-    return bool(np.count_nonzero(strong >= 0.25) * length / (len(strong) - 1) > least)
-
-
-def _may_fade(
-    standout: Standout,
-    cut: CrossCut,
-    ahead: Array,
-    near: slice,
-    width: float,
-    least: float,
-    settings: SegmentationSettings,
-) -> bool:
-    """False where so little stands out of the ground by ``least`` about a lead that it shows no cable that only fades.
-
-    Half of the sections ``near`` would hold a core half a width broad (edges a width apart to 15 %, a pair's to 20 % of
-    that) that stands out so far in its median: a fifth of a width does then, on two fifths of them at the very least.
-    """
-    strong = _standing_out(standout, cut, ahead, width, least, settings)
-    return bool(np.count_nonzero(strong >= 0.2) * len(ahead) / len(strong) >= 0.4 * (near.stop - near.start))
-
-
-def _standing_out(
-    standout: Standout, cut: CrossCut, ahead: Array, width: float, least: float | Array, settings: SegmentationSettings
-) -> Array:
-    """How much (widths) of each section of a lead (n,) stands out of its ground by ``least`` as the strip does."""
-    straight, _, offsets = straighten(standout.residual, ahead, path_normals(ahead)[1], width, settings)
-    relief = against_ground(straight @ cut.weights.astype(np.float32), offsets / width)[0]
-    strong = (-relief if cut.dark else relief) > least
-    return np.asarray(strong.sum(axis=1) * (offsets[1] - offsets[0]) / width)
 
 
 def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple[float, float]) -> tuple[Array, Array]:
@@ -284,8 +222,6 @@ def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDA
 def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     """Step of each section by the brightness of its ground."""
     _, normal = path_normals(cut.path)
-    beside = (cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]).astype(np.float32)
-    ground = cv2.remap(
-        standout.picture, beside[..., 0], beside[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    beside = cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]
+    ground = sampled(standout.picture, beside)
     return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _BEYOND_DARKEST))

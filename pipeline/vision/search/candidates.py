@@ -16,12 +16,22 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
 from pipeline.vision.search.bands import strips_in_bands
-from pipeline.vision.search.strips import Mask, Strip, find_strips, join_strips, ridge_widths, strip_mask, thick_part
+from pipeline.vision.search.strips import (
+    MIN_PIECE_WIDTHS,
+    THICK_WIDTHS,
+    Mask,
+    Strip,
+    find_strips,
+    join_strips,
+    ridge_widths,
+    strip_mask,
+    thick_part,
+)
 
+MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
 _TRACE_SHARE = 0.03  # of the area of the strips that cover most; narrower ones that cover less are specks and writing
 _ALONE_CLEAR_WIDTHS = 3.0  # widths; a strip that comes back to itself as near as that is looked at more closely
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
@@ -46,7 +56,6 @@ class Reading:
     thick: Mask
     width: float
     level: float
-    banded: bool = False  # the cable was sought within wider bands
 
     @property
     def longest(self) -> float:
@@ -64,7 +73,7 @@ class Wanted:
     across_objects: bool = True  # False where covers interrupt the cable: beyond a cover it is not the cable any more
 
 
-def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Iterator[tuple[Reading, ...]]:
+def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ...]]:
     """Readings with a strip that is long enough, one tuple for each picture and level, the likeliest first.
 
     Then those with the cable in a wider band. Where none has one, the reading with the longest strip comes alone.
@@ -72,7 +81,7 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
     for picture, level in _pictures(standout):
-        readings = list(_readings(picture, level, wanted, settings))
+        readings = list(_readings(picture, level, wanted))
         long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
         if long:
             given += 1
@@ -81,7 +90,7 @@ def read_photo(standout: Standout, wanted: Wanted, settings: SegmentationSetting
             break
         best = max([best, *readings], key=lambda reading: reading.longest)
     if wanted.width is not None:
-        for reading in islice(_banded(standout, wanted, wanted.width, settings), _MAX_JUDGED_PICTURES):
+        for reading in islice(_banded(standout, wanted, wanted.width), _MAX_JUDGED_PICTURES):
             given += 1
             yield (reading,)
     if not given:
@@ -96,13 +105,13 @@ def narrowest(standout: Standout) -> float:
     return min((width for width, length in widths if width * length > _TRACE_SHARE * most), default=0.0)
 
 
-def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSettings) -> Reading | None:
+def read_alone(standout: Standout, wanted: Wanted) -> Reading | None:
     """The likeliest reading of a cable of unknown width, if it shows one strip, long enough, and nothing else.
 
     That is no second strip, no branch and no return of the strip to its own neighbourhood: few cells blur a crossing.
     """
     picture, level = next(_pictures(standout))
-    readings = list(_readings(picture, level, wanted, settings))
+    readings = list(_readings(picture, level, wanted))
     strips = [strip for reading in readings for strip in reading.strips[:2]]
     if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
         return None
@@ -110,16 +119,16 @@ def read_alone(standout: Standout, wanted: Wanted, settings: SegmentationSetting
     return None if strips[0].branch or approaches_itself(strips[0].path, clear) else readings[0]
 
 
-def branches(strip: Strip, reading: Reading, settings: SegmentationSettings) -> bool:
+def branches(strip: Strip, reading: Reading) -> bool:
     """True if something of the cable's width leaves, crosses or meets the strip, so that its course is ambiguous."""
     width = reading.width
     if strip.branch >= _MIN_BRANCH_WIDTHS * width:
         return True
     reach = _JUNCTION_WIDTHS * width
-    long = [other for other in reading.strips if other.length > settings.min_piece_widths * width]
+    long = [other for other in reading.strips if other.length > MIN_PIECE_WIDTHS * width]
     if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
         return True
-    partners = [o for o in reading.strips if o is not strip and o.length > settings.min_partner_widths * width]
+    partners = [o for o in reading.strips if o is not strip and o.length > MIN_PARTNER_WIDTHS * width]
     meets = [_touches(end, a, b) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)]
     return any(meets)
 
@@ -170,7 +179,7 @@ def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
         yield distance, level
 
 
-def _readings(picture: Image, level: float, wanted: Wanted, settings: SegmentationSettings) -> Iterator[Reading]:
+def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]:
     above = picture > level
     if above.mean() > _MAX_COVERED_SHARE:
         return
@@ -179,13 +188,13 @@ def _readings(picture: Image, level: float, wanted: Wanted, settings: Segmentati
     for width, length in widths:
         if width * length < largest:
             continue  # the largest strip will speak for the photo; these are all smaller together
-        reading = _read(above, width, level, wanted, settings)
+        reading = _read(above, width, level, wanted)
         if reading.longest >= wanted.least_length:
             largest = max(largest, reading.longest * reading.width)
         yield reading
 
 
-def _banded(standout: Standout, wanted: Wanted, width: float, settings: SegmentationSettings) -> Iterator[Reading]:
+def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Reading]:
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
     for picture, level in _pictures(standout):
         mask = strip_mask(picture > level, width)
@@ -193,21 +202,19 @@ def _banded(standout: Standout, wanted: Wanted, width: float, settings: Segmenta
             continue
         for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
-            strips = strips_in_bands(picture, mask, thick, width, most, settings)
+            strips = strips_in_bands(picture, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
-                yield Reading(tuple(strips), mask, thick, width, level, banded=True)
+                yield Reading(tuple(strips), mask, thick, width, level)
 
 
-def _read(
-    above: NDArray[np.bool_], width: float, level: float, wanted: Wanted, settings: SegmentationSettings
-) -> Reading:
+def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) -> Reading:
     mask = strip_mask(above, width)
-    thick = thick_part(mask, settings.thick_widths * width)
-    strips = [s for s in find_strips(mask, thick, width, settings) if s.length <= wanted.most_length]
+    thick = thick_part(mask, THICK_WIDTHS * width)
+    strips = [s for s in find_strips(mask, thick, width) if s.length <= wanted.most_length]
     short = not strips or strips[0].length < wanted.least_length
     gap = _JOINT_GAP_WIDTHS if short or wanted.across_objects else _RING_GAP_WIDTHS
-    joined = join_strips(strips, width, settings, gap=gap * width, obstacle=None if wanted.across_objects else thick)
+    joined = join_strips(strips, width, gap=gap * width, obstacle=None if wanted.across_objects else thick)
     strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:
         width = strips[0].width

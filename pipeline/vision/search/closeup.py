@@ -1,4 +1,4 @@
-"""The full-resolution grey window along a cable: projection, pixel noise, edge blur.
+"""The full-resolution grey window along a cable: projection, edge blur.
 
 Only the corridor along the path is projected; elsewhere the window is zero. That keeps a 12 Mpx colour photo at a few
 bytes a pixel: memory that is never written is never used.
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
-from pipeline.vision.photo import Photo
+from pipeline.vision.median import median
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.search.crosscut import path_normals
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
@@ -33,8 +33,6 @@ class Closeup:
         Zero outside the corridor.
     origin_px : (u, v)
         Photo pixel of ``grey[0, 0]``.
-    noise : fraction of full range
-        Standard deviation of one pixel, without texture coarser than two pixels.
     blur_px : px
         Standard deviation of the edge spread.
     motion_px : px
@@ -44,13 +42,12 @@ class Closeup:
 
     grey: NDArray[np.float32]
     origin_px: tuple[int, int]
-    noise: float
     blur_px: float
     motion_px: float
 
 
 def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) -> Closeup:
-    """Project the corridor along ``path_px`` (k, 2) to grey and measure its noise and blur."""
+    """Project the corridor along ``path_px`` (k, 2) to grey and measure its blur."""
     margin = _CORRIDOR_WIDTHS * width_px + 8.0
     low = np.maximum(np.floor(path_px.min(axis=0) - margin).astype(int), 0)
     high = np.minimum(np.ceil(path_px.max(axis=0) + margin).astype(int) + 1, photo.size)
@@ -69,7 +66,6 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
     return Closeup(
         grey=grey,
         origin_px=(int(low[0]), int(low[1])),
-        noise=_pixel_noise(grey, local, width_px),
         blur_px=median(seen) if len(seen) else 0.0,
         motion_px=_motion(spreads, angles),
     )
@@ -90,22 +86,6 @@ def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[
     ]
 
 
-def _pixel_noise(grey: NDArray[np.float32], path: Array, width: float) -> float:
-    """Second differences along the ground beside the cable: blind to light, texture and edges coarser than a pixel."""
-    _, normal = path_normals(path)
-    step = max(1, len(path) // 500)  # eight thousand pixels tell a standard deviation to one percent
-    path, normal = path[::step], normal[::step]
-    beside = np.linspace(0.9, 1.6, 8) * width
-    offsets = np.concatenate([-beside, beside])[:, None, None]
-    u, v = np.rint(path + offsets * normal).astype(int).reshape(-1, 2).T
-    inside = (u >= 1) & (v >= 1) & (u < grey.shape[1] - 1) & (v < grey.shape[0] - 1)
-    at = v[inside] * grey.shape[1] + u[inside]
-    before, here, after = (grey.ravel()[at + k] for k in (-1, 0, 1))
-    differences = before - 2.0 * here + after
-    # 1 + 4 + 1 = 6 pixel variances in each difference
-    return scatter(differences, 0.0) / np.sqrt(6.0) if len(differences) else 0.0
-
-
 def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:
     """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, NaN without an edge, and angle ``(k,)``.
 
@@ -118,10 +98,8 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
     offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
     spreads = []
     for side in (-0.5, 0.5):
-        away = side * width + offsets
-        u, v = ((centre[:, k, None] + across[:, k, None] * away).astype(np.float32) for k in (0, 1))
-        profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        spreads.append(_spread_of_groups(np.asarray(profile, np.float32), offsets, outward=side > 0.0))
+        profile = sampled(grey, centre[:, None] + across[:, None] * (side * width + offsets)[:, None])
+        spreads.append(_spread_of_groups(profile, offsets, outward=side > 0.0))
     along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
     return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
 

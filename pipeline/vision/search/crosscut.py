@@ -13,16 +13,17 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
-from pipeline.vision.median import median, medians, scatter
+from pipeline.vision.median import median, medians
+from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.backdrop import CELLS_ACROSS, Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
-_TEXTURE_WIDTHS = 12.0  # widths; what beside the cable is even along so much of it is light; a fold of cloth is shorter
+SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
+SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 
 
 @dataclass(frozen=True)
@@ -39,24 +40,18 @@ class CrossCut:
         Core minus ground along ``weights``, positive where the section looks like the cable.
     contrast : float
         Median of ``step``.
-    texture : float
-        Standard deviation of the ground beside the cable along ``weights``, at least that of rounding.
     weights : (c,)
         Colour projection in which the cable stands out best, sum of absolute values 1.
     dark : bool
         Cable darker than the ground along ``weights``.
-    known : bool
-        Whether the width that the edges were sought by is the cable's, not that of a mask.
     """
 
     path: Array
     width: Array
     step: Array
     contrast: float
-    texture: float
     weights: Array
     dark: bool
-    known: bool
 
     @cached_property
     def seen_widths(self) -> Array:
@@ -94,32 +89,29 @@ def cut_across(
     standout: Standout,
     path: Array,
     width: float,
-    settings: SegmentationSettings,
     *,
     known: bool = False,
-    shaded: bool = False,
     weights: Array | None = None,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    ``shaded`` says that a hard shadow lies on one side; ``weights`` is the colour projection if it is not to be sought.
+    ``weights`` is the colour projection if it is not to be sought.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
     of edges one width apart gives middle and width of each section (`pipeline.vision.search.flanks`).
     """
-    path = smooth_path(path, settings.smoothing_widths * width)
+    path = smooth_path(path, SMOOTHING_WIDTHS * width)
     _, normal = path_normals(path)
-    straight, rows, offsets = straighten(standout.residual, path, normal, width, settings)
+    straight, rows, offsets = straighten(standout.residual, path, normal, width)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
-    relief, ground = against_ground(grey, offsets / width)
+    relief = grey - medians(grey[:, _beside(offsets / width)], axis=1)[:, None]
     core = np.abs(offsets) < 0.35 * width
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
     pitch = len(path) / len(rows)
-    flanks = find_flanks(relief, offsets, width, pitch, settings, known=known)
+    flanks = find_flanks(relief, offsets, width, pitch, known=known)
     step = _core_level(relief, offsets, flanks)
-    texture = _texture(grey, ground, offsets / width, _TEXTURE_WIDTHS * width / pitch, shaded=shaded)
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")
@@ -129,39 +121,14 @@ def cut_across(
         width=(flanks.right - flanks.left)[nearest],
         step=step[nearest],
         contrast=median(step),
-        texture=float(np.hypot(texture, settings.min_ground_std)),
         weights=weights,
         dark=sign < 0,
-        known=known,
     )
-
-
-def against_ground(grey: Image, offset_widths: Array) -> tuple[Image, Image]:
-    """A straightened picture ``(n, m)`` less the ground on each section, and that ground ``(n,)``: beside the cable."""
-    ground = medians(grey[:, _beside(offset_widths)], axis=1)
-    return grey - ground[:, None], ground
 
 
 def _beside(offset_widths: Array) -> NDArray[np.bool_]:
     """Columns of the ground beside the cable."""
     return np.asarray((np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7))
-
-
-def _texture(grey: Image, ground: Image, offset_widths: Array, light: float, *, shaded: bool) -> float:
-    """Scatter of the ground ``(n, m)`` beside the cable about what changes along it over less than ``light`` rows.
-
-    A shadow runs along the cable: it is no texture, and what texture does along the path it does across, too. The
-    border of a hard shadow (``shaded``) wanders over the columns of its side, and the other side tells.
-    """
-    beside = _beside(offset_widths)
-    values = grey[:, beside] if shaded else grey[:, beside] - ground[:, None]
-    # A running mean, as broad as a bell of that standard deviation: its time does not grow with the width.
-    # Reflected, and about the median: the path's last rows, where a cover lies beside it, must not stand for the rest.
-    values = values - uniform_filter1d(values, round(np.sqrt(12.0) * light), axis=0, mode="reflect")
-    values = values - medians(values, axis=0)
-    right = offset_widths[beside] > 0.0
-    sides = (values[:, right], values[:, ~right]) if shaded else (values,)
-    return min(scatter(side, 0.0) for side in sides)
 
 
 def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:
@@ -172,19 +139,15 @@ def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) ->
     return np.asarray(medians(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
 
 
-def straighten(
-    picture: Image, path: Array, normal: Array, width: float, settings: SegmentationSettings
-) -> tuple[Image, Array, Array]:
+def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array, Array]:
     """Picture ``(n, m, c)`` along the path, the places of its rows on it, and the offsets of its columns.
 
     A wide strip is averaged to as many rows and twice as many columns a width as a cable of known diameter has cells.
     """
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
-    u = (path[:, 0, None] + normal[:, 0, None] * offsets).astype(np.float32)
-    v = (path[:, 1, None] + normal[:, 1, None] * offsets).astype(np.float32)
-    straight = np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    rows = round(len(path) / max(1, int(width / settings.cells_across)))
-    columns = len(offsets) // max(1, int(0.5 * width / settings.cells_across))
+    straight = sampled(picture, path[:, None] + normal[:, None] * offsets[:, None])
+    rows = round(len(path) / max(1, int(width / CELLS_ACROSS)))
+    columns = len(offsets) // max(1, int(0.5 * width / CELLS_ACROSS))
     if (columns, rows) != (len(offsets), len(path)):
         straight = np.asarray(cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
     place, offset = _centres(len(path), rows), _centres(len(offsets), columns)

@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.median import median, scatter
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.polyline import arc_lengths, step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
@@ -26,7 +24,9 @@ from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.closeup import Closeup
 from pipeline.vision.search.strips import end_direction
 
+COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
 _TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
+_BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
 _STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
 _CUT_STD_WIDTHS = 0.04  # widths; a cut with pliers is square and the path centred to about a twentieth
 
@@ -70,18 +70,16 @@ def straight_body(path: Array, width: float, trimmed: float) -> tuple[Array, Arr
     return body, end_direction(body, width)
 
 
-def at_border(place: Sequence[float] | Array, photo: Photo, width_px: float) -> bool:
-    """True if a place ``(u, v)`` lies within a width of the picture's border, or a hundredth of the picture."""
+def at_border(place: Sequence[float] | Array, photo: Photo, reduction: int, width_px: float) -> bool:
+    """True if an end ``(u, v)`` of a strip is where the picture ends: a mask and what is led straight on reach it."""
     u, v = place
-    reach = max(width_px, 0.01 * max(photo.size))
+    reach = max(_BORDER_CELLS * reduction, _BORDER_WIDTHS * width_px)
     return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < reach)
 
 
-def lead_to_axes(
-    standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing], settings: BearingSettings
-) -> Array:
+def lead_to_axes(standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing]) -> Array:
     """The path (cells) with straight ends up to the rim of each cover, or to the axis where there is no cover."""
-    margin = settings.cover_margin_widths * width
+    margin = COVER_MARGIN_WIDTHS * width
     for axis in axes:
         path = path[::-1]
         center = standout.to_cells(np.array(axis.center_px))
@@ -130,8 +128,7 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
     along = np.arange(-1.5 * width, 1.5 * width + 0.125, 0.25)
     rows = np.linspace(-0.25, 0.25, 9) * width
     points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
-    u, v = (points[..., k].astype(np.float32) for k in (0, 1))
-    profiles = cv2.remap(closeup.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    profiles = sampled(closeup.grey, points)
     places = [_half_level(profile, along, width, _STROKE_WIDTHS * width) for profile in profiles]
     known = np.array([place for place in places if place is not None])
     if len(known) < 5:

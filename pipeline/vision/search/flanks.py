@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median
 
+PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
 _PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
 _PAIR_WIDTHS = 26  # widths tried, 5 % apart; the edges are then sought in 15 %
-_PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off before the edges count for less
+_PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off: scales and sheaths are
 _PAIR_WIDTH_SHARE = 0.9  # ratio to the best pair's score from which a wider pair is preferred
 _EDGE_REACH_WIDTHS = 0.1  # widths; an edge is sought so near to the pair's place; glare is farther
 _LEAST_EDGE_SHARE = 0.15  # ratio to the usual steepest slope; a flatter place is no edge: half is shade
@@ -45,9 +45,9 @@ def find_flanks(
     offsets: Array,
     width: float,
     pitch: float,
-    settings: SegmentationSettings,
     *,
     known: bool,
+    search: float = PAIR_SEARCH_WIDTHS,
 ) -> Flanks:
     """Edges of the cable.
 
@@ -62,6 +62,8 @@ def find_flanks(
     pitch : cells
         Distance of neighbouring sections.
     known : bool
+    search : widths
+        How far beside the middle of the picture the pair's middle may lie.
 
     Returns
     -------
@@ -76,11 +78,11 @@ def find_flanks(
     usual = median(np.abs(slope).max(axis=1)) + 1e-12
     pooling = _PAIR_POOLING_WIDTHS * width / pitch
     rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
-    near = np.flatnonzero(np.abs(offsets) <= settings.pair_search_widths * width)
+    near = np.flatnonzero(np.abs(offsets) <= search * width)
     # Pooled sections repeat each other: every half width of them is enough for width and course.
     every = np.arange(0, len(relief), max(1, int(0.5 * pooling)))
     rise, fall = rise[every], fall[every]
-    best = spacing * _pair_width(rise, fall, near, width / spacing, known, settings)
+    best = spacing * _pair_width(rise, fall, near, width / spacing, known)
     score = _pair_score(rise, fall, near, np.array([best / spacing]))[:, 0]
     course = offsets[near][_best_course(score, _PAIR_WANDER_COST)]
     middle = np.interp(np.arange(len(relief)), every, course)
@@ -141,19 +143,18 @@ def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
     return np.array(course[::-1])
 
 
-def _pair_width(
-    rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool, settings: SegmentationSettings
-) -> float:
+def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool) -> float:
     """Distance in columns of the edges that fits best along the whole strip; ``near`` are the columns of its middle.
 
-    An unknown width is the largest of nearly the best ones: a highlight splits a cable, nothing doubles it.
+    Of an unknown width it is the largest of nearly the best: a highlight splits a cable, nothing doubles
+    it.
     """
     tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = _pair_score(rise, fall, near, tried).max(axis=2).mean(axis=0)
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / _PAIR_WIDTH_STD) ** 2)
-        return float(tried[np.argmax(totals * (settings.pair_width_doubt + (1.0 - settings.pair_width_doubt) * trust))])
+        return float(tried[np.argmax(totals * trust)])
     return float(tried[np.flatnonzero(totals >= _PAIR_WIDTH_SHARE * totals.max())[-1]])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.photo import Photo
+from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.crosscut import path_normals
@@ -68,8 +68,7 @@ def in_colour_of(photo: Photo, standout: Standout, cable: RoughCable) -> Photo |
     across = width * path_normals(path)[1][:, None]
 
     def colours(widths: Array) -> Array:
-        u, v = np.moveaxis((path[:, None] + widths[:, None] * across).astype(np.float32), -1, 0)
-        found = cv2.remap(standout.residual, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        found = sampled(standout.residual, path[:, None] + widths[:, None] * across)
         return found.reshape(-1, found.shape[-1]).astype(np.float64)
 
     beside = colours(np.concatenate([-_BESIDE, _BESIDE]))

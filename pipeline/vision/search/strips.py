@@ -19,12 +19,15 @@ from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths, step_lengths
 
 Mask = NDArray[np.uint8]
 
+THICK_WIDTHS = 1.7  # widths; wider things are objects: a soft shadow widens the mask by up to a half
+MIN_PIECE_WIDTHS = 2.5  # widths; shorter pieces are writing, dirt or texture
+WIDTH_RATIO_RANGE = (0.5, 1.7)  # to the diameter; mask widths of a cable with shadow or with a rim lost in glare
+JOINT_ANGLE_DEG = 30.0  # degrees; over five widths a cable turns by less unless its bend radius is ten widths
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
 _ROUGH_DISTANCE = 0.95  # rough distances over masks of 5 cells are 2 % off at most
 _CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
@@ -123,14 +126,7 @@ def thick_part(mask: Mask, least: float) -> Mask:
     return opened
 
 
-def find_strips(
-    mask: Mask,
-    thick: Mask,
-    width: float,
-    settings: SegmentationSettings,
-    *,
-    ratios: tuple[float, float] | None = None,
-) -> list[Strip]:
+def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, float] | None = None) -> list[Strip]:
     """Strips of about the given width (cells), longest first; ``ratios`` are their least and greatest width to it."""
     grown = _morphology(thick, cv2.MORPH_DILATE, _disc(3.0))
     thin = mask & (1 - grown)
@@ -138,12 +134,12 @@ def find_strips(
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + np.argsort(areas)[::-1][:_MAX_PIECES]
     strips = []
-    for label in largest[areas[largest - 1] >= settings.min_piece_widths * width**2]:
+    for label in largest[areas[largest - 1] >= MIN_PIECE_WIDTHS * width**2]:
         u, v, w, h = stats[label, :4]
         piece = np.pad((labels[v : v + h, u : u + w] == label).astype(np.uint8), 1)
         strip = _trace(piece, width)
         if strip is not None:
-            low, high = settings.width_ratio_range if ratios is None else ratios
+            low, high = WIDTH_RATIO_RANGE if ratios is None else ratios
             if low * width <= strip.width <= high * width:
                 strips.append(
                     Strip(strip.path + np.array([u - 1, v - 1]), strip.width, strip.width_scatter, strip.branch)
@@ -168,13 +164,11 @@ def ridge_widths(mask: Mask) -> list[tuple[float, float]]:
     return [(float(np.sqrt(edges[i] * edges[i + 1])), float(pooled[i])) for i in best]
 
 
-def join_strips(
-    strips: list[Strip], width: float, settings: SegmentationSettings, *, gap: float, obstacle: Mask | None = None
-) -> list[Strip]:
+def join_strips(strips: list[Strip], width: float, *, gap: float, obstacle: Mask | None = None) -> list[Strip]:
     """Join strips whose ends face each other across a gap (glare, a sticker) up to ``gap``, but not an obstacle."""
     strips = list(strips)
     while True:
-        best = _best_joint(strips, width, settings, gap, obstacle)
+        best = _best_joint(strips, width, gap, obstacle)
         if best is None:
             return sorted(strips, key=lambda strip: -strip.length)
         i, j, first, second = best
@@ -196,7 +190,7 @@ def _bridge(start: Array, stop: Array) -> Array:
 
 
 def _best_joint(
-    strips: list[Strip], width: float, settings: SegmentationSettings, least: float, obstacle: Mask | None
+    strips: list[Strip], width: float, least: float, obstacle: Mask | None
 ) -> tuple[int, int, Array, Array] | None:
     best = None
     for i, a in enumerate(strips):
@@ -206,7 +200,7 @@ def _best_joint(
                     gap = float(np.hypot(*(second[0] - first[-1])))
                     if gap >= least or (obstacle is not None and _blocked(first[-1], second[0], obstacle)):
                         continue
-                    if _continues(first, second, width, settings):
+                    if _continues(first, second, width):
                         best, least = (i, j, first, second), gap
     return best
 
@@ -216,14 +210,14 @@ def _blocked(start: Array, stop: Array, obstacle: Mask) -> bool:
     return bool(obstacle[v, u].any())
 
 
-def _continues(first: Array, second: Array, width: float, settings: SegmentationSettings) -> bool:
+def _continues(first: Array, second: Array, width: float) -> bool:
     """True if ``second`` goes on where ``first`` ends, by the directions of both and of the gap."""
     leaving, arriving = end_direction(first, width), -end_direction(second[::-1], width)
     gap = second[0] - first[-1]
     length = float(np.hypot(*gap))
     # Skeletons end up to half a width short and aside, so the direction of a short gap means nothing.
     along = gap / length if length > width else (leaving + arriving) / (np.hypot(*(leaving + arriving)) + 1e-12)
-    limit = np.cos(np.radians(settings.joint_angle_deg))
+    limit = np.cos(np.radians(JOINT_ANGLE_DEG))
     return bool(leaving @ arriving > limit and leaving @ along > limit and arriving @ along > limit)
 
 

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings import cover_size
 from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
-from pipeline.vision.bearings.cover_size import cover_radius, rim_radius, visible_ends
+from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
 from pipeline.vision.bearings.covers import find_again, find_cover, find_rim
-from pipeline.vision.bearings.rim import Circle, Radius
+from pipeline.vision.bearings.rim import SAME_RADIUS, Circle, Radius
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
@@ -23,7 +21,6 @@ from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.ends import CableEnd
 from pipeline.vision.segmentation import find_cable
 
-STAGE = BearingSettings()
 SCALE = 9_000.0
 CURVE = Curve.from_curvature(9.0, 0.035)
 CAMERA = Camera(540, 300, SCALE, look_at_m=(0.017, 0.0))
@@ -64,7 +61,6 @@ def centre_errors(scene: Scene, *, off: float = 0.0, radius_error: float = 0.0) 
             rough_end(picture, side, radius, off),
             Radius(radius * (1 + radius_error), 0.01 if radius_error == 0 else 0.05),
             scene.cable.diameter_m * SCALE,
-            STAGE,
         )
         assert circle is not None
         assert circle.radius == pytest.approx(radius, rel=0.01)  # a rim hardly off the ground tells it to 0.3 px
@@ -145,9 +141,7 @@ def test_cover_of_the_grounds_own_look_is_found_by_its_dot() -> None:
     picture = render(scene(covers=(cover, cover)))
     radius = 0.006 * SCALE
     for side, true in enumerate((picture.left_px, picture.right_px)):
-        circle = find_cover(
-            photo_of(picture), rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE, STAGE
-        )
+        circle = find_cover(photo_of(picture), rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE)
         assert circle is not None
         assert np.hypot(*np.subtract(circle.center, true)) < 3.5 * circle.std  # as for any look
         assert circle.radius == radius
@@ -169,7 +163,7 @@ def test_dome_brighter_than_the_ground_on_one_side_and_darker_on_the_other_is_no
     grey += np.random.default_rng(1).normal(0.0, 1.5, grey.shape)
     photo = Photo("dome", grey.clip(0, 255).astype(np.uint8), 8)
     for side, true in enumerate((picture.left_px, picture.right_px)):
-        circle = find_cover(photo, rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE, STAGE)
+        circle = find_cover(photo, rough_end(picture, side, radius), Radius(radius, 0.01), 0.0046 * SCALE)
         assert circle is not None
         # the shadow's centre lies 0.39 radii away; 3.5 standard deviations and 0.1 px as for every other look
         assert np.all(np.abs(np.subtract(circle.center, true)) < 3.5 * circle.std)
@@ -183,14 +177,14 @@ def test_strips_that_end_alike_share_one_search(monkeypatch: pytest.MonkeyPatch)
 
     def searched(photo: Photo, end: CableEnd, *rest: object) -> Circle | None:
         places.append(end)
-        return find_cover(photo, end, Radius(radius, 0.01), 41.0, STAGE)
+        return find_cover(photo, end, Radius(radius, 0.01), 41.0)
 
     monkeypatch.setattr("pipeline.vision.bearings.axes.find_cover", searched)
     hints = BearingHints(cover_px=2.0 * radius)
     for shift in (0.0, 0.05, 0.3):  # radii; the second is the same end, the third another
         ends = tuple(rough_end(picture, side, radius) for side in (0, 1))
         moved = tuple(replace(end, place=end.place + shift * radius * np.array([0.0, 1.0])) for end in ends)
-        axes = find_bearings(photo, moved, 41.0, hints, STAGE)
+        axes = find_bearings(photo, moved, 41.0, hints)
         for axis, true in zip(axes, (picture.left_px, picture.right_px), strict=True):
             assert axis is not None
             assert np.hypot(*np.subtract(axis.center_px, true)) < 0.1  # px, as for any look
@@ -201,17 +195,17 @@ def test_no_cover_is_no_circle() -> None:
     picture = render(scene(covers=(None, None), ground=Ground("brushed", GREY, 0.05)))
     radius = 0.006 * SCALE
     ends = tuple(rough_end(picture, side, radius, off=1.0) for side in (0, 1))
-    assert find_bearings(photo_of(picture), ends, 41.0, BearingHints(cover_px=2 * radius), STAGE) == (None, None)
+    assert find_bearings(photo_of(picture), ends, 41.0, BearingHints(cover_px=2 * radius)) == (None, None)
 
 
 def test_given_axes_are_assigned_to_the_nearer_ends() -> None:
     picture = render(scene(covers=(None, None)))
     ends = tuple(rough_end(picture, side, 5.0) for side in (0, 1))
     for given in ((picture.left_px, picture.right_px), (picture.right_px, picture.left_px)):
-        left, right = find_bearings(photo_of(picture), ends, 41.0, BearingHints(given_px=given), STAGE)
+        left, right = find_bearings(photo_of(picture), ends, 41.0, BearingHints(given_px=given))
         assert left is not None and right is not None
         assert (left.center_px, right.center_px) == (picture.left_px, picture.right_px)
-        assert (left.kind, left.std_px) == ("given", STAGE.given_std_px)
+        assert (left.kind, left.std_px) == ("given", 1.0)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +214,7 @@ def test_given_axes_are_assigned_to_the_nearer_ends() -> None:
 )
 def test_left_is_by_u_and_upper_where_the_chord_is_upright(angle_deg: float, first_is_left: bool) -> None:
     angle = np.radians(angle_deg)
-    assert left_first(np.zeros(2), np.array([np.cos(angle), np.sin(angle)]), STAGE) == first_is_left
+    assert left_first(np.zeros(2), np.array([np.cos(angle), np.sin(angle)])) == first_is_left
 
 
 def painted_covers(
@@ -255,18 +249,18 @@ def cable_to_the_rims(left: tuple[float, float], right: tuple[float, float], rad
     path = np.linspace(np.array(left) + radius * along, np.array(right) - radius * along, 80)
     ends = [Bearing((float(place[0]), float(place[1])), 2.8, kind="end") for place in path[[0, -1]]]
     nothing = np.zeros((1, 1), np.float32)
-    return RoughCable("a", path, (0, 79), ends[0], ends[1], 14.0, nothing, (0, 0), True, 0.4, 0.01, 1.0)
+    return RoughCable("a", path, (0, 79), ends[0], ends[1], 14.0, nothing, (0, 0), True, 0.4, 1.0)
 
 
 def test_size_of_covers_like_the_ground_is_told_by_the_screws_on_them() -> None:
     lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
     photos = painted_covers(lefts, right, radius)
     seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
-    found = cover_radius(seen, STAGE)
+    found = cover_radius(seen)
     # the radius is as good as the place where the cable vanishes
-    assert found is not None and abs(found / radius - 1.0) < STAGE.same_radius
+    assert found is not None and abs(found / radius - 1.0) < SAME_RADIUS
     for (photo, cable), left in zip(seen, lefts, strict=True):
-        bearings = find_bearings(photo, visible_ends(cable), 28.0, BearingHints(cover_px=2.0 * found), STAGE)
+        bearings = find_bearings(photo, visible_ends(cable), 28.0, BearingHints(cover_px=2.0 * found))
         for bearing, true in zip(bearings, (left, right), strict=True):
             assert bearing is not None
             assert np.abs(np.subtract(bearing.center_px, true)).max() < 3.5 * bearing.std_px < 3.5 * 0.1  # as any look
@@ -283,7 +277,7 @@ def test_size_that_one_end_tells_is_all_that_is_sought_at_the_others(monkeypatch
         return find_rim(photo, end, expected, *rest)
 
     monkeypatch.setattr(cover_size, "find_rim", counted)
-    assert cover_radius(seen, STAGE) is not None
+    assert cover_radius(seen) is not None
     sizes = len(set(sought))
     assert sizes > 8  # all sizes at the first end
     assert len(sought) <= sizes + 3 * 3  # three ends in at most three sizes about that of the first
@@ -294,28 +288,18 @@ def test_size_of_covers_is_told_where_letters_hide_the_last_of_the_cable() -> No
     photos = painted_covers(lefts, right, radius, disc_grey=215.0)
     lost = [cable_to_the_rims(left, right, 1.6 * radius) for left in lefts]
     seen = [(photos[0], lost[0]), (photos[1], replace(lost[1], visible=(0, 77)))]  # 10 px more at one end
-    found = cover_radius(seen, STAGE)
+    found = cover_radius(seen)
     assert found is not None and abs(found - radius) < 0.1  # px, though a soft shadow lies beside the rim
 
 
 def test_bright_middle_tells_the_axis_of_a_cover_whose_rim_is_like_the_ground() -> None:
     left, right, radius = (90.4, 120.7), (610.3, 90.6), 36.0
-    photo = painted_covers([left], right, STAGE.inner_disc * radius, disc_grey=215.0)[0]
+    photo = painted_covers([left], right, 0.82 * radius, disc_grey=215.0)[0]
     ends = visible_ends(cable_to_the_rims(left, right, radius))
-    bearings = find_bearings(photo, ends, 28.0, BearingHints(cover_px=2.0 * radius), STAGE)
+    bearings = find_bearings(photo, ends, 28.0, BearingHints(cover_px=2.0 * radius))
     for bearing, true in zip(bearings, (left, right), strict=True):
         assert bearing is not None and bearing.radius_px == radius
         assert np.abs(np.subtract(bearing.center_px, true)).max() < 0.1  # px, though a soft shadow lies beside it
-
-
-def test_radius_about_known_is_told_by_the_rims_at_half_of_the_ends() -> None:
-    lefts, right, radius = [(90.4, 120.7), (131.2, 119.9)], (610.3, 90.6), 36.0
-    photos = painted_covers(lefts, right, radius, disc_grey=215.0)
-    photos[0].pixels[60:122, 570:650] = 150  # one cover is gone
-    seen = list(zip(photos, [cable_to_the_rims(left, right, radius) for left in lefts], strict=True))
-    found = rim_radius(seen, 0.93 * radius, STAGE)
-    assert found is not None and abs(found - radius) < 0.1  # px, though a soft shadow lies beside the rim
-    assert rim_radius(seen[:1], 0.93 * radius, STAGE) is None
 
 
 def ringed_cover(
@@ -350,14 +334,14 @@ def ringed_cover(
 def test_rim_of_a_cover_with_a_ring_is_where_the_cable_vanishes(cable_above: float, radius: float) -> None:
     left, right = (90.4, 120.7), (610.3, 110.6)
     photo = ringed_cover(left, right, cable_above=cable_above)
-    found = cover_radius([(photo, cable_to_the_rims(left, right, 30.0))], STAGE)  # a mask ends within the dark ring
+    found = cover_radius([(photo, cable_to_the_rims(left, right, 30.0))])  # a mask ends within the dark ring
     assert found is not None and abs(found - radius) < 0.2  # px; the other edge of the ring lies 7 px away
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(37.0, 45.0), (24.0, 40.0), (63.0, 75.0)])
 def test_ring_at_the_end_of_a_cable_is_no_loop_of_it(inner: float, outer: float) -> None:
     photo = ringed_cover((90.4, 120.7), (610.3, 110.6), cable_above=outer, inner=inner, outer=outer)
-    found = find_cable(photo, VisionSettings(), cable=Cable(28.0, bearings=BearingHints(cover_px=2.0 * outer)))
+    found = find_cable(photo, cable=Cable(28.0, bearings=BearingHints(cover_px=2.0 * outer)))
     assert isinstance(found, RoughCable)
     assert np.abs(np.subtract(found.left.center_px, (90.4, 120.7))).max() < 0.1  # px, as for any cover
 
@@ -366,7 +350,7 @@ def test_one_cover_without_a_screw_tells_no_size() -> None:
     left, right, radius = (90.4, 120.7), (610.3, 90.6), 36.0
     photo = painted_covers([left], right, radius)[0]
     photo.pixels[60:120, 580:640] = 150  # the right one's circle is gone
-    assert cover_radius([(photo, cable_to_the_rims(left, right, radius))], STAGE) is None
+    assert cover_radius([(photo, cable_to_the_rims(left, right, radius))]) is None
 
 
 def test_size_of_dark_covers_hardly_wider_than_a_dark_cable() -> None:
@@ -374,8 +358,8 @@ def test_size_of_dark_covers_hardly_wider_than_a_dark_cable() -> None:
     photos = painted_covers(lefts, right, radius, disc_grey=60.0)
     # cable and covers are one dark thing, which ends on the far side of their rims
     seen = list(zip(photos, [cable_to_the_rims(left, right, -radius) for left in lefts], strict=True))
-    found = cover_radius(seen, STAGE)
-    assert found is not None and abs(found / radius - 1.0) < STAGE.same_radius  # a line 2 px inside the rim draws it in
+    found = cover_radius(seen)
+    assert found is not None and abs(found / radius - 1.0) < SAME_RADIUS  # a line 2 px inside the rim draws it in
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -388,6 +372,6 @@ def test_cover_hardly_off_the_ground_is_found_again_by_its_dot(seed):
     grey = drawn.reshape(120, 4, 160, 4).mean(axis=(1, 3)) + rng.normal(0.0, 2.0, (120, 160))
     seen = Bearing((60.4, 50.1), 0.03, 15.4, 1.1, "cover", sure=True)
     end = CableEnd(center + np.array([16.0, 0.0]), np.array([-1.0, 0.0]))
-    circle = find_again(Photo("a", np.rint(grey).astype(np.uint8), 8), end, (seen,), Radius(15.4, 0.05), STAGE)
+    circle = find_again(Photo("a", np.rint(grey).astype(np.uint8), 8), end, (seen,), Radius(15.4, 0.05))
     assert circle is not None
     assert circle.center == pytest.approx(center, abs=0.1)

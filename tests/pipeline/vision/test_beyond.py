@@ -8,10 +8,10 @@ import pytest
 
 from pipeline.records import Rejected
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision import judgement
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search import beyond
 from pipeline.vision.search.backdrop import stand_out
 from pipeline.vision.search.beyond import fades
 from pipeline.vision.search.crosscut import cut_across
@@ -74,7 +74,7 @@ def _is_told(found):
 
 @pytest.mark.parametrize("across", [_as_it_is, _ruled, _shaded, _pooled, _taped])
 def test_no_piece_of_the_cable_passes_for_it(across):
-    found = find_cable(_photo(across), VisionSettings())
+    found = find_cable(_photo(across))
     assert isinstance(found, RoughCable)
     assert found.length_px == pytest.approx(_length(), rel=WHOLE)
 
@@ -85,7 +85,7 @@ def test_dense_rules_are_followed_across_or_refused(pitch):
         rows, columns = np.ogrid[: SIZE[0], : SIZE[1]]
         return picture * np.where((rows % pitch < 4) | (columns % pitch < 4), 0.3, 1.0)
 
-    found = find_cable(_photo(across), VisionSettings())
+    found = find_cable(_photo(across))
     assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
 
 
@@ -97,7 +97,7 @@ def _papered(picture):
 @pytest.mark.parametrize("long", [None, 900.0, 700.0])
 def test_a_sheet_of_the_ground_s_colour_makes_no_end(long):
     """It hides thirteen widths, and what is left beyond is a quarter of the strip before it: no rival of that."""
-    found = find_cable(_photo(_papered), VisionSettings(), cable=Cable(length_px=long))
+    found = find_cable(_photo(_papered), cable=Cable(length_px=long))
     assert _is_told(found) and isinstance(found, Rejected) == (long is not None)  # a length refuses the piece
 
 
@@ -110,7 +110,7 @@ def test_a_band_across_the_cable_does_not_pass_for_it(grey, width):
         cv2.line(picture, (560, 40), (640, 520), grey, width, cv2.LINE_AA)
         return picture
 
-    found = find_cable(_photo(across), VisionSettings())
+    found = find_cable(_photo(across))
     assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
 
 
@@ -120,42 +120,38 @@ def test_glare_that_takes_the_contrast_makes_no_end(bright):
         u, v = np.arange(SIZE[1]) - 860.0, np.arange(SIZE[0])[:, None] - 380.0
         return np.minimum(picture + bright / (1.0 + np.exp((np.hypot(u, v) - 110.0) / 25.0)), 255.0)
 
-    found = find_cable(_photo(across), VisionSettings())
+    found = find_cable(_photo(across))
     assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
 
 
 @pytest.mark.parametrize(("left", "fading"), [(0.0, False), (0.4, False), (0.6, True), (0.8, True)])
-def test_the_quick_look_beyond_an_end_denies_no_cable_that_fades(left, fading, monkeypatch):
-    """A strip that ends where glare leaves a part of the cable's contrast: told with the quick look as without it."""
+def test_a_cable_that_fades_does_not_end(left, fading):
+    """A strip that ends where glare leaves a part of the cable's contrast: told, until too little is left."""
 
     def across(picture):
         return picture + (215.0 - picture) * (1.0 - left) / (1.0 + np.exp((700.0 - np.arange(SIZE[1])) / 2.0))
 
-    stage = VisionSettings().segmentation
-    standout = stand_out(_photo(across), 2, stage)
+    standout = stand_out(_photo(across), 2)
     path = standout.to_cells(_bow()[_bow()[:, 0] < 697.0])
-    cut = cut_across(standout, path, 0.5 * WIDTH, stage, known=True)
-    quick = fades(standout, cut, 0.5 * WIDTH, stage, at_start=False)
-    monkeypatch.setattr(beyond, "_may_fade", lambda *_: True)
-    assert quick == fades(standout, cut, 0.5 * WIDTH, stage, at_start=False) == fading
+    cut = cut_across(standout, path, 0.5 * WIDTH, known=True)
+    assert fades(standout, cut, 0.5 * WIDTH, at_start=False) == fading
 
 
 @pytest.mark.parametrize("slender", [10.0, 0.1])
 @pytest.mark.shared
-def test_a_fold_of_the_cloth_is_no_cable(slender, shared_data):
+def test_a_fold_of_the_cloth_is_no_cable(slender, shared_data, monkeypatch):
     """Eight times as long as wide, five times the noise; its end, put where its grey falls, is the picture's border."""
     whole = load_photo(shared_data / "real" / "loop" / "white0.jpg", VisionSettings().photo)
-    settings = VisionSettings()
-    stage = settings.segmentation.model_copy(update={"least_slenderness": slender})
+    monkeypatch.setattr(judgement, "_LEAST_SLENDERNESS", slender)
     mirrored = Photo("mirrored.png", np.ascontiguousarray(whole.pixels[:, ::-1]), 8)
-    found = find_cable(mirrored, settings.model_copy(update={"segmentation": stage}))
+    found = find_cable(mirrored)
     assert isinstance(found, Rejected) and found.code in ("photo/contrast", "photo/leaves-frame")
 
 
 def test_a_thing_eight_times_as_long_as_wide_is_no_cable():
     picture = np.full(SIZE, 215, np.uint8)
     cv2.line(picture, (300, 260), (492, 300), 40, 24, cv2.LINE_AA)
-    found = find_cable(Photo("thing.png", picture, 8), VisionSettings())
+    found = find_cable(Photo("thing.png", picture, 8))
     assert isinstance(found, Rejected)
     # drawn 25.4 px wide with round ends; its width is told to a pixel
     assert found.figure["slenderness"] == pytest.approx((np.hypot(192.0, 40.0) + 25.4) / 25.4, rel=0.04)
@@ -170,12 +166,12 @@ def test_half_a_cable_of_two_colours_does_not_pass_for_it(first):
     for part, colour in zip((bow[:250], bow[249:]), colours if first == 40.0 else colours[::-1], strict=True):
         cv2.polylines(picture, [part], False, colour, WIDTH, cv2.LINE_AA, 4)
     picture = cv2.GaussianBlur(picture, (0, 0), 1.0) + 2.0 * rng.standard_normal(picture.shape)
-    found = find_cable(Photo("halves.png", np.clip(picture, 0, 255).astype(np.uint8), 8), VisionSettings())
+    found = find_cable(Photo("halves.png", np.clip(picture, 0, 255).astype(np.uint8), 8))
     assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
 
 
 def test_another_piece_of_cable_in_line_is_none_of_one_that_is_whole():
-    assert isinstance(find_cable(_photo(_papered), VisionSettings(), cable=Cable(length_px=555.0)), RoughCable)
+    assert isinstance(find_cable(_photo(_papered), cable=Cable(length_px=555.0)), RoughCable)
 
 
 def test_a_stroke_of_print_is_no_end():
@@ -184,7 +180,7 @@ def test_a_stroke_of_print_is_no_end():
             picture[:, at : at + 3] = np.maximum(picture[:, at : at + 3], 190.0)
         return picture
 
-    found = find_cable(_photo(across), VisionSettings())
+    found = find_cable(_photo(across))
     assert isinstance(found, RoughCable)
     assert found.length_px == pytest.approx(_length(), rel=WHOLE)
 
@@ -198,7 +194,7 @@ def test_a_real_cable_is_followed_through_a_shadow(place, shared_data):
     rows, columns = picture.shape[:2]
     u, v = (np.arange(columns) / columns - place[0]) / 0.1, (np.arange(rows)[:, None] / rows - place[1]) / 0.08
     light = 1.0 - 0.55 * cv2.GaussianBlur((u**2 + v**2 < 1.0).astype(np.float32), (0, 0), 8)
-    found = find_cable(Photo("shadow.png", (picture * light[..., None]).astype(np.uint8), 8), VisionSettings())
+    found = find_cable(Photo("shadow.png", (picture * light[..., None]).astype(np.uint8), 8))
     assert isinstance(found, RoughCable)
     # that of the photo without the shadow; the last piece at a clamp is a matter of a few widths
     assert found.length_px == pytest.approx(3798.0, rel=0.01)
@@ -211,5 +207,5 @@ def test_a_band_across_a_real_cable_does_not_pass_for_it(shared_data):
     picture = cv2.resize(whole.pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     cv2.line(picture, (430, 460), (254, 1187), (37, 100, 188), 51, cv2.LINE_AA)
     noise = 7.0 * np.random.default_rng(9).standard_normal(picture.shape)
-    found = find_cable(Photo("band.png", np.clip(picture + noise, 0, 255).astype(np.uint8), 8), VisionSettings())
+    found = find_cable(Photo("band.png", np.clip(picture + noise, 0, 255).astype(np.uint8), 8))
     assert _is_told(found)

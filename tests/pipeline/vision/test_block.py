@@ -35,7 +35,7 @@ def test_line_ends_before_the_block_that_hides_a_given_axis(seed):
         cv2.circle(pixels, tuple(round(x) for x in end), 14, (30, 30, 30), cv2.FILLED, cv2.LINE_AA)
     bearings = BearingHints(given_px=(picture.left_px, picture.right_px))
     cable = Cable(diameter_px=DIAMETER * 8e3, bearings=bearings)
-    rough = find_cable(Photo("photo", pixels, 8), VisionSettings(), cable=cable)
+    rough = find_cable(Photo("photo", pixels, 8), cable=cable)
     found = measure_centerline(rough, plane=PlaneMap.from_scale(8e3), diameter_m=DIAMETER, settings=VisionSettings())
     off = errors(picture, found, 8e3)
     assert np.abs(off.normal[off.seen]).max() < 0.04

@@ -16,7 +16,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
-from pipeline.vision.scale.board import calibrate_by_board, find_board
+from pipeline.vision.scale.board import MAX_BORDER_STD, calibrate_by_board, find_board
 from pipeline.vision.scale.calibration import (
     Calibration,
     axis_parallax_std,
@@ -145,7 +145,7 @@ def test_corners_are_placed_as_well_as_the_noise_allows(charuco: bool) -> None:
     turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
     cells = np.broadcast_to(42.0 * turn, (len(truth), 2, 2))
     # beside markers of 0.6 squares only a cross along the edges is read
-    found = refine_corners(grey, near, cells, Window.of(0.6 if charuco else 0.0, STAGE), STAGE)
+    found = refine_corners(grey, near, cells, Window.of(0.6 if charuco else 0.0))
     limit = 0.02 / 0.84 * np.sqrt(2.0 * np.sqrt(np.pi) * np.hypot(1.0, 0.29) / (2.0 * 17.0))
     # a third more: blur, directions and light are fitted from the same pixels, and the edges fade at the corner
     assert np.sqrt(np.mean((found - truth) ** 2)) < 1.33 * limit
@@ -157,13 +157,13 @@ def test_no_corner_is_made_up_where_there_is_none() -> None:
     grey[:, 60:] += 80.0  # one edge, not two
     cells = np.broadcast_to(20.0 * np.eye(2), (3, 2, 2))
     places = np.array([[30.0, 40.0], [60.0, 40.0], [500.0, 40.0]])  # ground, edge, outside
-    assert np.isnan(refine_corners(grey, places, cells, Window.of(0.0, STAGE), STAGE)).all()
+    assert np.isnan(refine_corners(grey, places, cells, Window.of(0.0))).all()
 
 
 def test_small_board_says_that_it_does_not_tell_the_border(tmp_path: Path) -> None:
     camera = Camera(1200, 620, 5_400.0, k1=-0.01)
-    told = [fit_views(views_of(camera, [ChessBoard(*size, SQUARE)], 0.1, 1), STAGE)[0] for size in ((6, 4), (19, 9))]
-    assert told[0].border_std > STAGE.max_border_std > told[1].border_std
+    told = [fit_views(views_of(camera, [ChessBoard(*size, SQUARE)], 0.1, 1))[0] for size in ((6, 4), (19, 9))]
+    assert told[0].border_std > MAX_BORDER_STD > told[1].border_std
     board_photo(tmp_path, camera, ChessBoard(4, 3, 0.006, (0.03, 0.01)))
     spec = CameraSpec(calibration=tmp_path, board=Board(4, 3, 0.006), distance_m=1e9)
     calibration = calibrate_by_board(spec, 0.005, SETTINGS)[0]
@@ -185,7 +185,7 @@ def views_of(camera: Camera, poses: list[ChessBoard], noise_px: float, seed: int
 def test_several_photos_in_the_plane_share_one_fit() -> None:
     camera = Camera(2000, 1000, 9_000.0, k1=-0.01, perspective_per_m=(0.05, -0.04))
     poses = [ChessBoard(7, 5, SQUARE, (x, y), (0, 0, turn)) for x, y, turn in ((0.04, 0.03, 0.1), (0.14, 0.03, -0.4))]
-    errors = [shape_error(fit_views(views_of(camera, poses[:n], 0.1, 3), STAGE)[0].plane, camera) for n in (1, 2)]
+    errors = [shape_error(fit_views(views_of(camera, poses[:n], 0.1, 3))[0].plane, camera) for n in (1, 2)]
     # 0.1 px are 11 um: two boards hold all of the picture to three times the error of a corner, one small board at the
     # left tells little about the right half of it.
     assert 1e6 * errors[1] < 33.0
@@ -199,7 +199,7 @@ def test_scale_by_one_photo_is_as_sure_as_it_says() -> None:
         tilt = np.sin(np.radians(rng.uniform(-2.0, 2.0, 2))) / 0.4
         camera = Camera(1200, 620, 5_400.0, k1=float(rng.choice([-0.01, 0.0, 0.01])), perspective_per_m=tuple(tilt))
         board = ChessBoard(int(rng.integers(7, 15)), 7, SQUARE, (0.02, 0.02), (0.0, 0.0, rng.uniform(-0.05, 0.05)))
-        fit = fit_views(views_of(camera, [board], float(rng.uniform(0.05, 0.2)), seed), STAGE)[0]
+        fit = fit_views(views_of(camera, [board], float(rng.uniform(0.05, 0.2)), seed))[0]
         middle = 0.5 * np.array([camera.width, camera.height])
         about = middle + np.array([[2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]])
         x, y = camera.plane(about[:, 0], about[:, 1])
@@ -220,7 +220,7 @@ def test_ten_positions_give_the_lens_and_the_camera_distance() -> None:
         )
         for _ in range(11)
     ]
-    fit = fit_views(views_of(camera, poses, 0.1, 7), STAGE)[0]
+    fit = fit_views(views_of(camera, poses, 0.1, 7))[0]
     # foreshortening is about a fifth of 600 px of board: 0.1 px tell it to a thousandth, by a single corner
     assert fit.distance_m == pytest.approx(0.45, rel=1e-3)
     assert fit.rms_px == pytest.approx(0.1, rel=0.065)  # 2184 numbers tell it to 1.5 %: three of those, and 77 fitted
@@ -234,7 +234,7 @@ def test_few_positions_tell_the_lens_and_the_cable_tells_which_plane_is_its_own(
     poses = [ChessBoard(13, 7, SQUARE, (0.05, 0.03), tilt) for tilt in tilts]
     planes = [
         Calibration(fit.plane, Scale(5_000.0, fit.scale_std, Message("scale.number")))
-        for fit in fit_views(views_of(camera, poses, 0.1, 7), STAGE)
+        for fit in fit_views(views_of(camera, poses, 0.1, 7))
     ]
     assert len(planes) == 4
     travel = np.array([0.0, 0.01, 0.02, 0.03])
@@ -248,7 +248,7 @@ def test_few_positions_tell_the_lens_and_the_cable_tells_which_plane_is_its_own(
 def test_positions_in_one_plane_give_no_distance() -> None:
     camera = Camera(2000, 1200, 6_000.0, distance_m=0.45)
     poses = [ChessBoard(9, 6, SQUARE, (0.06 + 0.005 * i, 0.03), (0.0, 0.0, 0.2 * i)) for i in range(11)]
-    assert fit_views(views_of(camera, poses, 0.1, 2), STAGE)[0].distance_m is None
+    assert fit_views(views_of(camera, poses, 0.1, 2))[0].distance_m is None
 
 
 def test_folder_without_a_board_is_the_users_error(tmp_path: Path) -> None:
@@ -271,7 +271,7 @@ def test_corners_on_one_line_are_no_board(monkeypatch: pytest.MonkeyPatch) -> No
     line = np.column_stack([np.arange(8) * SQUARE, np.zeros(8)])
     monkeypatch.setattr("pipeline.vision.scale.board._charuco", lambda *_: (line, 4_000.0 * line))
     photo = Photo("a.png", np.full((300, 400), 128, np.uint8), 8)
-    found = find_board(photo, Board(11, 7, SQUARE, charuco=True), STAGE)
+    found = find_board(photo, Board(11, 7, SQUARE, charuco=True))
     assert isinstance(found, Rejected) and found.code == "calibration/no-corners"
 
 
@@ -289,7 +289,7 @@ def found(left: float, right: float, radius: float | None = None, std: float = 0
     path = np.column_stack([np.linspace(left, right, 50), np.full(50, middle)])
     bearings = [Bearing((u, middle), std, radius, 0.02 if radius else None) for u in (left, right)]
     grey = np.zeros((1, 1), np.float32)
-    return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 0.01, 1.0)
+    return RoughCable("a", path, (0, 49), *bearings, 20.0, grey, (0, 0), True, 0.5, 1.0)
 
 
 def specimen(*, marker_m: float | None = 0.012, length_m: float = 0.18) -> Specimen:

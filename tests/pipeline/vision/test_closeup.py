@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline.records import Rejected
-from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
@@ -101,6 +100,6 @@ def test_covers_lost_in_blur_are_no_reason_of_their_own(sensor):
     camera = Camera(1640, 640, scale, look_at_m=(0.5 * curve.chord, 0.5 * curve.y.max()))
     pixels = render(Scene(Strand(curve, 0.0046), camera, sensor=sensor)).pixels
     known = Cable(0.0046 * scale, length * scale, BearingHints(cover_px=0.012 * scale))
-    found = find_cable(Photo("a.png", pixels, 8), VisionSettings(), cable=known)
+    found = find_cable(Photo("a.png", pixels, 8), cable=known)
     assert isinstance(found, Rejected)
     assert found.code == "photo/blur"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.axes_of_series import told_by_others
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.path import fit_along
@@ -22,7 +21,7 @@ from tests.rod.elastica import natural_chord, uniform_equilibrium
 LEAST_SCORE = 0.45
 """Standard deviations, rms: a band twice as wide as its errors leaves room for cables that go on otherwise."""
 PARALLAX = 0.003  # covers 3 mm above the plane, a metre from the camera
-SETTINGS, HIDDEN, ERROR, COUNT = CurveSettings(), 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
+HIDDEN, ERROR, COUNT = 0.008, 2e-5, 12  # m; sections are off by 0.1 to 0.2 px at 8 px/mm
 
 
 def straight_bow(rng):
@@ -56,21 +55,23 @@ def cases():
     return fitted(bow)
 
 
-def _seen(case, beside, apart):
+def _seen(case, beside, apart, *, marked=True):
     """Fit in the frame of axes seen off by ``beside`` and ``apart`` m, its covariance and that frame."""
     fit, curve = case
     origin = np.array([-apart, beside])
-    chord = ChordFrame(PlaneMap.from_scale(1.0), origin, np.eye(2), curve.chord + 2.0 * apart, 1e-5, False, PARALLAX)
+    chord = ChordFrame(
+        PlaneMap.from_scale(1.0), origin, np.eye(2), curve.chord + 2.0 * apart, 1e-5, False, PARALLAX, marked
+    )
     return replace(fit, curve=replace(fit.curve, point=fit.curve.point - origin)), fit.smooth.covariance, chord
 
 
-def _errors(case, *, kinds=("cover", "cover"), beside=0.0, apart=0.0, known=True, told=None):
+def _errors(case, *, marked=True, beside=0.0, apart=0.0, known=True, told=None):
     """Errors of kappa at both ends and their standard deviations, 1/m; axes seen off by ``beside`` and ``apart`` m."""
     fit, curve = case
     covariance = fit.smooth.covariance
     if known:
-        known_of = {"kinds": kinds, "width": DIAMETER, "settings": SETTINGS, "told": told}
-        fit, covariance = continue_to_axes(*_seen(case, beside, apart), **known_of)
+        seen = _seen(case, beside, apart, marked=marked)
+        fit, covariance = continue_to_axes(*seen, width=DIAMETER, told=told)
     ends = np.array([0.0, LENGTH])
     basis = fit.curve.curvature_basis(ends)
     std = np.sqrt(((basis @ covariance) * basis).sum(axis=1))
@@ -83,7 +84,7 @@ def _rms(values):
 
 def test_ends_are_nearer_to_the_truth(cases):
     alone = _rms([_errors(case, known=False)[0] for case in cases])
-    bent = _rms([_errors(case, kinds=("end", "end"))[0] for case in cases])
+    bent = _rms([_errors(case, marked=False)[0] for case in cases])
     tied = _rms([_errors(case)[0] for case in cases])
     # 0.39, 0.27 and 0.26 1/m; over 24 ends an rms is known to 15 %, but all three see the same noise
     assert tied < bent < 0.8 * alone
@@ -92,7 +93,7 @@ def test_ends_are_nearer_to_the_truth(cases):
 def test_bow_of_a_straight_law_goes_on_as_one():
     straight = fitted(straight_bow)
     alone = _rms([_errors(case, known=False)[0] for case in straight])
-    errors, std = np.array([_errors(case, kinds=("end", "end")) for case in straight]).transpose(1, 0, 2)
+    errors, std = np.array([_errors(case, marked=False) for case in straight]).transpose(1, 0, 2)
     # 0.34 and 0.13 1/m; as above
     assert _rms(errors) < 0.6 * alone
     assert np.mean(np.abs(errors) < 1.96 * std) > 0.85
@@ -108,7 +109,7 @@ def test_band_covers_the_truth_when_covers_are_seen_too_far_apart(cases):
 
 def test_axes_of_visible_ends_tell_roughly_where_the_curve_ends(cases):
     """Off by a quarter of the width, as far as a search may put them: no more than a part of what is stated."""
-    (here, std), (there, _) = (_errors(cases[0], kinds=("end", "cover"), beside=off) for off in (0.0, 1e-3))
+    (here, std), (there, _) = (_errors(cases[0], marked=False, beside=off) for off in (0.0, 1e-3))
     assert (np.abs(np.asarray(here) - there) < 0.3 * np.asarray(std)).all()
 
 
@@ -116,8 +117,7 @@ def test_axes_of_visible_ends_tell_roughly_where_the_curve_ends(cases):
 def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
     """Twelve bows taken for photos of one camera: what they share is found, and the ends come out better for it."""
     off = {"beside": 0.0, "apart": 0.0} | off
-    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
-    together = told_by_others([sight_of_axes(*_seen(case, **off), **known) for case in cases])
+    together = told_by_others([sight_of_axes(*_seen(case, **off), width=DIAMETER) for case in cases])
     alone = _rms([_errors(case, **off)[0] for case in cases])
     found = [_errors(case, **off, told=told) for case, told in zip(cases, together, strict=True)]
     # 0.26 to 0.16 1/m where the axes are exact, 0.33 to 0.23 with parallax; the same noise in both
@@ -127,6 +127,5 @@ def test_a_series_tells_how_its_cables_pass_the_axes(cases, off):
 
 def test_a_photo_of_unknown_errors_tells_the_others_nothing(cases):
     fit, covariance, chord = _seen(cases[0], 0.0, 0.0)
-    known = {"kinds": ("cover", "cover"), "width": DIAMETER, "settings": SETTINGS}
-    assert sight_of_axes(fit, covariance, chord, **known) is not None
-    assert sight_of_axes(fit, np.full_like(covariance, np.nan), chord, **known) is None
+    assert sight_of_axes(fit, covariance, chord, width=DIAMETER) is not None
+    assert sight_of_axes(fit, np.full_like(covariance, np.nan), chord, width=DIAMETER) is None

@@ -88,7 +88,6 @@ def measured_on_second_renderer(seed: int, *, bright: bool = False, stated_m: fl
         origin_px=closeup.origin_px,
         dark=not bright,
         contrast=0.5,
-        noise=closeup.noise,
         blur_px=closeup.blur_px,
     )
     found = measure_centerline(rough, plane=PlaneMap.from_scale(scale), diameter_m=stated_m, settings=VisionSettings())

@@ -9,7 +9,7 @@ from pipeline.vision.render import Camera, ChessBoard
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.scale.calibration import Calibration, from_number
 from pipeline.vision.scale.doubt import with_doubt_of_plane
-from pipeline.vision.scale.plane_fit import fit_views
+from pipeline.vision.scale.plane_fit import USUAL_LENS, fit_views
 from tests.pipeline.vision.test_calibration import SQUARE, views_of
 
 STAGE = CalibrationSettings()
@@ -49,9 +49,9 @@ def test_errors_of_a_small_board_are_as_large_as_the_band_says() -> None:
     for seed in range(20):
         rng = np.random.default_rng([12, seed])
         tilt = np.sin(np.radians(rng.uniform(-2.0, 2.0, 2))) / 0.4
-        camera = Camera(1300, 640, 5_400.0, k1=float(rng.normal(0.0, STAGE.usual_lens)), perspective_per_m=tuple(tilt))
+        camera = Camera(1300, 640, 5_400.0, k1=float(rng.normal(0.0, USUAL_LENS)), perspective_per_m=tuple(tilt))
         board = ChessBoard(6, 5, SQUARE, (0.06, 0.03), (0.0, 0.0, rng.uniform(-0.05, 0.05)))
-        fit = fit_views(views_of(camera, [board], 0.15, seed), STAGE)[0]
+        fit = fit_views(views_of(camera, [board], 0.15, seed))[0]
         calibration = Calibration(fit.plane, from_number(5_400.0, STAGE).scale, aside=fit.aside)
         line = arc(camera)
         std = with_doubt_of_plane(line, calibration).kappa_std[3:-3]

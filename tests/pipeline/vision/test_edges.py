@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges, straighten
@@ -37,7 +36,7 @@ def fitted(pixels, *, ramps=True):
     s = np.arange(pixels.value.shape[1]) * 8.0
     shaded, plain = fit_profiles(pixels, s, blur=0.8)
     profiles = shaded if ramps else plain
-    return profiles, fit_edges(pixels, s, profiles, settings=CurveSettings())
+    return profiles, fit_edges(pixels, s, profiles)
 
 
 @pytest.mark.parametrize("u", [-2.3, -0.4, 0.0, 1.1])
@@ -133,14 +132,7 @@ def strip_picture(*, half=24.0, middle=60.0, highlight=True) -> Ground:
 
 @pytest.mark.parametrize("lead", [-6.0, 0.0, 6.0])
 def test_search_finds_the_sheath_and_not_the_highlight(lead):
-    found = search_edges(
-        strip_picture(),
-        straight(v=60.0 + lead),
-        span=(10.0, 390.0),
-        half_width=24.0,
-        tolerance=0.15,
-        settings=CurveSettings(),
-    )
+    found = search_edges(strip_picture(), straight(v=60.0 + lead), span=(10.0, 390.0), half_width=24.0, tolerance=0.15)
     assert np.all(found.usable)
     # a step between two pixels, sought pixel by pixel
     assert_allclose(found.edges + lead, np.tile([-24.0, 24.0], (len(found.edges), 1)), atol=1.0)

@@ -9,14 +9,12 @@ from scipy.interpolate import CubicSpline
 from fixtures.photographed.specimen import Order, make, write
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
-from pipeline.settings.vision.centerline import CurveSettings
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.series import trace_series
 from rod.measurement import slow_covariance
 from rod.midline import block_covariance
 
 SCATTER, BRIEF = 5e-6, 5e-4
-OPTIONS = CurveSettings()
 
 
 def photo(rng, std, length, n=300):
@@ -28,7 +26,7 @@ def photo(rng, std, length, n=300):
 
 def test_scatter_alone_makes_no_waves():
     rng = np.random.default_rng(1)
-    found = [seen_waves([photo(rng, 0.0, 1.0) for _ in range(4)], OPTIONS) != Waves() for _ in range(60)]
+    found = [seen_waves([photo(rng, 0.0, 1.0) for _ in range(4)]) != Waves() for _ in range(60)]
     # once in twenty at most as said: of 60 more than seven by chance once in a hundred
     assert sum(found) <= 7
 
@@ -36,7 +34,7 @@ def test_scatter_alone_makes_no_waves():
 @pytest.mark.parametrize(("std", "length", "factor"), [(2e-6, 4e-3, 3.0), (4e-6, 8e-3, 2.0)])
 def test_size_and_length_of_waves(std, length, factor):
     rng = np.random.default_rng(2)
-    seen = [seen_waves([photo(rng, std, length) for _ in range(7)], OPTIONS) for _ in range(20)]
+    seen = [seen_waves([photo(rng, std, length) for _ in range(7)]) for _ in range(20)]
     found = np.array([(waves.own, waves.length) for waves in seen])
     assert np.median([waves.common for waves in seen]) < 0.3 * std
     # seven photos of some twelve waves each tell a variance to a sixth; the length of waves that hardly rise above the
@@ -47,8 +45,8 @@ def test_size_and_length_of_waves(std, length, factor):
 
 def test_few_sections_tell_nothing():
     short = photo(np.random.default_rng(3), 2e-5, 8e-3, n=80)
-    assert seen_waves([short] * 7, OPTIONS) == Waves()
-    assert seen_waves([], OPTIONS) == Waves()
+    assert seen_waves([short] * 7) == Waves()
+    assert seen_waves([]) == Waves()
 
 
 def test_waves_that_all_photos_have_alike():
@@ -59,7 +57,7 @@ def test_waves_that_all_photos_have_alike():
     for _ in range(12):
         alike = 4e-6 * root @ rng.standard_normal(len(s))
         photos = [photo(rng, 0.0, 1.0) for _ in range(7)]
-        found.append(seen_waves([replace(one, half=one.half + alike) for one in photos], OPTIONS))
+        found.append(seen_waves([replace(one, half=one.half + alike) for one in photos]))
     # one draw of a dozen waves tells their variance to 40 %, their standard deviation to a fifth
     assert np.median([waves.common for waves in found]) == pytest.approx(4e-6, rel=0.2)
     assert np.median([waves.own for waves in found]) < 1e-6
@@ -68,17 +66,17 @@ def test_waves_that_all_photos_have_alike():
 def test_every_photo_has_waves_of_its_own():
     rng = np.random.default_rng(5)
     photos = [photo(rng, 0.0, 1.0) for _ in range(4)]
-    assert seen_waves(photos, OPTIONS) == Waves()
-    found = edge_waves(photos, OPTIONS, metres_per_px=1e-4)
+    assert seen_waves(photos) == Waves()
+    found = edge_waves(photos, metres_per_px=1e-4)
     assert (found.own, found.common, found.length) == pytest.approx((1e-6, 0.5e-6, 0.04 * 0.18))
-    assert edge_waves([], OPTIONS, metres_per_px=1e-4) == Waves()
+    assert edge_waves([], metres_per_px=1e-4) == Waves()
 
 
 def test_a_speck_on_one_edge_is_no_wave():
     rng = np.random.default_rng(4)
     photos = [photo(rng, 0.0, 1.0) for _ in range(7)]
     specks = [replace(one, half=one.half + 1e-3 * (np.abs(one.s - 0.1) < 1e-3)) for one in photos]
-    assert seen_waves(specks, OPTIONS).own < 0.5 * SCATTER
+    assert seen_waves(specks).own < 0.5 * SCATTER
 
 
 def off_the_truth(shape, bow, mirrored):

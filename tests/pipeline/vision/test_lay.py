@@ -119,15 +119,15 @@ def roped(seed):
     shown = cv2.GaussianBlur(shown, (0, 0), 1.0) + 2.0 * rng.standard_normal(v.shape)
     rough = rough_cable(scene, picture, rng, pixels=shown.clip(0, 255).astype(np.uint8))
     plane = PlaneMap.from_scale(scene.camera.px_per_m)
-    return follow_cable(rough, plane=plane, diameter_m=DIAMETER, settings=SETTINGS), picture, scene
+    return follow_cable(rough, plane=plane, diameter_m=DIAMETER), picture, scene
 
 
 def test_curves_follow_a_rope_once_its_lay_is_off():
     """The lay taken for noise, the band of the curvature was three times as wide."""
     photos = [roped(seed) for seed in (3, 4, 5, 6)]
     before, off, band = [cable for cable, *_ in photos], [], []
-    for cables in (before, without_lay(before, DIAMETER, SETTINGS)):
-        waves = waves_of(cables, SETTINGS)
+    for cables in (before, without_lay(before, DIAMETER)):
+        waves = waves_of(cables)
         lines = [centerline_of(cable, SETTINGS, waves=waves) for cable in cables]
         pairs = zip(lines, photos, strict=True)
         off.append([errors(shown, line, scene.camera.px_per_m) for line, (_, shown, scene) in pairs])

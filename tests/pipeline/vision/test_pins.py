@@ -4,13 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.settings.vision.bearings import BearingSettings
 from pipeline.vision.bearings.covers import find_cover
 from pipeline.vision.bearings.rim import Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.ends import CableEnd
-
-STAGE = BearingSettings()
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3, 0.6])
@@ -24,4 +21,4 @@ def test_end_of_a_cable_is_not_taken_for_the_middle_of_a_cover_hardly_wider(slop
     grey = drawn.reshape(80, 4, 160, 4).mean(axis=(1, 3)) + np.random.default_rng(5).normal(0.0, 3.0, (80, 160))
     photo = Photo("a", np.rint(grey).clip(0, 255).astype(np.uint8), 8)
     for off in (-0.4, 0.0, 0.4):
-        assert find_cover(photo, CableEnd(end + off * outward, outward), Radius(7.1, 0.01), 8.9, STAGE) is None
+        assert find_cover(photo, CableEnd(end + off * outward, outward), Radius(7.1, 0.01), 8.9) is None

@@ -177,13 +177,12 @@ def test_other_photos_tell_where_the_fixed_cover_stands(
 
     def misled(
         photo: Photo,
-        settings: VisionSettings,
         *,
         cable: Cable | None = None,
         near: RoughCable | None = None,
         hints: PhotoHints | None = None,
     ) -> RoughCable | Rejected:
-        found = sound(photo, settings, cable=cable, near=near, hints=hints)
+        found = sound(photo, cable=cable, near=near, hints=hints)
         if photo.name != "step_02.png" or isinstance(found, Rejected) or (near is None and not always):
             return found
         u, v = found.right.center_px
@@ -207,7 +206,7 @@ def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
     traces = trace_series(series(tmp_path, given=given, covers=False, camera=camera), SETTINGS)
     for line, curve in zip(lines(traces), CURVES, strict=True):
         assert line.chord_m == pytest.approx(curve.chord)
-        assert line.axis_std_px == pytest.approx(SETTINGS.bearings.given_std_px)
+        assert line.axis_std_px == pytest.approx(1.0)
 
 
 def test_a_cable_seen_far_from_a_given_axis_only_is_refused(tmp_path: Path) -> None:
@@ -361,12 +360,12 @@ def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
     sound, asked = shots_module.find_cable, []
 
     def strict(
-        photo: Photo, settings: VisionSettings, *, cable: Cable, near: RoughCable | None, hints: PhotoHints | None
+        photo: Photo, *, cable: Cable, near: RoughCable | None, hints: PhotoHints | None
     ) -> RoughCable | Rejected:
         asked.append(photo.name)
         told = near is not None and cable.diameter_px is not None and lost != (2,)
         if told or int(photo.name[5:7]) not in lost:
-            return sound(photo, settings, cable=cable, near=near)
+            return sound(photo, cable=cable, near=near)
         return Rejected(photo.name, Message("photo/crossing"))
 
     monkeypatch.setattr(shots_module, "find_cable", strict)
@@ -383,6 +382,6 @@ def test_a_cover_that_is_off_by_its_own_error_stands_still(std_px: float, astray
     found = []
     for moved, off in enumerate((0.0, 0.1, -0.1, 1.0)):
         left, right = (Bearing(place, std_px, 36.0) for place in ((90.0 + 20.0 * moved, 120.0), (610.0 + off, 90.0)))
-        found.append(RoughCable("a", path, (0, 1), left, right, 14.0, grey, (0, 0), True, 0.4, 0.01, 1.0))
+        found.append(RoughCable("a", path, (0, 1), left, right, 14.0, grey, (0, 0), True, 0.4, 1.0))
     fixed = fixed_cover(found, 0.3)
     assert fixed is not None and (fixed.side, fixed.astray) == ("right", astray)

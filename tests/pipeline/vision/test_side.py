@@ -53,7 +53,7 @@ def test_reflected_twice_is_the_same(traced):
 
 
 def test_photos_that_bow_alike_stay_as_they_are(traced):
-    lines, findings = on_one_side(traced.photos[1:], DIAMETER, SETTINGS.series)
+    lines, findings = on_one_side(traced.photos[1:], DIAMETER)
     assert lines == traced.photos[1:]
     assert not findings
     straight = replace(traced.photos[0], shape=reflected(traced.photos[0].shape))

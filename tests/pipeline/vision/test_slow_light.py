@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.slow_light import steadied
+from pipeline.vision.centerline.slow_light import LEAST_SLOW_SECTIONS, steadied
 from tests.pipeline.vision.bow_scene import bow_scene, trace
 
-SETTINGS = VisionSettings().curve
 COUNT = 240
 S = np.linspace(0.0, 2000.0, COUNT)
 SLOW = np.column_stack([0.4 + 0.1 * np.sin(S / 800.0), 0.3 - 0.05 * (S / 1000.0 - 1.0) ** 2])  # level and step
@@ -26,7 +24,7 @@ def covariance(noise: float) -> np.ndarray:
 def both(place, light, errors, s=S):
     """Places and their errors of an edge that has its like on the other side."""
     sides = (np.stack([x, x]) for x in (place, light, errors))
-    return (found[0] for found in steadied(*sides, s, settings=SETTINGS))
+    return (found[0] for found in steadied(*sides, s))
 
 
 def drawn(seed: int, noise: float = 0.05, light: np.ndarray | float = 0.0):
@@ -34,7 +32,7 @@ def drawn(seed: int, noise: float = 0.05, light: np.ndarray | float = 0.0):
     errors = covariance(noise)
     found = np.random.default_rng(seed).multivariate_normal(np.zeros(3), errors, (2, COUNT))
     shared = SLOW + found[..., :2] + light
-    place, std = steadied(found[..., 2], shared, np.broadcast_to(errors, (2, COUNT, 3, 3)), S, settings=SETTINGS)
+    place, std = steadied(found[..., 2], shared, np.broadcast_to(errors, (2, COUNT, 3, 3)), S)
     return found[0, :, 2], place[0], std[0], float(np.sqrt(errors[2, 2]))
 
 
@@ -98,7 +96,7 @@ def test_where_many_sections_show_no_edge_the_others_stay_as_they_are():
 
 
 def test_few_sections_tell_no_light():
-    few = SETTINGS.least_slow_sections - 1
+    few = LEAST_SLOW_SECTIONS - 1
     place = np.random.default_rng(4).standard_normal(few)
     found, _ = both(place, SLOW[:few], np.broadcast_to(covariance(0.05), (few, 3, 3)), S[:few])
     np.testing.assert_array_equal(found, place)

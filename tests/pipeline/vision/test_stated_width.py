@@ -9,6 +9,7 @@ from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message
 from pipeline.records import Centerline, Rejected, Scale, Traces
 from pipeline.settings import Settings
+from pipeline.vision import single
 from pipeline.vision.series import trace_series
 from pipeline.vision.stated_width import with_width_seen
 
@@ -42,10 +43,11 @@ def test_the_right_diameter_is_not_doubted(specimen):
     assert len(widths(traces)) == 3 and "diameter/seen" not in [finding.code for finding in traces.findings]
 
 
-def test_a_photo_that_breaks_the_look_without_a_diameter_costs_no_specimen(specimen):
+def test_a_photo_that_breaks_the_look_without_a_diameter_costs_no_specimen(specimen, monkeypatch):
     def broken(*_, **__):
         raise ValueError("numbers nobody foresaw")
 
     refused = tuple(Rejected(image, Message("photo/width.neither")) for image in specimen.images)
     traces = Traces(refused, Scale(5e3, 1e-3, Message("scale.number")))
-    assert with_width_seen(specimen, traces, SETTINGS.vision, retrace=broken, trace=broken) is traces
+    monkeypatch.setattr(single, "find_cable", broken)
+    assert with_width_seen(specimen, traces, SETTINGS.vision, broken) is traces

@@ -5,12 +5,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.search import SegmentationSettings
 from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import find_strips, thick_part
-
-SETTINGS = VisionSettings().segmentation
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -43,12 +39,12 @@ def test_branch_is_what_leaves_the_longest_path_by_more_than_a_width(branch):
     cv2.line(mask, (20, 60), (480, 60), 1, width)
     if branch:
         cv2.line(mask, (250, 60), (250, 60 + branch), 1, width)
-    (strip,) = find_strips(mask, np.zeros_like(mask), width, SETTINGS)
+    (strip,) = find_strips(mask, np.zeros_like(mask), width)
     assert strip.length == pytest.approx(460, abs=2 * width)
     assert strip.branch == pytest.approx(max(branch - width, 0), abs=width)
 
 
 def test_a_flat_strip_of_unknown_width_shows_no_edges():
     offsets = np.arange(-22.0, 22.1)
-    flanks = find_flanks(np.zeros((90, 45), np.float32), offsets, 10.0, 1.0, SegmentationSettings(), known=False)
+    flanks = find_flanks(np.zeros((90, 45), np.float32), offsets, 10.0, 1.0, known=False)
     assert np.isnan(flanks.left).all() and np.isnan(flanks.right).all()
