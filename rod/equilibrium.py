@@ -139,7 +139,8 @@ def solve(
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see the module.
     patient : bool
-        Else no path is followed to its end where a cable lacks an equilibrium, which costs fifty equilibria.
+        Else the shape that a start leads to is taken, as for a trial beside a known equilibrium, and no path is followed
+        to its end where a cable lacks one, which costs fifty equilibria.
 
     Raises
     ------
@@ -171,7 +172,7 @@ def _attempts(system: System, first: Start | None, branch: Branch, *, patient: b
     side = bow_side(rod, branch)
     # A cable that has jumped keeps the side it came to.
     kept = side if side or first is None else int(np.sign(rod.bow(first.angles)))
-    trusted = branch == "jump" or _leads(rod, side)
+    trusted = branch == "jump" or not patient or _leads(rod, side)
     warm = None if first is None else _near(system, first)
     if warm and _wound(system, warm, swung=branch != "jump"):
         first = warm = None
