@@ -139,7 +139,7 @@ def solve(
     branch : {"natural", "opposite", "up", "down", "jump"}
         Side of the bow, see the module.
     patient : bool
-        Else the shape that a start leads to is taken, as for a trial beside a known equilibrium, and no path is followed
+        Else the shape that a start leads to is taken, as trials beside a known equilibrium may, and no path is followed
         to its end where a cable lacks one, which costs fifty equilibria.
 
     Raises

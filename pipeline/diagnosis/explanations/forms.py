@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import form_between
 from pipeline.diagnosis.causes.rig import by_step
-from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.fits.extension import Extension, Term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
@@ -68,7 +68,7 @@ def with_more_forms(
         # a form that is there already, put beside itself, starts on the ridge where neither knows its amount
         for eligible in (fresh, fitting):
             if _loudest(more.statistic, eligible) ** 2 >= least:
-                fits = (fit_terms(observation, fitted, more, (start,)) for start in _starts(more, eligible))
+                fits = (fit_term(observation, fitted, more, start) for start in _starts(more, eligible))
                 added = min((one for one in fits if one is not None), key=lambda one: one.chi2, default=None)
             if added is not None and fitted.chi2 - added.chi2 >= least:
                 break

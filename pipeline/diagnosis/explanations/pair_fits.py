@@ -16,7 +16,7 @@ from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import LEAST
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
-from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench, laid_along
@@ -30,7 +30,7 @@ def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes:
         direction = second.best(cause)
         if cause == best.causes[0] or direction is None:
             continue
-        fitted = fit_terms(bench.observation, best.fitted, second, (direction,))
+        fitted = fit_term(bench.observation, best.fitted, second, direction)
         if fitted is not None:
             found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found

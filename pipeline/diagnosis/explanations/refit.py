@@ -1,7 +1,7 @@
-"""Terms put beside what a fitted model has already, and everything fitted again in full.
+"""A term put beside what a fitted model has already, and everything fitted again in full.
 
 Scores are local: their amounts are right only as far as the model is linear. A refit starts from that linear estimate,
-the other parameters moved out of the new terms' place, or from the share of it that fits best; and from another K0,
+the other parameters moved out of the new term's place, or from the share of it that fits best; and from another K0,
 where the base model may have gone elsewhere.
 """
 
@@ -33,56 +33,52 @@ ELSEWHERE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """Terms put beside a fitted model, with what the linear model says of them.
+    """A term put beside a fitted model, with what the linear model says of it.
 
     Attributes
     ----------
     base : Fit
-        The model they are put beside.
-    terms : tuple of Term
-    amounts : tuple of float
-        Linear estimate of each, in the unit of its cause.
-    columns : (N, terms)
-        Their whitened traces per unit of amount.
+        The model it is put beside.
+    term : Term
+    amount : float
+        Linear estimate, in the unit of its cause.
+    column : (N,)
+        Its whitened trace per unit of amount.
     """
 
     base: Fit
-    terms: tuple[Term, ...]
-    amounts: tuple[float, ...]
-    columns: Array
+    term: Term
+    amount: float
+    column: Array
 
     @property
     def extension(self) -> Extension:
-        """The model with the terms in it."""
+        """The model with the term in it."""
         known = self.base.extension
-        return Extension(known.base, known.facts, (*known.terms, *self.terms))
+        return Extension(known.base, known.facts, (*known.terms, self.term))
 
     def start(self, vector: Array, *, share: float = 1.0) -> Array:
-        """Vector of `extension`: one of the model so far, then the terms with a share of their amounts, kept sane."""
-        facts, parts = self.base.extension.facts, [vector]
-        for term, amount in zip(self.terms, self.amounts, strict=True):
-            limit = SANE * term.cause.plausible(facts)
-            traced = TRACE * abs(term.variant.trace) * term.cause.plausible(facts)
-            # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
-            bent = np.sign(share * amount) * traced * abs(share * amount / traced) ** (1.0 / term.variant.power)
-            value = float(np.clip(bent, -limit, limit))
-            if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
-                value = share * term.cause.plausible(facts)
-            parts.append(term.numbers(value))
-        return np.concatenate(parts)
+        """Vector of `extension`: one of the model so far, then the term with a share of its amount, kept sane."""
+        term, usual = self.term, self.term.cause.plausible(self.base.extension.facts)
+        traced = TRACE * abs(term.variant.trace) * usual
+        # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
+        bent = np.sign(share * self.amount) * traced * abs(share * self.amount / traced) ** (1.0 / term.variant.power)
+        value = float(np.clip(bent, -SANE * usual, SANE * usual))
+        if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
+            value = share * usual
+        return np.concatenate([vector, term.numbers(value)])
 
 
-def fit_terms(
+def fit_term(
     observation: Observation,
     base: Fit,
     suspicion: Suspicion,
-    directions: tuple[int, ...],
+    direction: int,
     *,
-    amounts: tuple[float, ...] | None = None,
     hopeless: float = np.inf,
     tuned: bool = True,
 ) -> Fit | None:
-    """Fit with further directions as terms, the best from all starts that are worth trying.
+    """Fit with one further term, the best from all starts that are worth trying.
 
     Parameters
     ----------
@@ -91,26 +87,22 @@ def fit_terms(
         The model so far.
     suspicion : Suspicion
         Scores about that model.
-    directions : tuple of int
-        Of ``suspicion``, each to become a term.
-    amounts : tuple of float or None
-        Linear estimates, where the directions share them; else each as it is scored alone.
+    direction : int
+        Of ``suspicion``, to become a term.
     hopeless : float
         Chi-square above which the fit is of no use.
     tuned : bool
-        Whether places and times of the forms are fitted too; else they stay as scored.
+        Whether place and time of the form are fitted too; else they stay as scored.
 
     Returns
     -------
     Fit or None
         None where the model has no equilibrium from any start.
     """
-    terms = tuple(suspicion.terms[k] for k in directions)
+    term = suspicion.terms[direction]
     if not tuned:
-        terms = tuple(Term(term.cause, replace(term.variant, tuned=())) for term in terms)
-    if amounts is None:
-        amounts = tuple(float(suspicion.scores.estimate[k]) for k in directions)
-    added = Addition(base, terms, amounts, suspicion.columns[:, list(directions)])
+        term = Term(term.cause, replace(term.variant, tuned=()))
+    added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
     for start in (linear_start(observation, added), *_elsewhere(added)):
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
@@ -120,15 +112,15 @@ def fit_terms(
 
 
 def linear_start(observation: Observation, added: Addition) -> Array:
-    """The linear estimate of amounts and of what they leave to the other parameters, or the share of it that fits best.
+    """The linear estimate of an amount and of what it leaves to the other parameters, or the share that fits best.
 
     A cause put beside parameters that stay where they were starts far from its valley: they had taken its place. So the
-    others move as far as the linear model says; only the last trial leaves them, and takes the least of the amounts.
+    others move as far as the linear model says; only the last trial leaves them, and takes the least of the amount.
     """
     base, extension = added.base, added.extension
     size = np.linalg.norm(base.jacobian, axis=0)
     size = np.where(size > 0.0, size, 1.0)
-    left = base.residual - added.columns @ np.asarray(added.amounts)
+    left = base.residual - added.column * added.amount
     move = np.linalg.lstsq(base.jacobian / size, left, rcond=1e-7)[0] / size
     trials = [added.start(base.vector + share * move, share=share) for share in SHARES]
     trials.append(added.start(base.vector, share=SHARES[-1]))

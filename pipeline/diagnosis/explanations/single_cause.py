@@ -14,7 +14,7 @@ from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import LEAST
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, differing_by_step, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
-from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.observations.observation import Observation
@@ -75,7 +75,7 @@ def _in_any_form(
     to_the_noise = FITS * (len(base.residual) - base.extension.size)
     if direction is None or base.chi2 < to_the_noise:
         return None
-    first = fit_terms(observation, base, suspicion, (direction,))
+    first = fit_term(observation, base, suspicion, direction)
     if first is None or first.chi2 < to_the_noise:
         return None
     free = with_free_profile(observation, first, kind)
@@ -127,10 +127,10 @@ def _fit_form(
 
     Where the trace has kinks (slip), a form that is tuned may stall; the form as it is scored does not.
     """
-    found = fit_terms(observation, base, suspicion, (direction,), hopeless=hopeless)
+    found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
-    held = fit_terms(observation, base, suspicion, (direction,), hopeless=hopeless, tuned=False)
+    held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
     return held if held is not None and _cost(held) < _cost(found) else found
 
 

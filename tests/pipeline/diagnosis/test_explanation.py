@@ -111,7 +111,7 @@ def test_a_start_is_a_possible_cable_where_none_tried_has_an_equilibrium(plain, 
     monkeypatch.setattr(refit, "run", lambda *_, **__: SimpleNamespace(prediction=None))
     direction = int(plain.suspicion.of([cause.name for cause in SUSPECTS].index("hysteresis"))[0])
     term = plain.suspicion.terms[direction]
-    added = Addition(plain.base, (term,), (1.0,), 1e9 * plain.suspicion.columns[:, [direction]])
+    added = Addition(plain.base, term, 1.0, 1e9 * plain.suspicion.columns[:, direction])
     assert added.extension.admissible(linear_start(plain.observation, added))
 
 

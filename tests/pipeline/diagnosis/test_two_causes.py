@@ -8,7 +8,8 @@ from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations import search
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import with_all_forms
-from pipeline.diagnosis.explanations.refit import fit_terms
+from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
 from pipeline.faults import faults_of_input
@@ -36,8 +37,9 @@ def test_each_half_of_a_pair_has_all_its_forms():
     bench = prepare(faults_of_input(test), SETTINGS)
     names = [cause.name for cause in SUSPECTS]
     load, lens = names.index("in_plane_load"), names.index("lens_distortion")
-    loudest = bench.suspicion.best(load), bench.suspicion.best(lens)
-    half = explanation_of((load, lens), bench.base, fit_terms(bench.observation, bench.base, bench.suspicion, loudest))
+    one = fit_term(bench.observation, bench.base, bench.suspicion, bench.suspicion.best(load))
+    beside = suspect(bench.observation, one, SUSPECTS)
+    half = explanation_of((load, lens), bench.base, fit_term(bench.observation, one, beside, beside.best(lens)))
     (whole,) = with_all_forms(bench, [half])
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SHAPE_GAIN
     amount, std = whole.amount(SUSPECTS[lens])
