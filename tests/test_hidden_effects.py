@@ -40,7 +40,7 @@ BEYOND = {("three", name) for name in ("hysteresis", "force_offset", "bearing_fr
 
 UNSEEN: dict[str, set[str]] = {
     "three": {"bearing_friction", "displacement_offset", "force_offset", "hysteresis", "rigid_ends"},
-    "six": {"hysteresis", "bearing_friction"},
+    "six": {"hysteresis"},
     "loop": set(),
 }
 """Causes that a protocol cannot be asked for at a plausible size: less than 1.2 of what it detects."""

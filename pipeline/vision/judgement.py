@@ -186,7 +186,7 @@ def _check_width(photo: Photo, cut: CrossCut, reduction: int, cable: Cable) -> R
     width = cut.usual_width * reduction
     slender = float(step_lengths(cut.path).sum()) / cut.usual_width
     if cable.diameter_px is None and slender < _LEAST_SLENDERNESS:
-        return refused(photo, "photo/width.short", slenderness=slender)
+        return refused(photo, "photo/contrast.short", slenderness=slender)
     low, high = _ACCEPTED_WIDTH_RATIO
     if cable.diameter_px is not None and not low <= width / cable.diameter_px <= high:
         return refused(photo, "photo/width.other", width_px=width, diameter_px=cable.diameter_px)

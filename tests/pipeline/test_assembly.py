@@ -104,5 +104,5 @@ def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     (alike,) = photo_findings([narrow("a.png", 1.16), narrow("c.png", 1.16)])
     assert alike.message.startswith("2 photos (a.png, c.png): what was traced is 116 % as wide")
     german = Words("de").said(told[0].said)
-    assert german.language == "de" and german.text.startswith("2 Fotos (a.png, c.png), auf a.png: das ")
+    assert german.language == "de" and german.text.startswith("2 Fotos (a.png, c.png), auf a.png: Das ")
     assert Words("de").said(alike.said).language == "de"

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from fixtures.hostile.batch import QUICK
 from fixtures.make import SMALL, hidden_specimen
 from pipeline.cli import main
 from pipeline.simulate import Experiment, protocol
@@ -36,7 +35,7 @@ def run(tmp_path_factory):
         toml.write_text(toml.read_text().replace("[specimen]", '[specimen]\ntype = "HV 35"', 1))
     log = folder / "batch" / WRONG / "force.csv"
     log.write_text(in_millinewton(log.read_text()))
-    options = ["--no-reports", "--set", "batch.in_process=true", *QUICK, "--json"]  # causes are the business of others
+    options = ["--no-reports", "--set", "batch.in_process=true", "--json"]
     done = CliRunner().invoke(main, ["run", str(folder / "batch"), "-o", str(folder / "out"), *options])
     return folder / "out", done
 

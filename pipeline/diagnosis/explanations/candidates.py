@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.statistics.pairs import pair_gains
+from pipeline.diagnosis.statistics.score import descending
 from pipeline.diagnosis.statistics.twins import cosines
 
 LEAST, MARGIN = 30.0, 0.35
@@ -33,6 +34,35 @@ def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = 
             gains[k] = max(gains[k], _best_two_forms(suspicion, k))
     order = np.argsort(-gains, kind="stable")
     return [int(k) for k in order[:most] if gains[k] > max(needed, 0.0)]
+
+
+NEARLY_AS_LOUD = 0.75
+"""Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
+
+
+def hidden_pair(suspicion: Suspicion) -> tuple[int, ...]:
+    """Directions of two causes that remove far more together than any one alone: each hides the other."""
+    gains = pair_gains(suspicion.scores.z, cosines(suspicion.scores.unit), suspicion.sign, suspicion.owner)
+    if gains.max(initial=0.0) < suspicion.statistic.max(initial=0.0) ** 2 + MASKED:
+        return ()
+    return tuple(int(k) for k in np.unravel_index(int(np.argmax(gains)), gains.shape))
+
+
+MASKED = 20.0
+"""Chi-square that a pair must remove beyond the best single score to be sought where no cause is likely by itself."""
+
+
+def kinds(suspicion: Suspicion, cause: int) -> list[int]:
+    """The loudest form of each kind of a cause.
+
+    A kind is a setting, a set of numbers, and a label too unless the forms act together: then others are added beside.
+    """
+    own, found = suspicion.of(cause), dict[tuple[object, ...], int]()
+    for k in (int(k) for k in own[descending(suspicion.statistic[own])]):
+        form = suspicion.terms[k].variant
+        label = "" if suspicion.causes[cause].combines else form.label
+        found.setdefault((label, form.setting, form.tuned), k)
+    return list(found.values())
 
 
 def _best_two_forms(suspicion: Suspicion, cause: int) -> float:

@@ -13,10 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.candidates import LEAST
+from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
-from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.explanations.refit import cost, fit_term
+from pipeline.diagnosis.fits.extension import Extension
 from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench, laid_along
@@ -27,13 +28,30 @@ def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes:
     """A single cause with each of some others, those in the model already left out."""
     found = []
     for cause in causes:
-        direction = second.best(cause)
-        if cause == best.causes[0] or direction is None:
+        if cause == best.causes[0] or not second.of(cause).size:
             continue
-        fitted = fit_term(bench.observation, best.fitted, second, direction)
+        forms = kinds(second, cause)
+        loud = [form for form in forms if second.statistic[form] >= NEARLY_AS_LOUD * second.statistic[forms[0]]]
+        fits = (fit_term(bench.observation, best.fitted, second, form) for form in loud)
+        fitted = min((one for one in fits if one is not None), key=cost, default=None)
         if fitted is not None:
             found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found
+
+
+def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
+    """Causes that hide each other, fitted from what the linear model says of all at once; empty without equilibrium."""
+    base, suspicion = bench.base, bench.suspicion
+    terms = tuple(suspicion.terms[k] for k in directions)
+    table = np.hstack([base.jacobian, suspicion.columns[:, list(directions)]])
+    size = np.linalg.norm(table, axis=0)
+    move = np.linalg.lstsq(table / np.where(size > 0.0, size, 1.0), base.residual, rcond=1e-7)[0]
+    move = move / np.where(size > 0.0, size, 1.0)
+    extension = Extension(base.extension.base, bench.facts, terms)
+    start = extension.start(base.vector + move[: len(base.vector)], tuple(move[len(base.vector) :]))
+    fitted = fit_from(bench.observation, extension, extension.brought_inside(start), base)
+    causes = tuple(int(suspicion.owner[k]) for k in directions)
+    return [] if fitted.run.prediction is None else [explanation_of(causes, base, fitted)]
 
 
 def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:

@@ -111,6 +111,11 @@ def fit_term(
     return best
 
 
+def cost(fitted: Fit) -> float:
+    """Chi-square plus two for every parameter."""
+    return fitted.chi2 + 2.0 * fitted.extension.size
+
+
 def linear_start(observation: Observation, added: Addition) -> Array:
     """The linear estimate of an amount and of what it leaves to the other parameters, or the share that fits best.
 

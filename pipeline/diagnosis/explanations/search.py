@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.diagnosis.explanations.candidates import candidates
-from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, settled, with_all_forms
+from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
+from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, settled, together, with_all_forms
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
@@ -95,10 +95,12 @@ class Search:
         """Scores of all causes about a single cause."""
         return suspect(self.bench.observation, best.fitted, self.bench.suspicion.causes)
 
-    def pairs(self, singles: Sequence[Explanation], best: Explanation, second: Suspicion) -> None:
-        """Refit pairs: each single cause that these data allow with the two that score most beside it."""
+    def pairs(
+        self, singles: Sequence[Explanation], best: Explanation, second: Suspicion, found: list[Explanation]
+    ) -> None:
+        """Refit pairs beside those ``found``: each single cause that the data allow with what scores most beside it."""
         bench, near = self.bench, candidates(second)[:2]
-        found = pairs_beside(bench, best, second, near)
+        found += pairs_beside(bench, best, second, near)
         for one in singles:
             if one is not best:
                 beside = self.beside(one)
@@ -150,14 +152,14 @@ class Search:
 
 def searched(bench: Workbench) -> Search:
     """All hypotheses about a specimen that are worth it, weighed."""
-    search = Search(bench)
+    search, hidden = Search(bench), hidden_pair(bench.suspicion)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    if silent and first.word == "base" and bench.largest < bench.limit:
+    if silent and first.word == "base" and not hidden and bench.largest < bench.limit:
         return search
     search.singles()
     credible = [one.found for one in search.posterior.credible() if one.found is not None][:LIKELIEST]
     best = next((one.found for one in search.posterior.explanations(count=1)), None)
-    if best is not None and search.pairs_speak(best, second := search.beside(best)):
-        search.pairs(credible, best, second)
+    if best is not None and (search.pairs_speak(best, second := search.beside(best)) or hidden):
+        search.pairs(credible, best, second, together(bench, hidden) if hidden else [])
     return search

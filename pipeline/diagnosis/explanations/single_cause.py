@@ -11,18 +11,15 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import is_profile
-from pipeline.diagnosis.explanations.candidates import LEAST
+from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, differing_by_step, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
-from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
-
-NEARLY_AS_LOUD = 0.75
-"""Share of the loudest score; a misplaced spot keeps that much of the score it would have at its place."""
 
 
 def refit_one(
@@ -46,7 +43,7 @@ def refit_one(
         if kind.combines:
             for setting, one in best.items():
                 best[setting] = _several(observation, one, kind, setting, hopeless=hopeless)
-        found = min(best.values(), key=_cost, default=None)
+        found = min(best.values(), key=cost, default=None)
         found = None if found is None else differing_by_step(observation, found, kind)
     return None if found is None else explanation_of((cause,), base, found)
 
@@ -84,7 +81,7 @@ def _in_any_form(
     worse = price(free, first)
     spot = as_one_form(observation, free, worse=worse)
     few = with_more_forms(observation, first, kind, "", hopeless=free.chi2 + worse)
-    return min((free, spot, few), key=_cost)
+    return min((free, spot, few), key=cost)
 
 
 def _by_setting(
@@ -111,7 +108,7 @@ def _by_setting(
         if found.converged and found.chi2 < to_the_noise:
             enough[term.variant.label] = term.size
         setting = term.variant.setting
-        best[setting] = min(best.get(setting, found), found, key=_cost)
+        best[setting] = min(best.get(setting, found), found, key=cost)
     return best
 
 
@@ -131,27 +128,16 @@ def _fit_form(
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
     held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
-    return held if held is not None and _cost(held) < _cost(found) else found
+    return held if held is not None and cost(held) < cost(found) else found
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
     """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of each other kind.
 
     A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
-    A kind is a setting, a set of numbers, and a label too unless the forms act together: then others are added beside.
     """
     own = suspicion.of(cause)
     ranked = [int(k) for k in own[descending(suspicion.statistic[own])]]
     least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]
     loud = [k for k in ranked[:4] if suspicion.statistic[k] >= least]
-    kinds: dict[tuple[object, ...], int] = {}
-    for k in ranked:
-        form = suspicion.terms[k].variant
-        label = "" if suspicion.causes[cause].combines else form.label
-        kinds.setdefault((label, form.setting, form.tuned), k)
-    return list(dict.fromkeys([*loud, *kinds.values()]))
-
-
-def _cost(fitted: Fit) -> float:
-    """Chi-square plus two for every parameter."""
-    return fitted.chi2 + 2.0 * fitted.extension.size
+    return list(dict.fromkeys([*loud, *kinds(suspicion, cause)]))
