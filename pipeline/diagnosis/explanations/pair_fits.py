@@ -40,7 +40,7 @@ def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes:
 
 
 def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
-    """Causes that hide each other, fitted from what the linear model says of all at once; empty without equilibrium."""
+    """Causes that hide each other, fitted from what the linear model says of all at once; empty if that fails."""
     base, suspicion = bench.base, bench.suspicion
     terms = tuple(suspicion.terms[k] for k in directions)
     table = np.hstack([base.jacobian, suspicion.columns[:, list(directions)]])
@@ -51,7 +51,7 @@ def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
     start = extension.start(base.vector + move[: len(base.vector)], tuple(move[len(base.vector) :]))
     fitted = fit_from(bench.observation, extension, extension.brought_inside(start), base)
     causes = tuple(int(suspicion.owner[k]) for k in directions)
-    return [] if fitted.run.prediction is None else [explanation_of(causes, base, fitted)]
+    return [explanation_of(causes, base, fitted)] if fitted.converged else []
 
 
 def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:

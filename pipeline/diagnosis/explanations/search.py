@@ -152,14 +152,18 @@ class Search:
 
 def searched(bench: Workbench) -> Search:
     """All hypotheses about a specimen that are worth it, weighed."""
-    search, hidden = Search(bench), hidden_pair(bench.suspicion)
+    search = Search(bench)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    if silent and first.word == "base" and not hidden and bench.largest < bench.limit:
+    silent = silent and first.word == "base" and bench.largest < bench.limit
+    hidden = hidden_pair(bench.suspicion) if silent else ()
+    if silent and not hidden:
         return search
     search.singles()
     credible = [one.found for one in search.posterior.credible() if one.found is not None][:LIKELIEST]
     best = next((one.found for one in search.posterior.explanations(count=1)), None)
     if best is not None and (search.pairs_speak(best, second := search.beside(best)) or hidden):
+        if not hidden and search.posterior.word == "rest":
+            hidden = hidden_pair(bench.suspicion)
         search.pairs(credible, best, second, together(bench, hidden) if hidden else [])
     return search
