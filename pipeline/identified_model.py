@@ -191,5 +191,5 @@ def _facts(length: float, model: IdentifiedModel) -> Facts:
         force_scale=moment / length,
         moment_scale=moment,
         curvature_scale=high - low,
-        pressed=np.ones(1),
+        force_share=np.ones(1),
     )

@@ -53,7 +53,7 @@ class BearingFriction(Cause):
         """
         bending = model.bending
         if np.isfinite(variant.known) or variant.label == WITH_FORCE:
-            share = facts.pressed if variant.label == WITH_FORCE else np.eye(len(facts.branch))[int(variant.at)]
+            share = facts.force_share if variant.label == WITH_FORCE else np.eye(len(facts.branch))[int(variant.at)]
             more = amount * share
             before = 0.0 if bending.friction_by_step is None else bending.friction_by_step
             return replace(model, bending=replace(bending, friction_by_step=before + more))

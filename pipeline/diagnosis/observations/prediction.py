@@ -53,7 +53,7 @@ class Facts:
         Largest force, and largest force times bow.
     curvature_scale : 1/m
         Range of the curvatures met.
-    pressed : (n,)
+    force_share : (n,)
         Measured force, as a share of the largest one.
     bends : (n,) 1/m
         Largest bend from rest up to each step, by a fitted model; empty before any is.
@@ -75,7 +75,7 @@ class Facts:
     force_scale: float
     moment_scale: float
     curvature_scale: float
-    pressed: Array
+    force_share: Array
     bends: Array = field(default_factory=lambda: np.zeros(0))
     rest_side: Branch = "natural"
 
@@ -129,7 +129,7 @@ def facts_of(test: MeasuredTest) -> Facts:
         force_scale=force,
         moment_scale=force * bow,
         curvature_scale=bend or 1.0 / test.length,
-        pressed=forces / (force or 1.0),
+        force_share=forces / (force or 1.0),
         rest_side=_rest_side(steps),
     )
 

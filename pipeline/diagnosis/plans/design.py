@@ -223,7 +223,7 @@ def _facts(plan: Plan) -> Facts:
         force_scale=force,
         moment_scale=force * bow,
         curvature_scale=np.pi**2 * bow / plan.length**2,
-        pressed=np.array([float(branch != "mounted") for _, branch in steps]),
+        force_share=np.array([float(branch != "mounted") for _, branch in steps]),
     )
 
 

@@ -89,7 +89,7 @@ def more_steps(facts: Facts, displacements: list[float], branches: list[str]) ->
         displacement_std=np.r_[facts.displacement_std, np.zeros(count)],
         photo_time=np.r_[facts.photo_time, np.full(count, facts.photo_time[-1])],
         hold_times=(*facts.hold_times, *[facts.hold_times[-1]] * count),
-        pressed=np.r_[facts.pressed, [float(branch != "mounted") for branch in branches]],
+        force_share=np.r_[facts.force_share, [float(branch != "mounted") for branch in branches]],
         clock=np.r_[facts.clock, facts.clock[-1] + cycle * np.arange(1, count + 1)],
         picture_centre=np.vstack([facts.picture_centre, np.repeat(facts.picture_centre[-1:], count, axis=0)]),
     )
