@@ -4,6 +4,9 @@ base model and scores -> causes weighed by the linear model -> those that matter
 -> what scores beside those that the data allow refitted -> pairs pruned of what they do not need -> where something
 else is likelier still, the best cause with all others -> probabilities of all.
 
+Two causes may hide each other, each below its threshold: where no single one is likely, or something else is likelier,
+the pair that removes most by the linear scores is fitted from both at once (`together`).
+
 A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
 2.5 standard deviations of nothing is fitted again without it.
 """
