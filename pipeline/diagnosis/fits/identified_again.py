@@ -80,7 +80,7 @@ def identified_again(
         mean = None if there is None else _at_mean(observation, there)
         # a mean is off by a standard deviation of each unknown at most; farther off, what is linear is no guide (two
         # spots in one place)
-        if mean is None or mean.chi2 > fitted.chi2 + extension.size:
+        if mean is None or _told(observation, mean) > _told(observation, fitted) + extension.size:
             break
         found = mean
     covariance = _averaged(observation, found).covariance
@@ -88,6 +88,12 @@ def identified_again(
         moved = _moved_by_forces(observation, found, covariance, errors)
         covariance = covariance + np.outer(moved, moved)
     return _with_other_forms(observation, Identified(found, covariance))
+
+
+def _told(observation: Observation, fitted: Fit) -> float:
+    """Chi-square of the data and of what is known but of the form of the law."""
+    known = observation.rows.count + fitted.extension.base.known
+    return float(np.sum(fitted.residual[:known] ** 2))
 
 
 def _at_mean(observation: Observation, start: Fit) -> Fit:
