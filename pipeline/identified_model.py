@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause, Variant
 from pipeline.diagnosis.causes.law import LAW
-from pipeline.diagnosis.observations.prediction import Facts, Model
 from pipeline.result import CauseForm, Result, Visited
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
+from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
 Zero = Literal["natural", "length"]

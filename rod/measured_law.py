@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Source = tuple[str, int]
 
+POINTS = 61
+"""Of a reported curve: smooth at any figure's width."""
+
 #: Within this share of the range from K0 the secant m / (K - K0) is 0/0 to working precision, and is the tangent.
 NEAR_REST = 1e-3
 
@@ -41,7 +44,7 @@ class MeasuredLaw:
         a comparison with another way through the same data needs for the joint uncertainty. By name and step, -1 for
         what all photos have in common: ``("photo", step)`` (n, b) of the whitened midline (`rod.midline`), ``("force",
         step)`` (n, 1), the axes of one photo ``("left_across", step)`` and all that `rod.balance.moment_points` and
-        `rod.inverse.fit_model` name alike, ``("common_force", -1)`` (n, e); and what a way alone knows.
+        `rod.inverse.gains` name alike, ``("common_force", -1)`` (n, e); and what a way alone knows.
     shortfall : (n, n)
         Error of log(tangent) on the grid by the smoothness prior, per log(tangent) of the true law there.
     loaded_pre_curvature, loaded_pre_curvature_std : 1/m

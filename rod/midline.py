@@ -1,9 +1,8 @@
 """The raw midline of one photo as independent data: block means along the normal, and the whitener of their noise.
 
 A photo holds a thousand and more midline sections whose errors are correlated over some ten pixels and share a slowly
-varying part (light). Blocks of about one correlation length lose less than a tenth of a percent of what the sections
-know about a smooth curve (for a block of one correlation length the mean of an Ornstein-Uhlenbeck process keeps all but
-1/12 (b/l)^2 of a wavelength-l component), and turn thousands of rows into a hundred or two.
+varying part (light). A hundred blocks know a bent cable as well as all of them: the mean over a block of width b keeps
+all but 1/24 (2 pi b/l)^2 of what varies with the wavelength l, two thousandths at a quarter of the cable.
 
 A block mean is taken of the distance of the sections from the smooth curve of the same photo, and put back on that
 curve at the centre of the block: the mean of positions on an arc would lie inside it.
@@ -17,16 +16,25 @@ Axes: chord frame; "normal" is the displacement along ``(-sin theta, cos theta)`
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.measurement import MeasuredShape, slow_covariance
+from rod.measurement import MeasuredShape, SlowErrors, slow_covariance
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+LEAST_SECTIONS = 8
+"""Raw midline points that make a shape."""
+
+BLOCKS = 96
+"""Of one photo: four for each of the functions by which the inverse problem compares shapes, so that noise and misfit
+are measured apart."""
+
+
+@dataclass(frozen=True, eq=False)
 class Midline:
     """Independent data of one photo.
 
@@ -36,12 +44,16 @@ class Midline:
         Centres of the blocks: arc length on the smooth curve, measured position, direction of the tangent.
     offset : (b,) m
         Of the measured position from the smooth curve, along its normal.
-    covariance : (b, b) m^2
-        Of the position along the normal.
-    factor : (b, b) m
-        Lower triangular; ``factor @ factor.T = covariance``.
-    whitener : (b, b) 1/m
-        Its inverse; ``whitener @ covariance @ whitener.T = 1``.
+    section_s, section_std : (k,) m
+        Raw sections in increasing order.
+    first, sections : (b,)
+        Index of the first section of each block and their number.
+    correlation_length : m
+        Of the sections' errors.
+    slow : tuple of (std m, length m)
+        Slow sideways errors: of the light first, then of waves that a textured ground makes on this photo alone.
+    common : (std m, length m)
+        Waves that are the same at the same s on all photos.
     """
 
     s: Array
@@ -49,9 +61,38 @@ class Midline:
     y: Array
     theta: Array
     offset: Array
-    covariance: Array
-    factor: Array
-    whitener: Array
+    section_s: Array
+    section_std: Array
+    first: NDArray[np.intp]
+    sections: NDArray[np.intp]
+    correlation_length: float
+    slow: SlowErrors
+    common: tuple[float, float] = (0.0, 0.0)
+
+    def random(self, stretch: float = 1.0) -> Array:
+        """Covariance (b, b) m^2 of the sections' own errors, their correlation length stretched."""
+        if not self.section_s.size:
+            return np.zeros((0, 0))
+        length, reach = stretch * self.correlation_length, float(np.ptp(self.section_s))
+        covariance = block_covariance(self.section_s, self.section_std, self.first, self.sections, length)
+        covariance[np.diag_indices_from(covariance)] += (1e-9 * reach) ** 2  # only keeps it regular
+        return covariance
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the position along the normal, (b, b) m^2: as stated, all slow errors of this photo included."""
+        light, (own, length) = self.slow
+        return self.random() + slow_covariance(self.s, (light, (float(np.hypot(own, self.common[0])), length)))
+
+    @cached_property
+    def factor(self) -> Array:
+        """Lower triangular (b, b) m; ``factor @ factor.T = covariance``."""
+        return np.asarray(np.linalg.cholesky(self.covariance), float)
+
+    @cached_property
+    def whitener(self) -> Array:
+        """Its inverse, (b, b) 1/m; ``whitener @ covariance @ whitener.T = 1``."""
+        return np.tril(np.linalg.inv(self.factor))
 
     @property
     def on_curve(self) -> Array:
@@ -60,40 +101,45 @@ class Midline:
         return np.asarray(np.column_stack([self.x, self.y]) - self.offset[:, None] * normal)
 
 
-def midline(shape: MeasuredShape, *, blocks: int = 160) -> Midline:
-    """Block means of the raw sections with their covariance.
+def _nowhere() -> Midline:
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+    return Midline(none, none, none, none, none, none, none, index, index, 0.0, ((0.0, 0.0), (0.0, 0.0)))
+
+
+NOWHERE = _nowhere()
+"""Of a step that no photo shows."""
+
+
+def midline(shape: MeasuredShape, *, blocks: int = BLOCKS) -> Midline:
+    """Block means of the raw sections with their errors.
 
     Parameters
     ----------
     shape : MeasuredShape
     blocks : int
-        At most that many; fewer where a correlation length is longer. 160 on a cable of 180 mm are 1.1 mm each.
+        At most that many, of equal length.
 
     Raises
     ------
     ValueError
         If there are fewer than eight sections.
     """
-    order = np.argsort(shape.section_s)
+    order = np.argsort(shape.section_s, kind="stable")
     s, std = shape.section_s[order], shape.section_std[order]
-    if s.size < 8:
+    if s.size < LEAST_SECTIONS:
         raise ValueError(f"{s.size} midline sections do not make a shape")
     distance = shape.section_offsets()[order]
-    reach = float(s[-1] - s[0])
-    width = max(reach / blocks, shape.correlation_length)
-    count = max(8, min(blocks, int(np.ceil(reach / width)), s.size))
-    label = np.minimum(((s - s[0]) / reach * count).astype(int), count - 1)
+    count = min(blocks, s.size)
+    label = np.minimum(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), count - 1)
     _, first, sections = np.unique(label, return_index=True, return_counts=True)
     mean = np.add.reduceat(s, first) / sections
     offset = np.add.reduceat(distance, first) / sections
     x, y, theta = shape.at(mean)
-    covariance = block_covariance(s, std, first, sections, shape.correlation_length)
-    # A doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors.
-    covariance += slow_covariance(mean, tuple((min(error, reach), length) for error, length in shape.slow))
-    covariance[np.diag_indices_from(covariance)] += (1e-9 * reach) ** 2  # only keeps it regular
     x, y = x - offset * np.sin(theta), y + offset * np.cos(theta)
-    factor = np.asarray(np.linalg.cholesky(covariance), float)
-    return Midline(mean, x, y, theta, offset, covariance, factor, np.tril(np.linalg.inv(factor)))
+    # a doubt as large as the cable says all there is to say; more would only drown the noise in rounding errors
+    light, waves, alike = np.minimum([shape.systematic_std, shape.wave_std, shape.common_std], np.ptp(s)).tolist()
+    own, common = ((light, shape.systematic_length), (waves, shape.wave_length)), (alike, shape.wave_length)
+    return Midline(mean, x, y, theta, offset, s, std, first, sections, shape.correlation_length, own, common)
 
 
 def block_covariance(
@@ -119,7 +165,11 @@ def block_covariance(
     gap = s[first][None, :] - s[last][:, None]
     upper = np.triu(tail[:, None] * head[None, :] * np.exp(-np.maximum(gap, 0.0) / rho), 1)
     covariance = upper + upper.T
-    for k, (i, n) in enumerate(zip(first, sections, strict=True)):
-        inside = np.exp(-np.abs(s[i : i + n, None] - s[None, i : i + n]) / rho)
-        covariance[k, k] = std[i : i + n] @ inside @ std[i : i + n] / n**2
+    # inside the blocks, which may hold unlike numbers of sections: pairs at a time, up to as many apart as any is wide
+    inside = np.add.reduceat(std**2, first)
+    for apart in range(1, int(sections.max())):
+        pairs = std[apart:] * std[:-apart] * np.exp(-(s[apart:] - s[:-apart]) / rho)
+        pairs[block[apart:] != block[:-apart]] = 0.0
+        inside += 2.0 * np.bincount(block[apart:], weights=pairs, minlength=first.size)
+    covariance[np.diag_indices_from(covariance)] = inside / sections**2
     return np.asarray(covariance)

@@ -223,7 +223,7 @@ def test_f_beside_something_unexplained_is_no_better_known_than_without_the_near
     strange = with_alien(test, "waves", 12.0 * alien_size("six", "waves"))
     part, _, _ = diagnose(faults_of_input(strange), None, SETTINGS)
     assert (part.verdict, [cause.name for cause in part.causes]) == ("unexplained", ["force_drift"])
-    base = curve(bench_of(strange).base, points=SETTINGS.curve_points)
+    base = curve(bench_of(strange).base)
     apart = np.interp(part.extended.kappa_per_m, base.kappa_per_m, base.tangent_Nm2) - part.extended.tangent_Nm2
     assert np.all(np.abs(apart) <= 1.01 * np.array(part.extended.tangent_std_Nm2))
     assert np.abs(apart / part.extended.tangent_Nm2).max() > 0.1

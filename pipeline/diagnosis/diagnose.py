@@ -16,7 +16,6 @@ from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits import ordinary
 from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
@@ -35,6 +34,8 @@ from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.balance import BalanceGraph
 from rod.inverse import InverseOutcome
+from rod.inverse.fit import Fit
+from rod.inverse.observation import CHORD_STD
 from rod.measurement import MeasuredTest
 
 REFITTED = 3
@@ -65,7 +66,7 @@ def diagnose(
     settings : DiagnosisSettings or None
     """
     settings = settings or DiagnosisSettings()
-    reason = _not_to_be_compared(faults, identification, settings)
+    reason = _not_to_be_compared(faults, identification)
     graph = None if identification is None else identification.balance
     bench = reason or prepare(faults, settings, graph=graph)
     if isinstance(bench, Message):
@@ -87,15 +88,13 @@ def diagnose(
     return Diagnosed(part, (*faults.findings, *large, *off), faults)
 
 
-def _not_to_be_compared(
-    faults: Faults, identification: Identification | None, settings: DiagnosisSettings
-) -> Message | None:
+def _not_to_be_compared(faults: Faults, identification: Identification | None) -> Message | None:
     """Why nothing can be held against the simulation; None if something can."""
     if not faults.loaded_photos():
         return Message("diagnosis.no-photo")
     if not any(step.force for step in faults.test.steps):
         return Message("diagnosis.no-force")
-    if _stands_still(faults.test, settings):
+    if _stands_still(faults.test):
         return Message("diagnosis.no-travel")
     if identification is not None and identification.inverse.outcome is InverseOutcome.OPPOSITE_FORCES:
         return Message("diagnosis.contradiction")
@@ -158,14 +157,14 @@ def _told(correction: ForceCorrection) -> ForceCorrectionPart:
     )
 
 
-def _stands_still(test: MeasuredTest, settings: DiagnosisSettings) -> bool:
+def _stands_still(test: MeasuredTest) -> bool:
     """Whether all displacements of the log are zero, or the same while the photographed chord changes.
 
     The displacement is what drives the simulation; the chords, which both ways live on, are held against it.
     """
     logged = {step.displacement for step in test.steps if step.displacement is not None}
     chords = [step.chord for step in test.steps if step.chord is not None]
-    std = max((step.chord_std or settings.chord_std * test.length for step in test.steps), default=0.0)
+    std = max((step.chord_std or CHORD_STD * test.length for step in test.steps), default=0.0)
     moved = max(chords, default=0.0) - min(chords, default=0.0) > FAULT * std
     return logged == {0.0} or (len(logged) == 1 and moved)
 

@@ -12,21 +12,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.diagnosis.causes.law import LAW
-from pipeline.diagnosis.fits.base import start
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import ITERATIONS, Fit, fit
 from pipeline.diagnosis.fits.heldout import measured_gain
-from pipeline.diagnosis.fits.laws import FewPoints
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.observations.observation import Observation, observe
-from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.plans.design import Plan, planned_bench
 from pipeline.faults import faults_of_input
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES
 from rod.characteristic import Characteristic
+from rod.inverse.base import start
+from rod.inverse.extension import Extension
+from rod.inverse.fit import ITERATIONS, Fit, fit
+from rod.inverse.laws import FewPoints
+from rod.inverse.observation import Observation, observe
+from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
 
 POINT_GAIN = 16.0
@@ -90,8 +90,8 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
     faults = faults_of_input(test)
     facts = facts_of(faults.test)
     pictures = frozenset(range(len(test.steps)))
-    forces = observe(faults.test, settings, without_photos=pictures, without_forces=faults.forces)
-    everything = observe(faults.test, settings, without_photos=faults.photos, without_forces=faults.forces)
+    forces = observe(faults.test, without_photos=pictures, without_forces=faults.forces)
+    everything = observe(faults.test, without_photos=faults.photos, without_forces=faults.forces)
     bent, curved = False, False
     found: list[Discovery] = []
     for data, observation in (("forces", forces), ("forces and photos", everything)):
@@ -135,7 +135,6 @@ def _fitted(
         test,
         facts,
         points=3 if curved else 1,
-        elements=settings.grid,
         straight=not bent,
     )
     if not bent and isinstance(base.law, FewPoints):  # the control points then count from zero curvature

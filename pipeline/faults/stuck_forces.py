@@ -14,6 +14,7 @@ import numpy as np
 from scipy import special
 
 from pipeline.records import Array
+from rod.inverse.force_noise import last_digit
 from rod.measurement import MeasuredStep
 
 LEAST_SAMPLES = 4
@@ -31,24 +32,12 @@ AT_TOP = 5.0
 FINE = 2e-4
 """Last digit over the largest force: in a coarser log two steps may read the same force by chance."""
 
-ROUNDING = 1e-9
-"""Of the largest force: numbers that close are the same number."""
-
 
 class _Hold(NamedTuple):
     mean: float
     variance: float
     freedom: int
     repeats: bool
-
-
-def last_digit(forces: Array) -> float:
-    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
-    top = float(np.max(np.abs(forces), initial=0.0))
-    for places in range(-3, 13):
-        if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):
-            return 10.0**-places
-    return 0.0
 
 
 def stuck_forces(steps: tuple[MeasuredStep, ...]) -> list[int]:

@@ -69,7 +69,7 @@ class Agreement:
 def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
     """Compare both ways; None if they visited no common curvature."""
     one, two = inverse.law, graph.law
-    if one is None or two is None or inverse.model is None:
+    if one is None or two is None:
         return None
     first, second = log_curve(one), log_curve(two)
     grid = first.common_grid(second)

@@ -107,25 +107,17 @@ def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float
 
 
 def _nuisances(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
-    model, u = found.inverse.model, found.inverse.unknowns
-    if model is None:
-        return
-    figures = {
-        "length": {"fitted_m": model.cable_length(u), "given_m": model.length},
-        "scale": {"change": model.nuisance(u, "scale")},
-    }
-    for name, values in figures.items():
-        pull = abs(float(u[model.index(name)]))
-        if pull > settings.nuisance_sigma:
-            yield doubtful(f"identify/{name}", **values, z=pull)
+    for name, (value, _, before) in found.inverse.nuisances.items():
+        z, given = abs(value) / before, found.test.length
+        if z > settings.nuisance_sigma and name == "length":
+            yield doubtful("identify/length", fitted_m=given + value, given_m=given, z=z)
+        elif z > settings.nuisance_sigma and name == "scale":
+            yield doubtful("identify/scale", change=value, z=z)
 
 
 def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
-    evaluation = found.inverse.evaluation
-    if evaluation is None:
-        return
     for kind in ("shape", "force"):
-        chi2, count = evaluation.chi2(kind)
+        chi2, count = found.inverse.chi2(kind)
         if count and chdtrc(count, chi2) < settings.misfit_level:
             yield doubtful(f"identify/misfit-{kind}", rms=np.sqrt(chi2 / count))
 

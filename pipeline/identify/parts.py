@@ -21,13 +21,11 @@ from pipeline.result import (
 )
 from rod.balance import BalanceGraph
 from rod.balance.moment_points import pointwise_graph
-from rod.compliance_law import ComplianceLaw
 from rod.inverse import Estimate, InverseOutcome
-from rod.inverse.evaluation import StepFit
-from rod.inverse.fit_model import FitModel
-from rod.inverse.photo_residual import Pose, curve_distance
+from rod.inverse.observation import KINDS
+from rod.inverse.photo_fit import photo_fit
 from rod.measured_law import MeasuredLaw
-from rod.measurement import MeasuredShape
+from rod.stiffness_law import StiffnessLaw
 
 READINGS = 8
 """Points of the fitted law that are listed; the curve has them all."""
@@ -96,31 +94,26 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
 def inverse_part(found: Identification) -> InversePart:
     """The inverse problem."""
     way = found.inverse
-    spline, law, model = way.characteristic, way.law, way.model
-    if spline is None or law is None or model is None:
-        return InversePart(**InversePart.ending(way.outcome), converged=False, iterations=way.iterations)
-    stds = np.sqrt(np.diag(way.covariance))
+    fitted, law = way.characteristic, way.law
+    if fitted is None or law is None:
+        return InversePart(**InversePart.ending(way.outcome), converged=False)
     return InversePart(
         **InversePart.ending(way.outcome),
         converged=way.outcome in (InverseOutcome.CONVERGED, InverseOutcome.NOT_VISIBLE),
-        iterations=way.iterations,
         pre_curvature_per_m=law.pre_curvature,
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
-        knots=_readings(law, spline),
+        knots=_readings(law, fitted),
         curve=curve(way),
         misfit=misfit_part(way),
-        nuisance={
-            name: (model.nuisance(way.unknowns, name), float(stds[model.index(name)]) * std)
-            for name, std in model.nuisances.items()
-        },
+        nuisance={name: (value, std) for name, (value, std, _) in way.nuisances.items()},
         branches={name: part for name, branch in found.branches.items() if (part := curve(branch)) is not None},
     )
 
 
-def _readings(law: MeasuredLaw, fitted: ComplianceLaw) -> list[KnotPart]:
-    """Points of the law, dense where it bends most: evenly along its own abscissa (`rod.compliance_law`)."""
-    place = fitted.basis.place(law.moment)
+def _readings(law: MeasuredLaw, fitted: StiffnessLaw) -> list[KnotPart]:
+    """Points of the law, dense where it bends most: evenly along its own abscissa (`rod.stiffness_law`)."""
+    place = fitted.basis.place(law.kappa - law.pre_curvature)
     even = np.linspace(place[0], place[-1], READINGS)
     return [
         KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))
@@ -132,21 +125,30 @@ def _readings(law: MeasuredLaw, fitted: ComplianceLaw) -> list[KnotPart]:
 
 def misfit_part(way: Estimate) -> MisfitPart | None:
     """Residuals in units and in sigma; None without a fit."""
-    if way.evaluation is None or way.model is None:
+    observation, fitted, test = way.observation, way.fitted, way.test
+    if observation is None or fitted is None or test is None or fitted.run.prediction is None:
         return None
-    steps, blocks, value = way.evaluation.steps, way.evaluation.blocks, way.evaluation.value
-    forces = [step.force[0] for step in steps if step.force is not None]
-    distances = [step.photo[0] for step in steps if step.photo is not None]
-    bends = [_bend(way.model, way.unknowns, step) for step in steps if step.photo is not None]
-    by_block = {name: (float(value[b] @ value[b]), float(b.stop - b.start)) for name, b in blocks.items()}
-    data = {name: pair for name, pair in by_block.items() if name != "prior"}
+    holds = zip(observation.forces, fitted.run.prediction.samples, strict=True)
+    forces = [float(np.mean(data - model[: len(data)])) for data, model in holds if len(data)]
+    distances, bends = [], []
+    for photo in observation.photos:
+        if (shape := test.steps[photo.step].shape) is not None:
+            distances.append(photo_fit(observation, fitted, photo, photo.sections).distance)
+            bends.append((shape.kappa - photo_fit(observation, fitted, photo, shape).kappa)[shape.seen])
+    by_block = {
+        f"{kind}/{step.step}": found
+        for i, step in enumerate(test.steps)
+        for kind in KINDS[:-1]
+        if (found := way.chi2(kind, i))[1]
+    }
+    base = fitted.extension.base
     return MisfitPart(
         force_rmse_N=_rms(np.array(forces)),
         shape_rmse_m=_rms(np.concatenate(distances)) if distances else 0.0,
         curvature_rmse_per_m=_rms(np.concatenate(bends)) if bends else None,
         chi2=sum(chi2 for chi2, _ in by_block.values()),
-        # Each prior adds a row and takes an unknown; the laws' own unknowns are what the data pay.
-        degrees_of_freedom=sum(n for _, n in data.values()) - way.model.laws,
+        # each prior adds a row and takes an unknown; law and K0 are what the data pay
+        degrees_of_freedom=sum(n for _, n in by_block.values()) - base.law.size - 1,
         chi2_by_block=by_block,
     )
 
@@ -196,9 +198,10 @@ def agreement_part(found: Identification) -> AgreementPart:
 
 
 def _steps(found: Identification) -> list[StepPart]:
-    fitted = {}
-    if found.inverse.evaluation is not None:
-        fitted = {fit.data.step.step: fit.simulated.force for fit in found.inverse.evaluation.steps}
+    way, simulated = found.inverse, {}
+    if way.test is not None and way.fitted is not None and way.fitted.run.prediction is not None:
+        steps = zip(way.test.steps, way.fitted.run.prediction.force, strict=True)
+        simulated = {step.step: float(force) for step, force in steps}
     return [
         StepPart(
             step=step.step,
@@ -206,7 +209,7 @@ def _steps(found: Identification) -> list[StepPart]:
             displacement_m=0.0 if step.displacement is None else step.displacement,
             force_N=step.force,
             force_std_N=step.force_std,
-            force_fit_N=fitted.get(step.step),
+            force_fit_N=simulated.get(step.step),
             image=found.images.get(step.step),
         )
         for step in found.test.steps
@@ -214,33 +217,19 @@ def _steps(found: Identification) -> list[StepPart]:
 
 
 def _photos(way: Estimate) -> dict[int, PhotoResidual]:
-    if way.evaluation is None or way.model is None:
+    observation, fitted, test = way.observation, way.fitted, way.test
+    if observation is None or fitted is None or test is None:
         return {}
-    return {
-        fit.data.step.step: _photo(way.model, way.unknowns, fit, fit.data.step.shape)
-        for fit in way.evaluation.steps
-        if fit.photo is not None and fit.data.step.shape is not None
-    }
-
-
-def _pose(model: FitModel, u: Array, fit: StepFit) -> Pose:
-    return Pose(*model.pose(u, fit.data), model.nuisance(u, "scale"))
-
-
-def _photo(model: FitModel, u: Array, fit: StepFit, shape: MeasuredShape) -> PhotoResidual:
-    value, feet = curve_distance(shape, fit.simulated, _pose(model, u, fit), fit.chord)
-    std = np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", shape.basis_normal, shape.covariance, shape.basis_normal), 0.0))
-    kappa = np.interp(feet, fit.simulated.s, fit.simulated.kappa)
-    return PhotoResidual(_list(kappa), _list(value), _list(std))
-
-
-def _bend(model: FitModel, u: Array, fit: StepFit) -> Array:
-    """Measured minus fitted curvature where the cable is seen, 1/m."""
-    shape = fit.data.step.shape
-    if shape is None:
-        return np.empty(0)
-    feet = curve_distance(shape, fit.simulated, _pose(model, u, fit), fit.chord)[1]
-    return np.asarray((shape.kappa - np.interp(feet, fit.simulated.s, fit.simulated.kappa))[shape.seen])
+    found = {}
+    for photo in observation.photos:
+        step = test.steps[photo.step]
+        if (shape := step.shape) is None:
+            continue
+        variance = np.einsum("ip,pq,iq->i", shape.basis_normal, shape.covariance, shape.basis_normal)
+        at = photo_fit(observation, fitted, photo, shape)
+        std = np.sqrt(np.maximum(variance, 0.0))
+        found[step.step] = PhotoResidual(_list(at.kappa), _list(at.distance), _list(std))
+    return found
 
 
 def _rms(values: Array) -> float:

@@ -18,8 +18,8 @@ from pipeline.identify.contrast import chi_square, parts_difference
 from pipeline.identify.findings import identification_findings
 from pipeline.identify.identification import Identification
 from pipeline.settings.identify import IdentifySettings
-from rod.balance import BalanceOptions, balance
-from rod.inverse import Estimate, InverseOptions, estimate
+from rod.balance import balance
+from rod.inverse import Estimate, estimate
 from rod.measurement import MeasuredTest
 
 LEAST_PHOTOS = 2
@@ -36,10 +36,9 @@ def identify(faults: Faults, images: Mapping[int, str], settings: IdentifySettin
 
 def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identification:
     """`identify` of all of a test."""
-    options = inverse_options(settings)
-    inverse = estimate(test, options=options)
-    graph = balance(test, options=BalanceOptions(blocks=settings.blocks, grid=settings.grid))
-    branches = _branches(test, options)
+    graph = balance(test)
+    inverse = estimate(test, near=graph.law)
+    branches = _branches(test)
     found = Identification(
         test=test,
         inverse=inverse,
@@ -52,19 +51,14 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
     return replace(found, findings=identification_findings(found, settings))
 
 
-def inverse_options(settings: IdentifySettings) -> InverseOptions:
-    """The settings as the options of the inverse problem."""
-    return InverseOptions(elements=settings.elements, blocks=settings.blocks, grid=settings.grid)
-
-
-def _branches(test: MeasuredTest, options: InverseOptions) -> dict[str, Estimate]:
+def _branches(test: MeasuredTest) -> dict[str, Estimate]:
     groups = {"loading": ("mounted", "loading"), "unloading": ("unloading",)}
     halves = {name: tuple(s for s in test.steps if s.branch in members) for name, members in groups.items()}
     photos = [sum(s.shape is not None and s.branch != "mounted" for s in steps) for steps in halves.values()]
     if min(photos) < LEAST_PHOTOS:
         return {}
-    apart = {name: estimate(replace(test, steps=steps), options=options) for name, steps in halves.items()}
-    return apart if all(e.characteristic is not None for e in apart.values()) else {}
+    apart = {name: estimate(replace(test, steps=steps)) for name, steps in halves.items()}
+    return apart if all(e.law is not None for e in apart.values()) else {}
 
 
 def _branches_p(branches: dict[str, Estimate]) -> float | None:

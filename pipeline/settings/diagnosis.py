@@ -10,20 +10,6 @@ class DiagnosisSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    # noise
-    force_floor: float = Field(
-        5e-4,
-        description="share of the largest force; repeatability of a class 0.05 load cell; below it digits repeat",
-    )
-    chord_std: float = Field(
-        3e-5,
-        description="relative; std of a photographed chord where the photo states none (0.05 px of 1700)",
-    )
-    displacement_std: float = Field(
-        2e-6,
-        description="m; of one displacement of the log against the chord: spindle and last digit of a log in 0.001 mm",
-    )
-
     # detection
     false_alarm: float = Field(0.01, description="probability of naming anything on a specimen without effect")
     power: float = Field(0.9, description="probability at which the minimal detectable effect is stated")
@@ -35,12 +21,6 @@ class DiagnosisSettings(BaseModel):
         0.34, description="share of the causes; `underpowered` if fewer would have shown at a plausible size"
     )
     separated: float = Field(4.0, description="sigma; two explanations this far apart are told apart")
-
-    # base model
-    grid: int = Field(120, description="elements of the simulated cable; force to 1e-4, a tenth of its noise")
-
-    # presentation
-    curve_points: int = Field(61, description="points of the extended characteristic; smooth at any figure's width")
 
     # blind spots
     harm: float = Field(0.005, description="relative change of f_EI from which an invisible cause is worth a warning")

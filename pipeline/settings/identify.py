@@ -31,11 +31,6 @@ class IdentifySettings(BaseModel):
         description="m; of the point below the camera about the picture's middle: 3 degrees off plumb at a metre, or a "
         "photo that was cut",
     )
-    elements: int = Field(100, ge=20, description="of the simulated rod; at 100 its force is within 1e-4")
-    blocks: int = Field(
-        160, ge=20, description="independent data per photo at most; one per correlation length of the midline's error"
-    )
-    grid: int = Field(61, ge=11, description="points of a reported curve")
     agreement_level: float = Field(0.05, gt=0, lt=1, description="level of the test whether both ways agree")
     pre_curvature_sigma: float = Field(
         3.5, gt=0, description="standard deviations; K0 from photo, balance and inverse: three pairs, one false in 700"

@@ -35,7 +35,7 @@ from rod.balance.moment_regression import (
     uniform_at_rest,
 )
 from rod.compliance_law import moment_basis
-from rod.measured_law import Array, MeasuredLaw, Source, propagated
+from rod.measured_law import POINTS, Array, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
 CONTRADICTION = 2.0
@@ -62,22 +62,6 @@ class BalanceOutcome(Enum):
         "the regression did not settle; this usually means that one photo or force contradicts the others: compare the "
         "points of the photos"
     )
-
-
-@dataclass(frozen=True)
-class BalanceOptions:
-    """Numbers of the balance way, each with its reason.
-
-    Attributes
-    ----------
-    blocks : int
-        Independent data of one photo at most, see `rod.midline`.
-    grid : int
-        Points of the reported curve.
-    """
-
-    blocks: int = 160
-    grid: int = 61
 
 
 @dataclass(frozen=True)
@@ -109,22 +93,19 @@ class BalanceGraph:
         return self.outcome is BalanceOutcome.MEASURED
 
 
-def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> BalanceGraph:
+def balance(test: MeasuredTest) -> BalanceGraph:
     """Characteristic from moments ``P y`` and curvatures of all photos.
 
     Parameters
     ----------
     test : MeasuredTest
-    options : BalanceOptions or None
-        None means the defaults.
 
     Returns
     -------
     BalanceGraph
         With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
     """
-    options = options or BalanceOptions()
-    data = moment_points(test, blocks=options.blocks)
+    data = moment_points(test)
     if not any(points.force != 0.0 for points in data):
         return BalanceGraph(BalanceOutcome.NO_PHOTO, points=data)
     kappa, m = (np.concatenate([getattr(d, name)[d.seen] for d in data]) for name in ("kappa", "moment"))
@@ -144,7 +125,7 @@ def balance(test: MeasuredTest, *, options: BalanceOptions | None = None) -> Bal
     checks = assumption_checks(replace(found.model, blur=1.0), found) | {"noise_factor": found.model.blur}
     if rest is not None:
         checks["uniform_at_rest_p"] = at_rest
-    return _graph(found.model, found, checks, options.grid)
+    return _graph(found.model, found, checks)
 
 
 def _regress_in_spite_of_misfit(model: MomentModel, start: float) -> Regression | None:
@@ -164,7 +145,7 @@ def _regress_in_spite_of_misfit(model: MomentModel, start: float) -> Regression 
     return None
 
 
-def _graph(model: MomentModel, found: Regression, checks: dict[str, float], points: int) -> BalanceGraph:
+def _graph(model: MomentModel, found: Regression, checks: dict[str, float]) -> BalanceGraph:
     """Read moment, tangent and secant off the compliance on a grid of curvature, with bands by propagation."""
     curve, p = found.curve, model.size
     K0, errors = float(found.unknowns[p]), model.errors(found.unknowns)
@@ -172,7 +153,7 @@ def _graph(model: MomentModel, found: Regression, checks: dict[str, float], poin
     # the abscissa was laid along the regression before: beyond it, by a little at most, nothing is known of the law
     ends = np.clip([met.min(), met.max()], curve.basis.moments[0], curve.basis.moments[-1])
     low, high = K0 + curve.bend(ends)
-    kappa = np.linspace(float(low), float(high), points)
+    kappa = np.linspace(float(low), float(high), POINTS)
     m, f = curve.bound(np.array([K0]))(kappa)
     by_moment, by_log = np.zeros((2, m.size, found.unknowns.size))
     by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)

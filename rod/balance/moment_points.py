@@ -31,7 +31,7 @@ from scipy.sparse import csr_array, diags_array
 
 from rod.compliance_law import ComplianceLaw
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
-from rod.midline import Midline, midline
+from rod.midline import LEAST_SECTIONS, Midline, midline
 
 Array = NDArray[np.float64]
 
@@ -40,9 +40,6 @@ CELLS = 400
 
 HIDDEN = 20
 """Pieces of an arc under a cover."""
-
-LEAST_SECTIONS = 8
-"""Raw midline points that make a shape."""
 
 TURN = 0.3
 """Standard deviation of the turn at the left axis, rad: far more than any smooth curve is off by."""
@@ -164,10 +161,10 @@ class Residual:
     by_source: dict[str, Array]
 
 
-def moment_points(test: MeasuredTest, *, blocks: int = 160) -> tuple[MomentPoints, ...]:
-    """Points of every step that has a photo, in the order of the test; `blocks` as in `rod.midline.midline`."""
+def moment_points(test: MeasuredTest) -> tuple[MomentPoints, ...]:
+    """Points of every step that has a photo, in the order of the test."""
     return tuple(
-        _points_of(step, step.shape, midline(step.shape, blocks=blocks))
+        _points_of(step, step.shape, midline(step.shape))
         for step in test.steps
         if step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
     )

@@ -1,20 +1,42 @@
-"""What the inverse problem hands over: outcome, characteristic with bands on the visited range, and the fit itself.
+"""Way one, the inverse problem: from photos and forces to the characteristic by simulating the experiment (Sec. 4).
 
-Signs and axes: chord frame of `rod.measurement`; f_EI is the tangent reading dm/dK; SI units.
+The discrete rod is fitted to the midlines and to the forces of all steps at once, each residual divided by its standard
+deviation (Eq. (7) with statistical weights in place of w; the paper's own objective is in `rod.paper_fit`). The
+chords of the photos drive the simulation, and where there is no photo the displacement log does. What is fitted:
+`rod.inverse.base`; how: `rod.inverse.base_fit`; the law as the mean over what is not known of its form:
+`rod.inverse.mean_law`. A force-free photo is held against the arc of curvature K0; its force says something about the
+load cell, nothing about the cable, and is left out. Where the simulation cannot follow the data within their noise, the
+misfit counts as noise. Bands are by propagation, on the visited range only.
+
+Signs and axes: chord frame of `rod.measurement`; P positive in compression, K positive toward the bow; f_EI is the
+tangent reading dm/dK; SI units.
+
+Source: *Identification of Nonlinear Elastic Bending Behavior for Cable Simulation*, Sec. 4, Eqs. (6), (7).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
-from rod.compliance_law import ComplianceLaw
-from rod.inverse.evaluation import Evaluation, evaluate
-from rod.inverse.fit_model import FitModel
-from rod.law_prior import Posterior, averaged, priors
-from rod.measured_law import Array, MeasuredLaw, Source, propagated
+from rod.equilibrium import Outcome
+from rod.inverse.base import ELEMENTS, measured_curvatures
+from rod.inverse.base_fit import base_fit, law_of
+from rod.inverse.fit import Fit
+from rod.inverse.gains import gains, loaded_pre_curvature
+from rod.inverse.mean_law import linearised, mean_law, moved_by_forces, rows_posterior, weights
+from rod.inverse.observation import KINDS, Observation
+from rod.inverse.prediction import facts_of
+from rod.measured_law import POINTS, Array, MeasuredLaw, propagated
+from rod.measurement import MeasuredStep, MeasuredTest
+from rod.midline import LEAST_SECTIONS
+from rod.stiffness_law import StiffnessLaw
+
+OPPOSITE = -0.5
+"""Correlation of curvature and moment below which forces contradict photos; noise brings it to zero, not below."""
 
 INVISIBLE = 0.5
 """Standard deviation of log f, or K0 times length, beyond which it counts as not visible: a factor of 1.6."""
@@ -51,119 +73,235 @@ class InverseOutcome(Enum):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """What the inverse problem makes of a test; SI units, tangent reading.
 
     Attributes
     ----------
     outcome : InverseOutcome
-    characteristic : ComplianceLaw or None
-        The fitted law.
+    test : MeasuredTest or None
+        The steps that were fitted, as they were driven.
+    observation : Observation or None
+        Their data with weights.
+    fitted : Fit or None
+        The model at the mean over the priors of its law; None without one.
+    covariance : (p, p)
+        Of its vector.
     law : MeasuredLaw or None
-        The same on a grid over the visited range, with bands; None where there is no characteristic.
-    law_forms : (n, p)
+        On a grid over the visited range, with bands.
+    law_forms : (n, k)
         Forms of log(tangent) on the law's grid that the priors allow, one standard deviation each.
-    model, evaluation, unknowns, covariance
-        The fit itself: unknowns (q,) with covariance (q, q); residuals and jacobian whitened by the noise as stated,
-        whatever ``model.blur`` the bands were made with.
     invisible : tuple of (float or None, float)
         What the data leave open; see `invisible_combinations`.
-    iterations : int
-        Evaluations of the model, all fits together.
     """
 
     outcome: InverseOutcome
-    characteristic: ComplianceLaw | None = None
+    test: MeasuredTest | None = None
+    observation: Observation | None = None
+    fitted: Fit | None = None
+    covariance: Array = field(default_factory=lambda: np.empty(0))
     law: MeasuredLaw | None = None
     law_forms: Array = field(default_factory=lambda: np.empty(0))
-    model: FitModel | None = None
-    evaluation: Evaluation | None = None
-    unknowns: Array = field(default_factory=lambda: np.empty(0))
-    covariance: Array = field(default_factory=lambda: np.empty(0))
     invisible: tuple[tuple[float | None, float], ...] = ()
-    iterations: int = 0
 
     @property
     def converged(self) -> bool:
         """True if there is a characteristic to rely on within its band."""
         return self.outcome is InverseOutcome.CONVERGED
 
+    @property
+    def characteristic(self) -> StiffnessLaw | None:
+        """The fitted law."""
+        return None if self.fitted is None else law_of(self.fitted)
 
-def read_off(
-    model: FitModel, found: Evaluation, posterior: Posterior, *, grid: int, outcome: InverseOutcome
+    @cached_property
+    def nuisances(self) -> dict[str, tuple[float, float, float]]:
+        """What is fitted beside law and K0: value, standard deviation, and standard deviation before the test.
+
+        ``length`` (m) and ``scale`` (relative) are what is added to the stated ones; those of `rod.inverse.base.AXES`
+        are errors of axes and camera.
+        """
+        if self.fitted is None:
+            return {}
+        base, vector = self.fitted.extension.base, self.fitted.vector
+        known = np.linalg.inv(base.prior[: base.known].T @ base.prior[: base.known] + _nowhere(base.law.size, vector))
+        found = {}
+        for name in (*base.axes, "scale", "length"):
+            at = base.names.index(name)
+            unit = -base.length if name == "length" else 1.0
+            std, before = (abs(unit) * float(np.sqrt(table[at, at])) for table in (self.covariance, known))
+            found[name] = unit * float(vector[at]), std, before
+        return found
+
+    def chi2(self, kind: str, step: int | None = None) -> tuple[float, int]:
+        """Sum of squares and number of the residuals of a kind (`KINDS`), of one step (its index) or of all."""
+        if self.fitted is None or self.observation is None:
+            return 0.0, 0
+        if kind == "prior":
+            value = self.fitted.residual[self.observation.rows.count :]
+        else:
+            rows = self.observation.rows
+            own = (rows.kind == KINDS.index(kind)) & ((rows.step == step) if step is not None else True)
+            value = self.fitted.residual[: rows.count][own]
+        return float(value @ value), value.size
+
+
+def _nowhere(law: int, vector: Array) -> Array:
+    """A precision for law and K0, of which nothing is known, so that that of all others can be inverted."""
+    return np.diag((np.arange(vector.size) <= law).astype(float))
+
+
+def estimate(
+    test: MeasuredTest,
+    *,
+    near: MeasuredLaw | None = None,
+    begin: tuple[float, float] | None = None,
+    elements: int = ELEMENTS,
 ) -> Estimate:
-    """Estimate from a settled fit: curves on the visited range with bands by propagation."""
-    p, u = model.basis.size, found.unknowns
-    by_forces = _moved_by_forces(model, found, posterior.covariance)
+    """Characteristic, pre-curvature and their uncertainty by fitting the simulated experiment.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    near : MeasuredLaw or None
+        A law to start from where photos and forces show none by themselves.
+    begin : (N m^2, 1/m) or None
+        Constant EI and K0 to start from; None takes both from the curvatures that photos show over the moment P y.
+    elements : int
+        Of the simulated cable.
+
+    Returns
+    -------
+    Estimate
+        Look at ``outcome``.
+
+    Raises
+    ------
+    ValueError
+        If two steps have one number.
+    """
+    if len({step.step for step in test.steps}) < len(test.steps):
+        raise ValueError("every step of a test needs a number of its own")
+    test = _driven(replace(test, steps=tuple(step for step in test.steps if _tells(step))))
+    rest = frozenset(i for i, step in enumerate(test.steps) if step.branch == "mounted")
+    if not any(step.shape is not None and step.force != 0.0 for i, step in enumerate(test.steps) if i not in rest):
+        return Estimate(InverseOutcome.NO_DATA)
+    curvatures, moments = measured_curvatures(test)
+    if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
+        return Estimate(InverseOutcome.OPPOSITE_FORCES)
+    observation, fitted = base_fit(test, facts_of(test), near=near, begin=begin, elements=elements, without_forces=rest)
+    if fitted.run.prediction is None:
+        limit = fitted.run.failed is Outcome.LIMIT_POINT
+        return Estimate(InverseOutcome.LIMIT_POINT if limit else InverseOutcome.NO_EQUILIBRIUM)
+    return _read_off(test, observation, mean_law(observation, fitted), rest)
+
+
+def _tells(step: MeasuredStep) -> bool:
+    """Whether a step says something about the cable: a photo, or the force at a displacement."""
+    return _shown(step) or (step.branch != "mounted" and step.displacement is not None)
+
+
+def _shown(step: MeasuredStep) -> bool:
+    return step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
+
+
+def _driven(test: MeasuredTest) -> MeasuredTest:
+    """The test as it drives the simulation: by chords alone, so that a wrong zero of the log moves nothing.
+
+    The chord of a step without a photo is that of the log, whose zero the photos of the others tell. A force is that of
+    its photo, whatever it does during the hold.
+    """
+    loaded = [step for step in test.steps if _shown(step) and step.displacement is not None]
+    zeros = np.array([_chord(step) + (step.displacement or 0.0) for step in loaded])
+    scatter = float(zeros.std(ddof=1)) if zeros.size > 1 else 0.0
+    std = np.hypot(scatter, max((step.chord_std or 0.0 for step in loaded), default=0.0))
+
+    def driven(step: MeasuredStep) -> MeasuredStep:
+        free = replace(step, displacement=None, displacement_std=None, hold_forces=None, hold_times=None)
+        if _shown(step):
+            return replace(free, chord=_chord(step), displacement=0.0 if step.branch == "mounted" else None)
+        if step.displacement is None or not zeros.size:
+            return replace(step, shape=None, chord=None, hold_forces=None, hold_times=None)
+        own = np.hypot(std, step.displacement_std or 0.0)
+        return replace(free, shape=None, chord=float(zeros.mean()) - step.displacement, chord_std=float(own))
+
+    return replace(test, steps=tuple(driven(step) for step in test.steps))
+
+
+def _chord(step: MeasuredStep) -> float:
+    """Distance of the axes by a photo, m; of its ends, where the photo does not tell."""
+    assert step.shape is not None
+    x, y = step.shape.x, step.shape.y
+    return float(np.hypot(x[-1] - x[0], y[-1] - y[0])) if step.chord is None else step.chord
+
+
+def _read_off(test: MeasuredTest, observation: Observation, fitted: Fit, rest: frozenset[int]) -> Estimate:
+    """Curves on the visited range with bands by propagation."""
+    base, size = fitted.extension.base, fitted.extension.size
+    law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
+    posterior = rows_posterior(fitted, *linearised(observation, fitted, np.zeros((len(fitted.residual), 0))))
+    errors = [np.array([each.get(step.step, 0.0) for step in test.steps]) for each in test.common_force_errors]
+    by_forces = moved_by_forces(observation, fitted, posterior.covariance, errors)
     covariance = posterior.covariance + by_forces @ by_forces.T
-    curve, K0 = model.law(u), model.pre_curvature(u)
-    visited = [float(v) for fit in found.steps for v in (fit.simulated.kappa.min(), fit.simulated.kappa.max())]
-    # the abscissa was laid along the fit before the last: beyond it, by a little at most, nothing is known of the law
-    low, high = np.clip([min(visited), max(visited)], K0 + curve.bends[0], K0 + curve.bends[-1])
-    kappa = np.linspace(low, high, grid)
-    moment, f = curve.bound(np.array([K0]))(kappa)
-    by_moment, by_log = np.zeros((kappa.size, u.size)), np.zeros((kappa.size, u.size))
-    by_moment[:, :p] = curve.moment_by_parameters(kappa, K0)
-    by_moment[:, p] = -f / model.length
-    by_log[:, :p] = curve.log_tangent_by_parameters(kappa, K0)
-    by_log[:, p] = curve.log_slope(moment) * f / model.length
-    scale = _unknown_scale(model, found, by_log @ covariance @ by_log.T)
-    law = propagated(
+    kappa = K0 + np.linspace(min(float(fitted.excess.min()), 0.0), float(fitted.excess.max()), POINTS)
+    by_log, by_moment = by_parameters(fitted, kappa)
+    moment, scale = law.moment(kappa, K0), _unknown_scale(observation, fitted, by_log @ covariance @ by_log.T)
+    measured = propagated(
         kappa,
         K0,
         moment=moment,
-        tangent=f,
+        tangent=law.tangent(kappa, K0),
         by_moment=np.column_stack([by_moment, scale * moment]),
         by_log=np.column_stack([by_log, np.full(kappa.size, scale)]),
-        by_pre_curvature=np.eye(u.size + 1)[p] / model.length,
-        covariance=np.pad(covariance, (0, 1)) + np.diag(np.eye(u.size + 1)[-1]),
+        by_pre_curvature=np.eye(size + 1)[base.law.size],
+        covariance=np.pad(covariance, (0, 1)) + np.diag(np.eye(size + 1)[-1]),
     )
-    splines = model.basis.at(moment)
-    rest = tuple(name for name in found.blocks if _is_rest(model, name))
-    loaded = _without(model, found, rest) if rest else replace(posterior, mean=u)
-    blurred = model.blur != (1.0, 1.0)
-    return Estimate(
-        outcome=outcome,
-        characteristic=curve,
-        law=replace(
-            law,
-            gains=_gains(model, found, by_log @ posterior.covariance) | {("common_force", -1): by_log @ by_forces},
-            # coefficients of log c = -log f by least squares on the grid, which covers the moments of the basis
-            shortfall=by_log @ posterior.shrinkage @ np.linalg.pinv(splines),
-            loaded_pre_curvature=float(loaded.mean[p]) / model.length,
-            loaded_pre_curvature_std=float(np.sqrt(loaded.covariance[p, p])) / model.length,
-        ),
-        law_forms=splines @ posterior.law_forms,
-        model=model,
-        evaluation=evaluate(replace(model, blur=(1.0, 1.0)), u, starts=found.equilibria) if blurred else found,
-        unknowns=u,
-        covariance=covariance,
-        invisible=invisible_combinations(model, law, covariance),
+    splines, (loaded, loaded_std) = law.basis.at(kappa - K0), loaded_pre_curvature(test, observation, fitted, rest)
+    measured = replace(
+        measured,
+        gains=gains(test, observation, fitted, by_log @ posterior.covariance)
+        | {("common_force", -1): by_log @ by_forces},
+        # coefficients of log f by least squares on the grid, which covers the bends of the basis
+        shortfall=-by_log @ posterior.shrinkage @ np.linalg.pinv(splines),
+        loaded_pre_curvature=loaded,
+        loaded_pre_curvature_std=loaded_std,
     )
+    invisible = invisible_combinations(measured, test.length)
+    outcome = InverseOutcome.CONVERGED if fitted.converged else InverseOutcome.STALLED
+    if fitted.converged and invisible:
+        outcome = InverseOutcome.NOT_VISIBLE
+    forms = splines @ posterior.law_forms
+    return Estimate(outcome, test, observation, fitted, covariance, measured, forms, invisible)
 
 
-def _unknown_scale(model: FitModel, found: Evaluation, log_covariance: Array) -> float:
+def by_parameters(fitted: Fit, K: Array) -> tuple[Array, Array]:
+    """Derivatives (n, p) of log f_EI and of the moment (N m) at curvatures (n,) 1/m by the vector of a fit."""
+    base, law = fitted.extension.base, law_of(fitted)
+    K0, own, bend = base.pre_curvature(fitted.vector), law.parameters, base.pre_curvature_index
+    by_log, by_moment = np.zeros((2, len(K), fitted.extension.size))
+    by_log[:, :own] = law.log_tangent_by_parameters(K, K0)
+    by_moment[:, :own] = law.moment_by_parameters(K, K0)
+    if bend is not None:
+        by_log[:, bend] = -law.log_slope(K, K0)
+        by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
+    return by_log, by_moment
+
+
+def _unknown_scale(observation: Observation, fitted: Fit, log_covariance: Array) -> float:
     """Standard deviation of a common factor of f by which the covariance (n, n) of log f falls short of the forces.
 
-    Only forces tell it, and no law knows it better. A prior of its form over an abscissa of moments holds it all the
+    Only forces tell it, and no law knows it better. A prior of its form over an abscissa of bends holds it all the
     same: by nothing where forces are good to a per cent, too sharply where they contradict each other by many.
     """
-    known = [(s.simulated.force / (s.data.step.force_std * model.blur[1])) ** 2 for s in found.steps if s.force]
-    return float(np.sqrt(max(1.0 / sum(known) - float(log_covariance.mean()), 0.0)))
+    assert fitted.run.prediction is not None
+    weight = float(weights(observation, fitted)[observation.rows.force].min(initial=1.0))
+    holds = zip(observation.forces, fitted.run.prediction.force, observation.force_std, strict=True)
+    known = sum(len(data) * (weight * force / std) ** 2 for data, force, std in holds)
+    return float(np.sqrt(max(1.0 / known - float(log_covariance.mean()), 0.0)))
 
 
-def _without(model: FitModel, found: Evaluation, blocks: tuple[str, ...]) -> Posterior:
-    """The posterior with some blocks of the data left out."""
-    keep = np.ones(found.value.size, dtype=bool)
-    for name in blocks:
-        keep[found.blocks[name]] = False
-    return averaged(found.value[keep], found.jacobian[keep], found.unknowns, priors(model.basis))
-
-
-def invisible_combinations(
-    model: FitModel, law: MeasuredLaw, covariance: Array
-) -> tuple[tuple[float | None, float], ...]:
+def invisible_combinations(law: MeasuredLaw, length: float) -> tuple[tuple[float | None, float], ...]:
     """Parts of the law and K0 whose standard deviation exceeds `INVISIBLE`.
 
     Returns
@@ -177,38 +315,6 @@ def invisible_combinations(
         worst = int(np.argmax(std[where])) + (where.start or 0)
         if std[worst] > INVISIBLE:
             open_ones.append((float(law.kappa[worst]), float(std[worst])))
-    K0_std = float(np.sqrt(covariance[model.basis.size, model.basis.size]))
-    if K0_std > INVISIBLE:
-        open_ones.append((None, K0_std / model.length))
+    if law.pre_curvature_std * length > INVISIBLE:
+        open_ones.append((None, law.pre_curvature_std))
     return tuple(open_ones)
-
-
-def _is_rest(model: FitModel, block: str) -> bool:
-    kind, _, step = block.partition("/")
-    return kind in ("shape", "chord") and any(d.at_rest and str(d.step.step) == step for d in model.data)
-
-
-def _moved_by_forces(model: FitModel, found: Evaluation, response: Array) -> Array:
-    """Moves (q, e) of the unknowns by errors that several forces have in common."""
-    moved = np.zeros((response.shape[0], len(model.force_errors)))
-    for fit in found.steps:
-        step = fit.data.step
-        if fit.force is not None:
-            J = found.jacobian[found.blocks[f"force/{step.step}"]]
-            newtons = [errors.get(step.step, 0.0) for errors in model.force_errors]
-            moved -= np.outer(response @ J[0], newtons) / (step.force_std * model.blur[1])
-    return moved
-
-
-def _gains(model: FitModel, found: Evaluation, response: Array) -> dict[Source, Array]:
-    """Response of log(tangent) to every source of error; `response` (n, q) is its derivative by -J^T dr."""
-    gains: dict[Source, Array] = {}
-    for name in model.nuisances:
-        part, _, step = name.partition("/")
-        # With the normal matrix A and a nuisance e of prior variance 1: A^-1 (A - 1) e - e = -A^-1 e.
-        gains[part, int(step or -1)] = -response[:, [model.index(name)]]
-    for name, rows in found.blocks.items():
-        part, _, step = name.partition("/")
-        if part in ("shape", "force"):
-            gains["photo" if part == "shape" else part, int(step)] = -response @ found.jacobian[rows].T
-    return gains

@@ -1,188 +1,242 @@
-"""The fit of the inverse problem: Gauss-Newton toward the posterior mean, over all priors of the law's form at once.
+"""Fit of a model to an observation: Gauss-Newton on whitened residuals, damped where whole steps lead nowhere.
 
-Every iteration simulates the test, linearises, and moves to the mean over the priors (`rod.law_prior`), so no prior is
-chosen on the way. Where the law falls steeply, a method that lets the cost never rise creeps along a curved valley;
-whole steps, held back only in the law and K0, leave it. To keep them on the way the noise is taken larger at first
-(`LOUD`), and the abscissa of the law is laid along the law found so far (`rod.compliance_law.refreshed`) whenever
-the noise is lowered.
+What is fitted is an `extension.Extension`, the base model with or without causes added; rows and columns of the linear
+problem are those of `fits.sensitivities`. One iteration takes the first of these that lowers chi-square: the whole
+step, a part of it, steps of rising damping (Levenberg, Marquardt). It ends when the linear model promises nothing more,
+when a step brought nothing, when it crawls, or when what is left could not save a model that lies too far behind.
+
+Nothing here raises for a model without equilibrium: the step is shortened, and a fit that cannot start says so in
+``Fit.advice``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.compliance_law import refreshed
-from rod.inverse.evaluation import Evaluation, evaluate
-from rod.inverse.fit_model import FitModel
-from rod.law_prior import Posterior, averaged, priors
+from rod.inverse.extension import Extension
+from rod.inverse.observation import Observation
+from rod.inverse.prediction import Model
+from rod.inverse.sensitivities import sensitivities, whole_residual
+from rod.inverse.simulation import Run, run
+from rod.inverse.step import Linearised, lasting, reach
 
 Array = NDArray[np.float64]
 
-LOUD, LOWERED = 30.0, 6.0
-"""Factor on the noise that a fit begins with, or what its start asks for, and by how much it is lowered from stage to
-stage: a start that is off by a factor of two is ten standard deviations of good photos away, where their linearisation
-says nothing."""
+ITERATIONS, TOLERANCE = 15, 1e-3
+"""Gauss-Newton steps at most, where three to five are usual; change of chi-square at which a fit is done."""
 
-FOLLOWS = 2.0
-"""Root mean square of whitened residuals above which the simulation does not follow the data; no luck makes as much."""
+FITS = 1.4
+"""Reduced chi-square up to which a model explains the data: above it other starts and forms are tried."""
 
-ROUGHLY, FINELY = 0.5, 0.002
-"""Standard deviations by which the unknowns may still move where the noise is lowered, and in the end."""
+CRAWL, PATIENCE = 2e-3, 4
+"""Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
 
-LAYINGS = 2
-"""Times that the abscissa is laid along the law found in the end; each leaves a quarter of what the way there left."""
+FAR, CRAWL_FAR = 16.0, 1e-2
+"""Reduced chi-square (4 sigma rms) beyond which a fit is none that anything is read from, and that share there: data
+that no model explains else kept every one of hundreds of fits at work on a hundredth of its misfit."""
 
-LAW_STEP = 1.0
-"""Of log c in one step: a factor e."""
-
-BEND_STEP = 0.3
-"""Of K0 in one step, over the range of the bend."""
-
-EVALUATIONS = 60
-"""Bound of one fit; ten are usual."""
-
-SHORTER = 6
-"""Halvings of a step that leads to a cable without equilibrium."""
+PART = 0.4
+"""Share of a step that leads too far; where amount and stiffness act as a product, halves of a step did."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit that ended: model, last evaluation with the posterior there, number of evaluations, and whether settled."""
+    """A fitted model.
 
-    model: FitModel
-    evaluation: Evaluation
-    posterior: Posterior | None
-    evaluations: int
-    settled: bool
+    Attributes
+    ----------
+    extension : Extension
+    vector : (p,)
+    run : Run
+    residual : (N,)
+        Whitened, prior rows last.
+    jacobian : (N, p)
+        Sensitivities of the model: ``d residual = - jacobian d vector``; prior rows ``1 / std``.
+    converged : bool
+    """
+
+    extension: Extension
+    vector: Array
+    run: Run
+    residual: Array
+    jacobian: Array
+    converged: bool
 
     @property
-    def misfit(self) -> tuple[float, float]:
-        """Root mean square of the residuals of shapes and forces in units of the noise of `model`; 1 where unknown."""
-        shapes, forces = (self._rms(kind) for kind in ("shape", "force"))
-        return shapes, forces
-
-    def _rms(self, kind: str) -> float:
-        chi2, count = self.evaluation.chi2(kind)
-        return float(np.sqrt(chi2 / count)) if count else 1.0
+    def chi2(self) -> float:
+        """Sum of squares, priors included."""
+        return float(self.residual @ self.residual)
 
     @property
-    def log_evidence(self) -> float:
-        """Log evidence of the data with their stated noise; minus infinity where nothing was fitted."""
-        if self.posterior is None:
-            return -np.inf
-        counts = (self.evaluation.chi2(kind)[1] for kind in ("shape", "force"))
-        louder = sum(count * np.log(blur) for count, blur in zip(counts, self.model.blur, strict=True))
-        return self.posterior.log_evidence - float(louder)
+    def reduced_chi2(self) -> float:
+        """Chi-square per degree of freedom; 1 is noise."""
+        return self.chi2 / max(len(self.residual) - self.extension.size, 1)
 
-    def moments(self) -> tuple[float, float]:
-        """Smallest and largest bending moment of the simulated cable over all steps, N m."""
-        law, K0 = self.model.law(self.evaluation.unknowns), self.model.pre_curvature(self.evaluation.unknowns)
-        kappas = np.concatenate([step.simulated.kappa for step in self.evaluation.steps])
-        m = law.moment(np.array([kappas.min(), kappas.max()]), K0)
-        return float(m[0]), float(m[1])
+    @property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the parameters; invisible combinations get a huge variance, not an infinite one."""
+        size = np.linalg.norm(self.jacobian, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        _, weight, right = np.linalg.svd(self.jacobian / size, full_matrices=False)
+        root = right.T / np.maximum(weight, 1e-8 * weight[0])
+        return np.asarray((root @ root.T) / np.outer(size, size))
 
+    @property
+    def excess(self) -> Array:
+        """Curvatures (n,) of all steps beyond what each place of the cable has at rest, 1/m; its outermost ends apart.
 
-def fit(model: FitModel, start: Array) -> Fit:
-    """Fit from the unknowns `start` (q,).
+        For what a set adds to the rest see `rod.section`: it is not taken off.
+        """
+        rod = self.run.model.bending.rod
+        K0, first = rod.section.pre_curvature, 1 if rod.edges[0] else 0
+        return np.concatenate([(step.kappa[first : first + K0.size] - K0)[2:-2] for step in self.run.steps])
 
-    The noise is lowered to what is stated, or as far as the simulation follows the data. Where it does not, its misfit
-    counts as noise from there on: a law that is let follow closer bends to hide what the simulation lacks.
-    """
-    found, loud = Fit(model, evaluate(model, start), None, 1, False), None
-    used, noise = 1, max(LOUD, max(found.misfit) / FOLLOWS)
-    while found.evaluation.failure is None:
-        # toward data that contradict each other laws become wavy, and cost fifty times as much: foreseen, not tried
-        misfit = (0.0, 0.0) if loud is None else _foreseen(loud, noise)
-        if max(misfit) <= FOLLOWS:
-            quiet = _quieter(found, (noise, noise), FINELY if noise == 1.0 else ROUGHLY, EVALUATIONS - used)
-            used, misfit = used + quiet.evaluations, quiet.misfit
-        if loud is not None and max(misfit) > FOLLOWS:
-            found = _quieter(loud, _needed(loud, misfit, noise), ROUGHLY)
-            used += found.evaluations
-            break
-        found = loud = quiet
-        if noise == 1.0 or not found.settled:
-            break
-        noise = max(1.0, noise / LOWERED)
-    if found.settled:
-        # along the law found: where the abscissa was laid before depends on the way here
-        within = FINELY if max(found.model.blur) == 1.0 else ROUGHLY
-        for _ in range(LAYINGS):
-            if found.settled:
-                found = _quieter(found, found.model.blur, within, smooth=True)
-                used += found.evaluations
-    return replace(found, evaluations=used)
+    def amount(self, term: int) -> tuple[float, float]:
+        """Amount of a term and its standard deviation."""
+        at = self.extension.amounts_at[term]
+        return float(self.vector[at]), float(np.sqrt(self.covariance[at, at]))
 
 
-def _foreseen(found: Fit, noise: float) -> tuple[float, float]:
-    """`Fit.misfit` after a fit with another noise, to first order; the law stays within about a factor e."""
-    here, p, louder = found.evaluation, found.model.basis.size, np.ones(found.evaluation.value.size)
-    for name, block in here.blocks.items():
-        if name != "prior":
-            louder[block] = found.model.blur[name.startswith("force/")] / noise
-    value, J = louder * here.value, louder[:, None] * here.jacobian
-    move = np.linalg.lstsq(np.vstack([J, np.eye(p, J.shape[1])]), np.concatenate([-value, np.zeros(p)]), rcond=None)[0]
-    return replace(found, evaluation=replace(here, value=value + J @ move)).misfit
-
-
-def _needed(loud: Fit, misfit: tuple[float, float], noise: float) -> tuple[float, float]:
-    """Noise of shapes and forces with which residuals agree: by the last fit that followed them, as stated at least.
-
-    ``misfit`` is what is left with a lower ``noise`` of both.
-    """
-    needed = []
-    for one, other, blur in zip(loud.misfit, misfit, loud.model.blur, strict=True):
-        rms = blur * one if other > FOLLOWS else min(blur * one, noise * other)
-        needed.append(rms if rms > FOLLOWS else 1.0)
-    return needed[0], needed[1]
-
-
-def _quieter(
-    found: Fit, noise: tuple[float, float], within: float, evaluations: int = EVALUATIONS, *, smooth: bool = False
+def fit(
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    *,
+    iterations: int = ITERATIONS,
+    tolerance: float = TOLERANCE,
+    near: Run | None = None,
+    cutoff: float = 1e-7,
+    begin: Fit | None = None,
+    kept: NDArray[np.bool_] | None = None,
+    hopeless: float = np.inf,
 ) -> Fit:
-    """From a fit on with another noise, the abscissa of the law laid along the law found."""
-    model, u = found.model, found.evaluation.unknowns
-    if found.posterior is not None:
-        known = found.posterior.covariance[: model.basis.size, : model.basis.size]
-        model, u = model.on(refreshed(model.law(u), known, *found.moments()), u)
-    return _settle(replace(model, blur=noise), u, found.evaluation, within, evaluations, smooth=smooth)
+    """Gauss-Newton with shortened steps from ``start``.
+
+    Parameters
+    ----------
+    observation : Observation
+    extension : Extension
+    start : (p,)
+    iterations : int
+        At most.
+    tolerance : float
+        Fall of chi-square, over the reduced chi-square where that is above 1, at which the fit is done.
+    near : Run or None
+        Run of a similar model, for warm starts.
+    cutoff : float
+        Combinations of parameters that show less than this share of the clearest one stay where they are.
+    begin : Fit or None
+        Fit of this model to this observation, to go on from: nothing is computed anew at its vector.
+    kept : (N,) bool or None
+        Rows the model is fitted to; all of them are predicted.
+    hopeless : float
+        Chi-square above which the fit is of no use: it ends where the steps left, each as good as the better of the
+        last two, would not get there; as converged if whole steps are taken and the linear model promises no more.
+
+    Returns
+    -------
+    Fit
+        ``converged`` is False if the iterations ran out or the start has no equilibrium.
+    """
+    if begin is None:
+        begin = evaluated(observation, extension, np.asarray(start, dtype=float), near)
+        if begin.run.prediction is None:
+            return begin
+    state = _State(begin.vector, extension.base_model(begin.vector), begin.run, begin.residual)
+    jacobian = begin.jacobian
+    rows = np.ones(len(state.residual), dtype=bool) if kept is None else kept
+    converged, damping, crawled, falls = False, 0.0, 0, [np.inf, np.inf]
+    for left in range(iterations, 0, -1):
+        cost = state.cost(rows)
+        bounds = lasting(extension, state.vector)
+        linear = Linearised(jacobian[rows], state.residual[rows], cutoff, bounds, reach(extension))
+        left_over = max(cost / max(int(rows.sum()), 1), 1.0)  # a sigma of what a misfit leaves is no sigma of the noise
+        if linear.expected_fall < tolerance * left_over:
+            converged = True
+            break
+        if cost - left * max(falls[-2:]) > hopeless:
+            converged = damping == 0.0 and cost - linear.expected_fall > hopeless
+            break
+        lower = _lower(observation, extension, state, linear, damping, rows)
+        if lower is None:
+            converged = linear.expected_fall < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
+            break
+        raised, (state, damping) = lower[1] > damping > 0.0, lower
+        jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.run)
+        fall = cost - state.cost(rows)
+        falls.append(fall)
+        if fall < tolerance * left_over and damping == 0.0:
+            converged = True
+            break
+        crawled = crawled + 1 if damping > 0.0 and fall < (CRAWL if left_over < FAR else CRAWL_FAR) * cost else 0
+        if crawled == PATIENCE:
+            break
+        if not raised:  # what was too little a step ago is not tried again at once
+            damping = 0.1 * damping if damping > 1e-4 else 0.0
+    return Fit(extension, state.vector, state.run, state.residual, jacobian, converged)
 
 
-def _settle(model: FitModel, start: Array, near: Evaluation, within: float, evaluations: int, *, smooth: bool) -> Fit:
-    """Gauss-Newton until the unknowns move by less than `within` standard deviations; see `priors` for `smooth`."""
-    forms = priors(model.basis, smooth=smooth)
-    here, count = evaluate(model, start, starts=near.equilibria), 1
-    if here.failure is not None:
-        return Fit(model, here, None, count, False)
-    share, before = 1.0, np.zeros(len(model.basis.at_ends))
-    while True:
-        posterior = averaged(here.value, here.jacobian, here.unknowns, forms)
-        move = posterior.mean - here.unknowns
-        settled = bool(np.all(np.abs(move) <= within * np.sqrt(np.diag(posterior.covariance)) + 1e-12))
-        if settled or count >= evaluations:
-            return Fit(model, here, posterior, count, settled)
-        # a step back on the one before overshot the same valley: half as far, until steps agree again
-        law = model.basis.at_ends @ move[: model.basis.size]
-        share = 0.5 * share if law @ before < 0.0 else min(1.0, 2.0 * share)
-        before, move = law, share * move * min(1.0, _reach(model, here, move))
-        for _ in range(SHORTER):
-            there = evaluate(model, here.unknowns + move, starts=here.equilibria)
-            count += 1
-            if there.failure is None:
-                break
-            move = 0.5 * move
-        if there.failure is not None:
-            return Fit(model, here, posterior, count, False)
-        here = there
+def fit_from(
+    observation: Observation,
+    extension: Extension,
+    start: Array,
+    near: Fit,
+    *,
+    hopeless: float = np.inf,
+) -> Fit:
+    """A fit whose equilibria are sought from those of a fitted neighbour; see `fit`."""
+    return fit(observation, extension, start, near=near.run, hopeless=hopeless)
 
 
-def _reach(model: FitModel, here: Evaluation, move: Array) -> float:
-    """Share of a step that moves law and K0 as far as one step may."""
-    p = model.basis.size
-    log_c = float(np.abs(model.basis.at_ends @ move[:p]).max())
-    kappas = np.concatenate([step.simulated.kappa for step in here.steps])
-    bend = BEND_STEP * max(float(np.ptp(kappas)), 1e-12) * model.length
-    return min(LAW_STEP / max(log_c, 1e-300), bend / max(abs(float(move[p])), 1e-300))
+def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:
+    """The model at a vector (p,), not fitted; without residual and Jacobian where it has no equilibrium there."""
+    base_model = extension.base_model(vector)
+    here = run(extension.model(vector, of=base_model), extension.facts, near=near)
+    value = whole_residual(observation, here.prediction, vector, extension.prior)
+    if value is None:
+        return Fit(extension, vector, here, np.zeros(0), np.zeros((0, extension.size)), False)
+    jacobian = sensitivities(observation, extension, vector, base_model, here)
+    return Fit(extension, vector, here, value, jacobian, False)
+
+
+class _State(NamedTuple):
+    """A vector with its base model, its run and its residual."""
+
+    vector: Array
+    base_model: Model
+    run: Run
+    residual: Array
+
+    def cost(self, rows: NDArray[np.bool_]) -> float:
+        """Sum of squares of the named rows."""
+        return float(np.sum(self.residual[rows] ** 2))
+
+
+def _lower(
+    observation: Observation,
+    extension: Extension,
+    state: _State,
+    linear: Linearised,
+    damping: float,
+    rows: NDArray[np.bool_],
+) -> tuple[_State, float] | None:
+    """First state of lower chi-square, and the damping that led there; None where eight trials find none.
+
+    A whole step first; then a part of it, which follows a curved valley where damping would creep along its wall; then
+    steps of rising damping.
+    """
+    least = max(damping, 1e-5)
+    for used, share in ((damping, 1.0), (least, PART), *((least * 10.0**k, 1.0) for k in range(1, 7))):
+        trial = extension.brought_inside(state.vector + share * linear.step(used))
+        if not extension.admissible(trial):
+            continue
+        base_model = extension.base_model(trial)
+        there = run(extension.model(trial, of=base_model), extension.facts, near=state.run, patient=False)
+        value = whole_residual(observation, there.prediction, trial, extension.prior)
+        if value is not None and np.sum(value[rows] ** 2) < state.cost(rows):
+            return _State(trial, base_model, there, value), used
+    return None

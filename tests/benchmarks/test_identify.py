@@ -9,13 +9,13 @@ import time
 
 import numpy as np
 import pytest
+from rod.inverse.evaluation import evaluate
+from rod.inverse.fit_model import fit_model, step_data
 
 from rod.balance import balance
 from rod.bending_test import TABLE_1_KNOTS, simulate, table_1
 from rod.compliance_law import ComplianceLaw, moment_basis
 from rod.inverse import estimate
-from rod.inverse.evaluation import evaluate
-from rod.inverse.fit_model import fit_model, step_data
 from rod.paper_fit import Virtual, paper_fit
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import bending_test

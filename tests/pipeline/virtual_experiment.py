@@ -9,9 +9,6 @@ from dataclasses import replace
 from pipeline.identify.parts import curve
 from pipeline.result import InversePart, Result, ScalePart, SpecimenPart
 from rod.inverse import estimate
-from rod.inverse.options import InverseOptions
-
-QUICK = InverseOptions(elements=80, blocks=80)
 
 
 def without(test, step):
@@ -21,7 +18,7 @@ def without(test, step):
 
 def identified(test, *, name="virtual", way=None):
     """Result with the inverse part alone."""
-    way = way or estimate(test, options=QUICK)
+    way = way or estimate(test)
     return Result(
         status="measured",
         specimen=SpecimenPart(id=name, length_m=test.length, diameter_m=0.005, folder=name, moving_bearing="left"),

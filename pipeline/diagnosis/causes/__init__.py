@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pipeline.diagnosis.causes.bow import OutOfPlaneBow
 from pipeline.diagnosis.causes.camera import CameraTilt, LensDistortion, ScaleError
-from pipeline.diagnosis.causes.cause import Cause, Variant
 from pipeline.diagnosis.causes.law import Hysteresis, NonlinearStiffness, PlasticSet, StiffnessDrift
 from pipeline.diagnosis.causes.load_cell import ForceDrift, ForceGain, ForceOffset, Relaxation
 from pipeline.diagnosis.causes.profile import PreCurvatureVarying, StiffnessVarying
@@ -21,6 +20,7 @@ from pipeline.diagnosis.causes.rig import (
     RigCompliance,
     RigidEnds,
 )
+from rod.inverse.cause import Cause, Variant
 
 __all__ = ["CATALOGUE", "SUSPECTS", "Cause", "Variant"]
 

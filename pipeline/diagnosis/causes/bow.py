@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
+from rod.inverse.cause import Cause, Variant
+from rod.inverse.prediction import Facts, Model, Prediction
 
 SOFT = 8
 """How sharply the sine of the angle comes to its end at one: at 0.7 it is still right to 0.7 %."""

@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
+from rod.inverse.cause import Cause, Variant
+from rod.inverse.prediction import Facts, Model, Prediction
 from rod.section import InternalFriction
 
 Array = NDArray[np.float64]

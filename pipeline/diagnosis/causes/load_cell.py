@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import PLAIN, Cause, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model, Observer, Prediction
+from rod.inverse.cause import PLAIN, Cause, Variant
+from rod.inverse.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model
+from rod.inverse.cause import Cause, Variant
+from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
 
@@ -179,19 +179,6 @@ def largest_of(forms: Sequence[Variant], amounts: Array, covariance: Array, caus
     return np.asarray(table[int(np.argmax(size - 2.0 * std))])
 
 
-def is_profile(cause: Cause) -> bool:
-    """Whether a cause is one of this module."""
-    return isinstance(cause, PreCurvatureVarying | StiffnessVarying)
-
-
-def along_cable(cause: Cause, variant: Variant, model: Model) -> tuple[str, Array]:
-    """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which."""
-    if isinstance(cause, PreCurvatureVarying):
-        return "pre_curvature", profile(variant, position_of(model))
-    moves = profile(variant, position_of(model), from_beside=True)
-    return "stiffness_profile", np.where(_factor(model) > LEAST, moves, 0.0)
-
-
 def position_of(model: Model) -> Array:
     """Relative position 0..1 of the joints on the free cable."""
     return np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
@@ -205,6 +192,7 @@ class PreCurvatureVarying(Cause):
     combines = True
     limited = True
     seat = "cable"
+    varies = True
 
     def plausible(self, facts: Facts) -> float:
         """A change of direction of a tenth of a radian over the cable."""
@@ -219,6 +207,10 @@ class PreCurvatureVarying(Cause):
         rest = model.bending.rod.section.pre_curvature + amount * profile(variant, position_of(model))
         return replace(model, bending=replace(model.bending, pre_curvature=rest))
 
+    def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
+        """The pre-curvature."""
+        return "pre_curvature", profile(variant, position_of(model))
+
 
 class StiffnessVarying(Cause):
     """``stiffness_varying``: the cable is not equally stiff everywhere."""
@@ -227,6 +219,7 @@ class StiffnessVarying(Cause):
     unit = "-"
     combines = True
     seat = "cable"
+    varies = True
 
     def plausible(self, facts: Facts) -> float:
         """A tenth."""
@@ -245,3 +238,8 @@ class StiffnessVarying(Cause):
             + (0.0 if given is None else given - 1.0)
         )
         return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, LEAST)))
+
+    def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
+        """The factor on the moments, where it is not at its least."""
+        moves = profile(variant, position_of(model), from_beside=True)
+        return "stiffness_profile", np.where(_factor(model) > LEAST, moves, 0.0)

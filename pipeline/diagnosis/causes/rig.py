@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.observations.prediction import Facts, Model
+from rod.inverse.cause import Cause, Variant
+from rod.inverse.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
 """Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnosis.explanations.search import Search
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Posterior
 from pipeline.diagnosis.statistics.twins import between_causes, cosines
+from rod.inverse.fit import Fit
 
 
 @dataclass(frozen=True, eq=False)

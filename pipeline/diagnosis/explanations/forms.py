@@ -16,11 +16,11 @@ from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import form_between
 from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import fit_term
-from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.score import descending
+from rod.inverse.extension import Extension, Term
+from rod.inverse.fit import Fit, fit_from
+from rod.inverse.observation import Observation
 
 SHAPES_MOST = 3
 """Forms of one cause that are combined in a refit at most."""

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.profile import WAVE_COST, deviation, is_profile, position_of, profile, wave
+from pipeline.diagnosis.causes.profile import WAVE_COST, deviation, position_of, profile, wave
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
-from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import VISIBLE
-from pipeline.diagnosis.fits.sensitivities import profile_columns
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.score import span
+from rod.inverse.extension import Extension, Term
+from rod.inverse.fit import Fit, fit_from
+from rod.inverse.observation import Observation
+from rod.inverse.sensitivities import profile_columns
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def with_free_profile(observation: Observation, fitted: Fit, cause: Cause, *, ho
     hopeless : float
         Chi-square above which the result is of no use.
     """
-    if not is_profile(cause) or not _may_pay(observation, fitted, cause, hopeless):
+    if not cause.varies or not _may_pay(observation, fitted, cause, hopeless):
         return fitted
     best, most = fitted, fitted.chi2 - (1.0 - SHARED) * _excess(fitted)
     for count in BLOCKS:

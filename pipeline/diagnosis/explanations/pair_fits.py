@@ -12,16 +12,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
-from pipeline.diagnosis.fits.workbench import Workbench, laid_along
+from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
+from rod.inverse.base_fit import laid_along
+from rod.inverse.extension import Extension
+from rod.inverse.fit import Fit, fit_from
 
 
 def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
@@ -92,7 +92,7 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
         fitted, hopeless = pair.fitted, rival + LEAST
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             fitted = with_free_profile(bench.observation, fitted, kind, hopeless=hopeless)
-            if is_profile(kind) or not kind.combines:
+            if kind.varies or not kind.combines:
                 continue
             for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
                 fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
-from pipeline.diagnosis.fits.sensitivities import whole_residual
-from pipeline.diagnosis.observations.observation import Observation
-from pipeline.diagnosis.observations.simulation import run
+from rod.inverse.extension import Extension, Term
+from rod.inverse.fit import Fit, fit_from
+from rod.inverse.observation import Observation
+from rod.inverse.sensitivities import whole_residual
+from rod.inverse.simulation import run
 
 Array = NDArray[np.float64]
 

@@ -20,13 +20,13 @@ import numpy as np
 from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
 from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, settled, together, with_all_forms
 from pipeline.diagnosis.explanations.single_cause import refit_one
-from pipeline.diagnosis.fits.fit import fit_from
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
+from rod.inverse.fit import fit_from
 
 MATTERS = 0.1
 """Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""

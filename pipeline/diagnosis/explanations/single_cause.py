@@ -10,16 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.profile import is_profile
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, differing_by_step, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
-from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.search import Suspicion
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
+from rod.inverse.fit import FITS, Fit
+from rod.inverse.observation import Observation
 
 
 def refit_one(
@@ -37,7 +36,7 @@ def refit_one(
     """
     kind = suspicion.causes[cause]
     hopeless = rival + LEAST
-    found = _in_any_form(observation, base, suspicion, cause, hopeless) if is_profile(kind) else None
+    found = _in_any_form(observation, base, suspicion, cause, hopeless) if kind.varies else None
     if found is None:
         best = _by_setting(observation, base, suspicion, cause, hopeless=hopeless)
         if kind.combines:

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.fit import Fit, evaluated, fit_from
-from pipeline.diagnosis.fits.laws import AnyLaw
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.faults import Faults
 from pipeline.records import doubtful
+from rod.inverse.fit import Fit, evaluated, fit_from
+from rod.inverse.laws import AnyLaw
+from rod.inverse.observation import Observation
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]

@@ -16,9 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.result import CauseForm, Curve
-from rod.stiffness_law import StiffnessLaw
+from rod.inverse.base_fit import law_of
+from rod.inverse.estimate import by_parameters
+from rod.inverse.fit import Fit
+from rod.measured_law import POINTS
 
 Array = NDArray[np.float64]
 
@@ -44,32 +46,18 @@ def stated(fitted: Fit, kappa: Array) -> Stated:
     law, K0 = law_of(fitted), fitted.extension.base.pre_curvature(fitted.vector)
     tangent = law.tangent(kappa, K0)
     rows = np.zeros((len(kappa) + 1, fitted.extension.size))
-    rows[:-1] = _by_parameters(fitted, law, kappa)[0]
+    rows[:-1] = by_parameters(fitted, kappa)[0]
     if (bend := fitted.extension.base.pre_curvature_index) is not None:
         rows[-1, bend] = 1.0
     return Stated(np.append(np.log(tangent), K0), rows)
 
 
-def _by_parameters(fitted: Fit, law: StiffnessLaw, K: Array) -> tuple[Array, Array]:
-    """Derivatives (n, p) of log f_EI and of the moment at curvatures (n,)."""
-    base, own = fitted.extension.base, law.parameters
-    K0 = base.pre_curvature(fitted.vector)
-    by_log, by_moment = np.zeros((2, len(K), fitted.extension.size))
-    by_log[:, :own] = law.log_tangent_by_parameters(K, K0)
-    by_moment[:, :own] = law.moment_by_parameters(K, K0)
-    if (bend := base.pre_curvature_index) is not None:
-        by_log[:, bend] = -law.log_slope(K, K0)
-        by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
-    return by_log, by_moment
-
-
-def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: Fit | None = None) -> Curve:
+def curve(fitted: Fit, *, covariance: Array | None = None, other: Fit | None = None) -> Curve:
     """f_EI and m of a fitted model on its visited range.
 
     Parameters
     ----------
     fitted : Fit
-    points : int
     covariance : (p, p) or None
         Of the vector, where that is known better than from the linearised fit alone.
     other : Fit or None
@@ -78,8 +66,8 @@ def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: F
     base = fitted.extension.base
     law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
     low, high = visited(fitted)
-    K = np.linspace(max(low, K0), high, points)
-    by_log, by_moment = _by_parameters(fitted, law, K)
+    K = np.linspace(max(low, K0), high, POINTS)
+    by_log, by_moment = by_parameters(fitted, K)
     bend = base.pre_curvature_index
     used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
@@ -109,17 +97,10 @@ def curve(fitted: Fit, *, points: int, covariance: Array | None = None, other: F
         tangent_std_Nm2=tangent_std.tolist(),
         secant_Nm2=secant.tolist(),
         secant_std_Nm2=secant_std.tolist(),
-        supported=[True] * points,
+        supported=[True] * POINTS,
         tangent_factor_Nm2=factor.tolist(),
         pre_curvature_factor_per_m=np.concatenate(apart_rest).tolist(),
     )
-
-
-def law_of(fitted: Fit) -> StiffnessLaw:
-    """f_EI of a fitted model whose law may have any form."""
-    law = fitted.extension.base.characteristic(fitted.vector)
-    assert isinstance(law, StiffnessLaw)
-    return law
 
 
 def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = None) -> list[CauseForm]:

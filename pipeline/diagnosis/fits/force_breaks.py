@@ -26,11 +26,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.faults import Faults, ForceCorrection
 from pipeline.messages import Message
 from pipeline.records import Finding, Level, doubtful
+from rod.inverse.fit import fit
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.fits.fit import Fit, fit
 from pipeline.diagnosis.fits.maps import rms_errors
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.statistics.gain import Fold, folds_by_level, held_out
 from pipeline.result import GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.fit import Fit, fit
+from rod.inverse.observation import Observation
 
 SAME_LEVEL = 0.01
 """Share of the travel; loading and unloading steps closer than this are left out together."""

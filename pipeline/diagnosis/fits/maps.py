@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.observations.noise import section_covariance
-from pipeline.diagnosis.observations.observation import KINDS, Observation, normal_distance
+from rod.inverse.fit import Fit
+from rod.inverse.noise import section_covariance
+from rod.inverse.observation import KINDS, Observation, normal_distance
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]

@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.fits.extension import Term
-from pipeline.diagnosis.fits.fit import Fit, fit_from
 from pipeline.diagnosis.fits.search import Suspicion
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.messages import Message, word
 from pipeline.records import Finding, inferred
+from rod.inverse.extension import Term
+from rod.inverse.fit import Fit, fit_from
+from rod.inverse.observation import Observation
 
 
 def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspicion) -> Fit | None:

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.faults import Faults
 from pipeline.records import doubtful
+from rod.inverse.fit import Fit
+from rod.inverse.observation import Observation
 from rod.measurement import MeasuredTest
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.fits.extension import Term
-from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.fits.sensitivities import whole_residual
-from pipeline.diagnosis.observations.observation import Observation
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score, span
+from rod.inverse.extension import Term
+from rod.inverse.fit import Fit
+from rod.inverse.observation import Observation
+from rod.inverse.sensitivities import whole_residual
+from rod.inverse.simulation import run
 
 Array = NDArray[np.float64]
 

@@ -1,8 +1,7 @@
 """From a measured test to a fitted base model with all suspects scored: what every later step works on.
 
-Strategy: fit the base model to the data as stated; calibrate the noise of the photos by what is faster along the cable
-than any misfit; fit again; then score all suspects and simulate the family of scores. The law has so many control
-points that one of any form is followed: a law of another form is no cause.
+Strategy: fit the base model (`rod.inverse.base_fit`); score all suspects; simulate the family of scores. The law is one
+of any form: a law of another form is no cause.
 """
 
 from __future__ import annotations
@@ -14,23 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS, Cause
-from pipeline.diagnosis.fits.base import Base, start
 from pipeline.diagnosis.fits.extended import stiffness_change_linear
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import ITERATIONS, Fit, fit, fit_from
-from pipeline.diagnosis.fits.laws import AnyLaw
 from pipeline.diagnosis.fits.search import Suspicion, suspect
-from pipeline.diagnosis.observations.noise import calibrate_photo_noise
-from pipeline.diagnosis.observations.observation import Observation, normal_distance, observe
-from pipeline.diagnosis.observations.prediction import Facts, facts_of
 from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.balance import BalanceGraph
-from rod.compliance_law import refreshed
+from rod.inverse.base_fit import base_fit
+from rod.inverse.fit import Fit
+from rod.inverse.observation import Observation
+from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
-from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
 
@@ -98,7 +92,7 @@ def prepare(
     settings : DiagnosisSettings
     causes : sequence of Cause
     graph : BalanceGraph or None
-        What the balance equations say of the test, which the fit starts from; found here if not given.
+        What the balance equations say of the test, from which the fit may start.
 
     Returns
     -------
@@ -106,26 +100,16 @@ def prepare(
         The advice of the equilibrium that failed, where no base model can be simulated.
     """
     test = faults.test
-    facts = facts_of(test)
-    observation = observe(test, settings, without_photos=faults.photos, without_forces=faults.forces)
-    base = start(test, facts, elements=settings.grid, exact=settings.displacement_std, graph=graph)
-    fitted = _first_fit(observation, base, facts)
+    observation, fitted = base_fit(
+        test,
+        facts_of(test),
+        near=None if graph is None else graph.law,
+        without_photos=faults.photos,
+        without_forces=faults.forces,
+    )
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
         return ended(fitted.run.failed)
-    if observation.photos:
-        noise = calibrate_photo_noise(
-            [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in observation.photos],
-            [photo.sections for photo in observation.photos],
-            [photo.basis for photo in observation.photos],
-        )
-        observation = observe(
-            test, settings, photo_noise=noise, without_photos=faults.photos, without_forces=faults.forces
-        )
-        here = fitted.extension, fitted.vector
-        # laid along itself the law moves a little, and a cable that was about to snap over may do so
-        again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))
-        fitted = next((found for found in again if found.run.prediction is not None), fitted)
     return scored(test, observation, fitted, causes, settings)
 
 
@@ -155,25 +139,3 @@ def _with_bends(fitted: Fit) -> Facts:
     rest = fitted.extension.base.pre_curvature(fitted.vector)
     bends = [float(step.kappa.max()) - rest for step in fitted.run.steps]
     return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])
-
-
-def _first_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
-    """The model fitted from the law and K0 that photos show; from a constant one where that does not settle."""
-    best: Fit | None = None
-    for vector in (base.as_seen(), base.neutral()):
-        found = fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS)
-        if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
-            best = found
-        if best is not None and best.converged:
-            break
-    return best or found
-
-
-def laid_along(fitted: Fit) -> tuple[Extension, Array]:
-    """The model with the abscissa of its law laid along the law found, over the bends visited, and its vector there."""
-    base, count = fitted.extension.base, fitted.extension.base.law.size
-    law, bends = base.characteristic(fitted.vector), fitted.excess
-    assert isinstance(law, StiffnessLaw)
-    basis = refreshed(law.rise, fitted.covariance[:count, :count], float(bends.min()), float(bends.max()))
-    extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis)))
-    return extension, np.r_[basis.projected(law.rise), fitted.vector[count:]]

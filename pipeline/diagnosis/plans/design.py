@@ -14,15 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS
-from pipeline.diagnosis.fits.base import Base
 from pipeline.diagnosis.fits.extended import curve
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.fits.fit import fit
-from pipeline.diagnosis.fits.laws import following
 from pipeline.diagnosis.fits.workbench import Workbench, scored
-from pipeline.diagnosis.observations.observation import observe
-from pipeline.diagnosis.observations.prediction import Facts
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import detectable_amount
@@ -34,6 +27,13 @@ from pipeline.rounding import plain
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.units import amount_unit
 from rod.characteristic import MomentCurve
+from rod.inverse.base import Base
+from rod.inverse.extension import Extension
+from rod.inverse.fit import fit
+from rod.inverse.laws import following
+from rod.inverse.observation import observe
+from rod.inverse.prediction import Facts
+from rod.inverse.simulation import run
 from rod.laws import StickSlip
 
 Array = NDArray[np.float64]
@@ -187,7 +187,7 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
         (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
     ]
     causes = [_cause_plan(bench, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
-    extent = curve(bench.base, points=settings.curve_points)
+    extent = curve(bench.base)
     relative = np.array(extent.tangent_std_Nm2) / np.array(extent.tangent_Nm2)
     bend = bench.base.extension.base.pre_curvature_index
     assert bend is not None
@@ -243,7 +243,6 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         length=plan.length,
         scale_std=plan.scale_std,
         length_std=1e-3 * plan.length_std_mm / plan.length,
-        elements=settings.grid,
         first=plan.pre_curvature,
     )
     vector = base.neutral()
@@ -266,7 +265,7 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         length_std=1e-3 * plan.length_std_mm,
     )
     test = planned_test(made, facts, precision, photos=plan.photos)
-    observation = observe(test, settings)
+    observation = observe(test)
     observation = replace(observation, force_std=np.full(len(facts.branch), precision.force_std), force_freedom=0)
     fitted = fit(
         observation,

@@ -15,18 +15,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.cause import Cause
-from pipeline.diagnosis.fits.fit import Fit
-from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.observations.observation import observe
-from pipeline.diagnosis.observations.prediction import Facts
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.messages import Message, entry
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.cause import Cause
+from rod.inverse.fit import Fit
+from rod.inverse.observation import observe
+from rod.inverse.prediction import Facts
+from rod.inverse.sensitivities import sensitivities, whole_residual
+from rod.inverse.simulation import run
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def _separation(bench: Workbench, probable: Fit, rival: Fit, protocol: Protocol,
         made = run(truth.model(probable.vector), facts)
         if made.prediction is None:
             return 0.0
-        observation = observe(planned_test(made, facts, precision), settings)
+        observation = observe(planned_test(made, facts, precision))
         other = replace(rival.extension, facts=facts, turned=turned)
         base_model = other.base_model(rival.vector)
         shown = run(other.model(rival.vector, of=base_model), facts)

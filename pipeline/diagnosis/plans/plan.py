@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.prediction import Facts
-from pipeline.diagnosis.observations.simulation import Run
+from rod.inverse.prediction import Facts
+from rod.inverse.simulation import Run
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 Array = NDArray[np.float64]

@@ -11,13 +11,13 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction, taken_by_rig
-from pipeline.diagnosis.observations.observation import Observation
 from pipeline.diagnosis.posterior.error_grid import MOVED
 from pipeline.diagnosis.posterior.evidence import log_gain
 from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.diagnosis.statistics.score import span
+from rod.inverse.fit import Fit
+from rod.inverse.observation import Observation
 
 LOUDEST = 40.0
 """Standard deviations: what is found neither at that size nor at the largest possible one is found at none."""

@@ -24,7 +24,7 @@ In whitened rows the covariance is
     C = 1 + hold^2 + forces^2 D'              for the means of the holds; what varies within a hold is as whitened,
 
 and displacements are further unknowns, known to ``moved``, as are the forms of causes that every rig has a little of
-(`pipeline.diagnosis.causes.cause.Variant.ordinary`): too little to be named. Along the eigenvectors of D all other
+(`rod.inverse.cause.Variant.ordinary`): too little to be named. Along the eigenvectors of D all other
 sizes cost a sum.
 Notation of the products: G grid points, o own columns, k added ones.
 """
@@ -40,10 +40,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
-from pipeline.diagnosis.observations.common_errors import shared_light
-from pipeline.diagnosis.observations.noise import by_axes, slow_errors
-from pipeline.diagnosis.observations.observation import Observation
-from pipeline.diagnosis.observations.prediction import Facts
+from rod.inverse.common_errors import shared_light
+from rod.inverse.noise import by_axes, slow_errors
+from rod.inverse.observation import Observation
+from rod.inverse.prediction import Facts
 
 Array = NDArray[np.float64]
 Forms = Callable[[Array], Array]
@@ -327,7 +327,11 @@ def hold_sizes(observation: Observation) -> dict[float, float]:
 
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
     """Which of `SHAPES` are waves of a photo, and nothing else."""
-    scatter = np.median([np.median(photo.sections.std) for photo in observation.photos]) if observation.photos else 0.0
+    scatter = (
+        np.median([np.median(photo.sections.section_std) for photo in observation.photos])
+        if observation.photos
+        else 0.0
+    )
     size = facts.length * np.array(SHAPES)
     return np.asarray((size >= FAINTEST * scatter) & (size <= scatter) & (size > 0.0))
 
@@ -387,10 +391,9 @@ def _slow_errors(observation: Observation, photos: NDArray[np.int_]) -> Array:
     step, share = observation.rows.step[photos], np.zeros((len(photos), len(photos)))
     for photo in observation.photos:
         own = np.flatnonzero(step == photo.step)
-        sections, axes = photo.whiten[:, 1:], photo.whiten @ by_axes(photo.sections, photo.chord)
-        share[np.ix_(own, own)] = (
-            sections @ slow_errors(photo.sections) @ sections.T + 0.5 * photo.stated_chord_std**2 * axes @ axes.T
-        )
+        sections = photo.whiten[:, 1:]
+        axes = photo.stated_chord_std / np.sqrt(2.0) * photo.whiten @ by_axes(photo.sections, photo.chord)
+        share[np.ix_(own, own)] = sections @ slow_errors(photo.sections) @ sections.T + axes @ axes.T
     if observation.common is None:
         return share
     share += shared_light([photo.sections for photo in observation.photos], [p.whiten for p in observation.photos])

@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from pipeline.diagnosis.fits.extension import Term
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
+from rod.inverse.extension import Term
+from rod.inverse.fit import Fit
 
 Array = NDArray[np.float64]
 

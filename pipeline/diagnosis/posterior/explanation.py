@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.profile import WAVE_COST, is_profile, is_wave, largest_of
-from pipeline.diagnosis.fits.fit import Fit
+from pipeline.diagnosis.causes.profile import WAVE_COST, is_wave, largest_of
+from rod.inverse.fit import Fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Explanation:
         extension, own = self.fitted.extension, self.fitted.extension.terms_of(cause)
         at = [extension.amounts_at[i] for i in own]
         covariance = self.fitted.covariance[np.ix_(at, at)]
-        if is_profile(cause) and len(own) > 1:
+        if cause.varies and len(own) > 1:
             forms = [extension.formed(self.fitted.vector, i).variant for i in own]
             weight = largest_of(forms, self.fitted.vector[at], covariance, cause)
         elif cause.additive:

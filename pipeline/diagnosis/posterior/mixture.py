@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr
 
 from pipeline.diagnosis.fits.extended import factor_of, stated
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import SIZES, moments
 from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
 from pipeline.result import Curve, Widening, visited
+from rod.inverse.fit import Fit
 
 Array = NDArray[np.float64]
 

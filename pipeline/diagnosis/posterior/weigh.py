@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.displacements import displacement_columns
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.search import Suspicion, ordinary
-from pipeline.diagnosis.observations.observation import Observation
-from pipeline.diagnosis.observations.prediction import Facts
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.evidence import Evidence, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+from rod.inverse.fit import Fit
+from rod.inverse.observation import Observation
+from rod.inverse.prediction import Facts
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
-from pipeline.diagnosis.fits.fit import FITS, Fit
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
@@ -14,6 +13,7 @@ from pipeline.diagnosis.posterior.mixture import centre_of, widening
 from pipeline.messages import entry
 from pipeline.result import CausePart, Curve, HypothesisPart, TwinPart, Widening
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.fit import FITS, Fit
 
 
 def named_causes(
@@ -93,7 +93,7 @@ TOLD = 1e-6
 
 def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
     """f_EI of the extended model, with the law's smoothness in its band."""
-    return curve(again.fitted, points=settings.curve_points, covariance=again.covariance, other=again.other)
+    return curve(again.fitted, covariance=again.covariance, other=again.other)
 
 
 def all_believed(bench: Workbench, conclusion: Conclusion, curve: Curve, own: Fit | None = None) -> Widening:

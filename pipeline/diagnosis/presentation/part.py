@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
-from pipeline.diagnosis.fits.fit import Fit
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
@@ -35,6 +34,7 @@ from pipeline.diagnosis.words import could_have_been_seen, headline
 from pipeline.messages import Message
 from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.fit import Fit
 
 
 def present(
@@ -74,7 +74,7 @@ def present(
         powerless=len(seen) < settings.powerless * len(rows),
     )
     told = identified is not None and sum(identified.supported) > 1
-    plain = identified if identified is not None and told else curve(bench.base, points=settings.curve_points)
+    plain = identified if identified is not None and told else curve(bench.base)
     # the answer is the curve that all that is believed leaves the narrower band, with that band
     wider = None if extended is not None and word != "unexplained" else all_believed(bench, conclusion, plain)
     refuted = False

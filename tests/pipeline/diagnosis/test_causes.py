@@ -13,10 +13,10 @@ from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis import explain
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import form_between
-from pipeline.diagnosis.fits.base import start
-from pipeline.diagnosis.observations.prediction import facts_of
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.simulate.effects import ONE_SIDED
+from rod.inverse.base import start
+from rod.inverse.prediction import facts_of
+from rod.inverse.simulation import run
 
 CONTRACT = {
     "nonlinear_stiffness", "pre_curvature_varying", "stiffness_varying", "hysteresis", "plastic_set", "relaxation",
@@ -31,7 +31,7 @@ BY_NAME = {cause.name: cause for cause in CATALOGUE}
 def bench():
     test = hidden_test(Cable(), LOOP, largest=0.0138, seed=2)
     facts = facts_of(test)
-    base = start(test, facts, elements=60)
+    base = start(test, facts)
     model = base.model(base.neutral())
     return facts, model, run(model, facts)
 

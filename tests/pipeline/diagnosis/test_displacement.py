@@ -9,12 +9,12 @@ from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from pipeline.diagnosis.diagnose import diagnose
-from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
 from pipeline.diagnosis.fits.workbench import prepare
-from pipeline.diagnosis.observations.simulation import run
 from pipeline.diagnosis.statistics.score import admissible
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.sensitivities import sensitivities, whole_residual
+from rod.inverse.simulation import run
 
 SETTINGS = DiagnosisSettings()
 SCATTER = 5e-5

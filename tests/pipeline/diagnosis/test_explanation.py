@@ -15,12 +15,12 @@ from pipeline.diagnosis.explanations.forms import may_join
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
-from pipeline.diagnosis.fits.extension import Term
-from pipeline.diagnosis.fits.fit import fit
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.findings import too_large
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.extension import Term
+from rod.inverse.fit import fit
 
 SETTINGS = DiagnosisSettings()
 ELEMENTS = Slipping((2e-3, 1.3e-3), (1.0, 3.0))

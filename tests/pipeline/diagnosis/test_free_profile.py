@@ -11,12 +11,12 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import deviation, forms, largest_of, position_of, profile, wave
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
-from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.fit import FITS, evaluated
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.extension import Extension, Term
+from rod.inverse.fit import FITS, evaluated
 
 SETTINGS = DiagnosisSettings()
 PROFILES = ("pre_curvature_varying", "stiffness_varying")

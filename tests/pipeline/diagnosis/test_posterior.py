@@ -13,13 +13,13 @@ from fixtures.hidden import LOOP, Reading, hidden_test
 from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.observations.noise import by_axes
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, evidence, evidences
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
+from rod.inverse.noise import by_axes
 
 
 @pytest.fixture(scope="module")

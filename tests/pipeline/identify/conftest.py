@@ -18,7 +18,7 @@ def law():
 
 @pytest.fixture(scope="session")
 def settings():
-    return IdentifySettings(elements=80, blocks=80)
+    return IdentifySettings()
 
 
 @pytest.fixture(scope="session")

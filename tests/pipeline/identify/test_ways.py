@@ -88,10 +88,10 @@ def test_curvature_wrong_in_the_smooth_curve_alone_is_a_disagreement(measured, s
 
 def test_branches_are_fitted_apart_and_together(found, law):
     assert set(found.branches) == {"loading", "unloading"}
-    assert {d.step.branch for d in found.branches["loading"].model.data} == {"mounted", "loading"}
-    assert {d.step.branch for d in found.branches["unloading"].model.data} == {"unloading"}
+    assert {step.branch for step in found.branches["loading"].test.steps} == {"mounted", "loading"}
+    assert {step.branch for step in found.branches["unloading"].test.steps} == {"unloading"}
     assert found.branches_p > 1e-3
-    assert {d.step.branch for d in found.inverse.model.data} == {"mounted", "loading", "unloading"}
+    assert {step.branch for step in found.inverse.test.steps} == {"mounted", "loading", "unloading"}
 
 
 def test_branches_that_differ_are_named(measured, settings):

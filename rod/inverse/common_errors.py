@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.noise import Sections, light_alike
+from rod.inverse.noise import light_alike
 from rod.measurement import slow_covariance
+from rod.midline import Midline
 
 Array = NDArray[np.float64]
 
@@ -51,12 +52,12 @@ class CommonErrors:
         return np.asarray(rows + self.directions @ ((factors - 1.0) * along.T).T)
 
 
-def common_errors(sections: Sequence[Sections], whiten: Sequence[Array]) -> CommonErrors | None:
+def common_errors(sections: Sequence[Midline], whiten: Sequence[Array]) -> CommonErrors | None:
     """What the photos of a test err alike; None where nothing is told of it.
 
     Parameters
     ----------
-    sections : sequence of Sections
+    sections : sequence of Midline
         Of every photo.
     whiten : sequence of (1 + q, 1 + k)
         Acts on (chord residual, normal residuals of the sections) of each.
@@ -69,20 +70,20 @@ def common_errors(sections: Sequence[Sections], whiten: Sequence[Array]) -> Comm
     return CommonErrors(directions[:, kept], variances[kept]) if kept.any() else None
 
 
-def shared_light(sections: Sequence[Sections], whiten: Sequence[Array]) -> Array:
+def shared_light(sections: Sequence[Midline], whiten: Sequence[Array]) -> Array:
     """Covariance (n, n) that the light's error makes between rows of different photos, each whitened by its own."""
     pairs = ([np.zeros((len(a.s), len(b.s))) if a is b else light_alike(a, b) for b in sections] for a in sections)
     return _joint(np.block(list(pairs)), sections, whiten)
 
 
-def _waves(sections: Sequence[Sections]) -> Array:
+def _waves(sections: Sequence[Midline]) -> Array:
     """Covariance (k, k) over the sections of all photos of waves that are the same on all."""
     std = float(np.sqrt(np.mean([own.common[0] ** 2 for own in sections])))
     length = float(np.median([own.common[1] for own in sections]))
     return slow_covariance(np.concatenate([own.s for own in sections]), ((std, length),))
 
 
-def _joint(covariance: Array, sections: Sequence[Sections], whiten: Sequence[Array]) -> Array:
+def _joint(covariance: Array, sections: Sequence[Midline], whiten: Sequence[Array]) -> Array:
     """Covariance (n, n) of the whitened rows from one of the sections (k, k), all photos one after the other."""
     ends = np.cumsum([0, *(len(own.s) for own in sections)])
     rows = np.vstack([root[:, 1:] @ covariance[a:b] for root, a, b in zip(whiten, ends, ends[1:], strict=False)])

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.prediction import Facts, Model, Prediction
 from rod.equilibrium import Branch, Equilibrium, solve
+from rod.inverse.prediction import Facts, Model, Prediction
 from rod.newton import Outcome
 from rod.parameters import Parameter
 from rod.sensitivity import Derivatives, derivatives

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.profile import along_cable, is_profile
-from pipeline.diagnosis.fits.extension import Extension
-from pipeline.diagnosis.observations.prediction import Facts, Model, end_for_end
-from pipeline.diagnosis.observations.simulation import Run, base_derivatives, freedom
+from rod.inverse.extension import Extension
+from rod.inverse.prediction import Facts, Model, end_for_end
+from rod.inverse.simulation import Run, base_derivatives, freedom
 from rod.parameters import Parameter, Toward, comparable
 from rod.sensitivity import Derivatives
 
@@ -62,7 +61,7 @@ def plainly(extension: Extension, vector: Array, base_model: Model) -> Model:
     """The model at a vector (p,) without profiles along the cable, which no other cause touches."""
     model = base_model
     for k, at in enumerate(extension.amounts_at):
-        if not is_profile(extension.terms[k].cause):
+        if not extension.terms[k].cause.varies:
             term = extension.formed(vector, k)
             model = term.cause.apply(model, float(vector[at]), term.variant, extension.facts)
     return model
@@ -84,7 +83,7 @@ def bending_numbers(extension: Extension, vector: Array, base_model: Model, here
     for k, at in enumerate(extension.amounts_at):
         term = extension.formed(vector, k)
         numbers = range(at, at + term.size)
-        if is_profile(term.cause):
+        if term.cause.varies:
             _of_profile(bends, extension, vector, k, here)
             continue
         alone = term.cause.apply(base_model, float(vector[at]), term.variant, extension.facts)
@@ -129,12 +128,12 @@ def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, here:
     """Amount, place and width of a form along the cable."""
     term, at = extension.formed(vector, k), extension.amounts_at[k]
     cable = end_for_end(here) if extension.turned else here
-    name, phi = along_cable(term.cause, term.variant, cable)
+    name, phi = term.cause.along_cable(term.variant, cable)
     moves = [phi]
     for tuned in term.variant.tuned:
         step = 1e-3 * SHORT * term.variant.scale(tuned)
         beside = term.variant.moved({tuned: getattr(term.variant, tuned) + step})
-        moves.append(float(vector[at]) * (along_cable(term.cause, beside, cable)[1] - phi) / step)
+        moves.append(float(vector[at]) * (term.cause.along_cable(beside, cable)[1] - phi) / step)
     for i, move in enumerate(moves):
         bends.by((name, move[::-1] if extension.turned else move), at + i)
 

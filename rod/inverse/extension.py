@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.cause import Cause, Variant
-from pipeline.diagnosis.fits.base import Base
-from pipeline.diagnosis.observations.prediction import Facts, Model, end_for_end
+from rod.inverse.base import Base
+from rod.inverse.cause import Cause, Variant
+from rod.inverse.prediction import Facts, Model, end_for_end
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
-from rod.balance import BalanceGraph
 from rod.characteristic import Characteristic, ParametricCurve
 from rod.compliance_law import LawBasis, moment_basis, refreshed
 from rod.law_prior import priors
+from rod.measured_law import MeasuredLaw
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
@@ -175,31 +175,26 @@ def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[An
     return law, law.basis.projected(rise), float(rest)
 
 
-def as_balanced(graph: BalanceGraph, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
-    """The same by the balance equations, where the moments alone show none; None without a law.
-
-    They know the noise, so they see an early knee in what scatters too much to rise; of a cable that is not uniform
-    they know less.
+def as_measured(measured: MeasuredLaw, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
+    """The same of a law that was measured otherwise, where the moments alone show none; None without a bend.
 
     Parameters
     ----------
-    graph : BalanceGraph
+    measured : MeasuredLaw
     unit : N m^2
         Of the coefficients.
     """
-    if graph.law is None:
-        return None
-    bend = graph.law.kappa - graph.law.pre_curvature
+    bend = measured.kappa - measured.pre_curvature
     above = bend > 0.0
     if np.count_nonzero(above) < LEAST:
         return None
-    tangent, bend = graph.law.tangent[above], bend[above]
+    tangent, bend = measured.tangent[above], bend[above]
     law, coefficients = following(np.append(tangent[0], tangent), np.append(0.0, bend), unit=unit)
     for _ in range(LAYINGS):
         rise = law.basis.law(coefficients)
         law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
         coefficients = law.basis.projected(rise)
-    return law, coefficients, graph.law.pre_curvature
+    return law, coefficients, measured.pre_curvature
 
 
 LEAST = 4

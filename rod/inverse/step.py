@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pipeline.diagnosis.fits.extension import Extension
+from rod.inverse.extension import Extension
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,11 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.prediction import Facts, Model
+from rod.inverse.prediction import Facts, Model
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class Cause(ABC):
     limited : bool
         Whether many times the plausible amount cannot be. A number typed wrongly, a zero never set, a bearing that has
         seized, a heavy or patched cable may be off by any amount.
+    varies : bool
+        Whether its forms are profiles along the cable, see `along_cable`.
     """
 
     name: ClassVar[str]
@@ -117,6 +122,7 @@ class Cause(ABC):
     combines: ClassVar[bool] = False
     additive: ClassVar[bool] = False
     limited: ClassVar[bool] = False
+    varies: ClassVar[bool] = False
 
     @abstractmethod
     def plausible(self, facts: Facts) -> float:
@@ -129,3 +135,13 @@ class Cause(ABC):
     @abstractmethod
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The model with the cause in it."""
+
+    def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
+        """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which.
+
+        Raises
+        ------
+        NotImplementedError
+            If the cause does not vary along the cable.
+        """
+        raise NotImplementedError(self.name)

@@ -18,16 +18,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.camera import DISTORTED, axes_off, scaled, tilt_of
-from pipeline.diagnosis.fits.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_balanced, as_photographed
-from pipeline.diagnosis.observations.prediction import Facts, Model, Observer
-from rod.balance import BalanceGraph, balance
 from rod.bending_test import BendingTest
 from rod.characteristic import ParametricCurve
 from rod.compliance_law import moment_basis
+from rod.inverse.camera import DISTORTED, axes_off, scaled, tilt_of
+from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_measured, as_photographed
+from rod.inverse.prediction import Facts, Model, Observer
+from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
+
+ELEMENTS = 120
+"""Of the simulated cable: its force is right to 1e-4, a thirtieth of a load cell's."""
 
 AXES = ("left_along", "left_across", "right_along", "right_across", "parallax", "tilt_along", "tilt_across", "lens")
 
@@ -77,7 +80,7 @@ class Base:
     length: float
     scale_std: float
     length_std: float
-    elements: int
+    elements: int = ELEMENTS
     first: float = 0.0
     seen: Array | None = None
     straight: bool = False
@@ -208,46 +211,41 @@ def start(
     test: MeasuredTest,
     facts: Facts,
     *,
-    elements: int,
     points: int = 0,
     straight: bool = False,
     exact: float = 0.0,
-    graph: BalanceGraph | None = None,
+    near: MeasuredLaw | None = None,
+    begin: tuple[float, float] | None = None,
 ) -> Base:
     """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
-    The law is one of any form, or a spline of ``points``; where the moments show none, it begins with that of the
-    balance equations (``graph``). A displacement that is known to ``exact`` (m) or better has no error of its own.
+    The law is one of any form, or a spline of ``points``. Where the moments show none it begins with one that was
+    measured otherwise (``near``); with ``begin`` (N m^2, 1/m) given it is that constant EI and K0. A displacement that
+    is known to ``exact`` (m) or better has no error of its own.
 
     Raises
     ------
     ValueError
         If no step has both a photo and a force.
     """
-    curvature, moment = [], []
-    for step in test.steps:
-        if step.shape is not None:
-            inside = slice(len(step.shape.s) // 10, -(len(step.shape.s) // 10) or None)
-            curvature.append(step.shape.kappa[inside])
-            moment.append(step.force * step.shape.y[inside])
-    if not curvature:
-        raise ValueError("no step has a measured shape")
-    K, m = np.concatenate(curvature), np.concatenate(moment)
+    K, m = measured_curvatures(test)
     slope, rest = np.polyfit(m, K, 1) if np.ptp(m) > 0.0 else (0.0, float(np.mean(K)))
     if not slope > 0.0:  # a straight, force-free cable or a force of the wrong sign: any positive stiffness will do
         slope, rest = np.ptp(K) / max(float(np.max(np.abs(m))), 1e-30), 0.0
     reach = max(float(np.quantile(K, 0.995)) - rest, 0.2 * facts.curvature_scale)
     stiffness = float(1.0 / slope)
+    if begin is not None:
+        stiffness, rest = begin
     law: Law = FewPoints(np.linspace(0.0, reach, points), stiffness)
     seen = None
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
-        shown = as_photographed(m, K, unit=stiffness)
-        if shown is None:
+        shown = None if begin is not None else as_photographed(m, K, unit=stiffness)
+        if shown is None and near is not None:
             # from the other side of straight a law with an early knee is never found; else the line will do
-            balanced = as_balanced(graph or balance(test), unit=stiffness)
-            shown = balanced if balanced is not None and balanced[2] * rest < 0.0 else None
+            measured = as_measured(near, unit=stiffness)
+            shown = measured if measured is not None and measured[2] * rest < 0.0 else None
         if shown is not None:
             law, coefficients, bend = shown
             seen = np.r_[coefficients, bend]
@@ -258,7 +256,6 @@ def start(
         length=test.length,
         scale_std=max(test.scale_std, EXACT),
         length_std=max(test.length_std / test.length, EXACT),
-        elements=elements,
         first=float(rest),
         straight=straight,
         axis_std=test.axis_std,
@@ -277,3 +274,22 @@ def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: fl
         return 0.0
     natural = test.length * float(np.sinc(0.5 * pre_curvature * test.length / np.pi))
     return natural - chord - float(facts.displacement[index])
+
+
+def measured_curvatures(test: MeasuredTest) -> tuple[Array, Array]:
+    """Curvature (n,) 1/m and moment P y (n,) N m wherever photos show the cable, but for their outermost tenths.
+
+    Raises
+    ------
+    ValueError
+        If no step has both a photo and a force.
+    """
+    curvature, moment = [], []
+    for step in test.steps:
+        if step.shape is not None:
+            inside = slice(len(step.shape.s) // 10, -(len(step.shape.s) // 10) or None)
+            curvature.append(step.shape.kappa[inside])
+            moment.append(step.force * step.shape.y[inside])
+    if not curvature:
+        raise ValueError("no step has a measured shape")
+    return np.concatenate(curvature), np.concatenate(moment)

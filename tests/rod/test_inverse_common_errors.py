@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.diagnosis.observations.common_errors import common_errors
-from pipeline.diagnosis.observations.noise import Sections, section_covariance, smooth_basis
+from rod.inverse.common_errors import common_errors
+from rod.inverse.noise import section_covariance, smooth_basis
+from rod.midline import Midline
 
 LENGTH = 0.18
 COMMON = (2e-6, 8e-3)
@@ -13,7 +14,9 @@ COMMON = (2e-6, 8e-3)
 def sections(count, common=COMMON, light=3e-6, turned=0.0):
     s, flat = np.linspace(0.01, 0.17, count), np.zeros(count)
     theta, std = turned + np.linspace(1.0, -1.0, count), np.full(count, 4e-6)
-    return Sections(s, s, flat, theta, std, 3, 1e-4, 5e-4, ((light, 0.06), (1e-6, 8e-3)), common)
+    each, one = np.arange(count), np.ones(count, dtype=int)
+    slow = (light, 0.06), (1e-6, 8e-3)
+    return Midline(s, s, flat, theta, flat, s, std, each, one, 5e-4, slow, common)
 
 
 def whitening(own):

@@ -5,11 +5,11 @@ import pytest
 
 from fixtures.effects import HIDE, LARGEST, Form
 from fixtures.hidden import THREE, hidden_test, nudged
-from pipeline.diagnosis.fits.fit import TOLERANCE
-from pipeline.diagnosis.fits.step import Bounds, Linearised, lasting, least_distance, reach
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.fit import TOLERANCE
+from rod.inverse.step import Bounds, Linearised, lasting, least_distance, reach
 
 SETTINGS = DiagnosisSettings()
 NOTHING = Bounds(np.zeros((0, 2)), np.zeros(0))

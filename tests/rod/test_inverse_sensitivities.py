@@ -6,15 +6,14 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import hidden_test
-from fixtures.scores import SETTINGS
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.fits.base import start
-from pipeline.diagnosis.fits.extension import Extension, Term
-from pipeline.diagnosis.fits.sensitivities import sensitivities, whole_residual
-from pipeline.diagnosis.observations import simulation
-from pipeline.diagnosis.observations.observation import observe
-from pipeline.diagnosis.observations.prediction import facts_of
-from pipeline.diagnosis.observations.simulation import run
+from rod.inverse import simulation
+from rod.inverse.base import start
+from rod.inverse.extension import Extension, Term
+from rod.inverse.observation import observe
+from rod.inverse.prediction import facts_of
+from rod.inverse.sensitivities import sensitivities, whole_residual
+from rod.inverse.simulation import run
 
 TEST = hidden_test(Cable(), PROTOCOLS["loop"], largest=LARGEST, seed=1)
 FACTS = facts_of(TEST)
@@ -26,10 +25,10 @@ def test_place_and_width_of_a_spot_move_the_data_as_whole_simulations_say(turned
     facts, kinds = facts_of(test), {cause.name: cause for cause in CATALOGUE}
     held = [("stiffness_varying", 5, -0.1), ("pre_curvature_varying", 4, 0.1)]
     terms = tuple(Term(kinds[name], kinds[name].variants(facts)[form]) for name, form, _ in held)
-    base = start(test, facts, elements=120)
+    base = start(test, facts)
     extension = Extension(base, facts, terms, turned=turned)
     amounts = tuple(share * 10.0 * kinds[name].plausible(facts) for name, _, share in held)
-    vector, observation = extension.start(base.neutral(), amounts), observe(test, SETTINGS)
+    vector, observation = extension.start(base.neutral(), amounts), observe(test)
     base_model = extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), facts)
     jacobian = sensitivities(observation, extension, vector, base_model, here)
@@ -57,9 +56,9 @@ def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name,
     (cause,) = (cause for cause in CATALOGUE if cause.name == name)
     beside = next(one for one in CATALOGUE if one.name == ("in_plane_load" if name == "hysteresis" else "hysteresis"))
     terms = (Term(cause, cause.variants(FACTS)[form]), Term(beside, beside.variants(FACTS)[0]))
-    extension = Extension(start(TEST, FACTS, elements=120), FACTS, terms)
+    extension = Extension(start(TEST, FACTS), FACTS, terms)
     vector = extension.start(extension.base.neutral(), (cause.plausible(FACTS), 0.2 * beside.plausible(FACTS)))
-    observation, base_model = observe(TEST, SETTINGS), extension.base_model(vector)
+    observation, base_model = observe(TEST), extension.base_model(vector)
     here = run(extension.model(vector, of=base_model), FACTS)
     monkeypatch.setattr(simulation, "solve", None)  # nothing is simulated for it
     jacobian = sensitivities(observation, extension, vector, base_model, here)

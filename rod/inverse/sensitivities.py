@@ -16,13 +16,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.profile import along_cable
-from pipeline.diagnosis.fits.bending import bending_numbers, combined, plainly
-from pipeline.diagnosis.fits.extension import STEP, Extension, Term
-from pipeline.diagnosis.observations.linearised import columns_of
-from pipeline.diagnosis.observations.observation import Observation, residual
-from pipeline.diagnosis.observations.prediction import Model, Prediction, end_for_end
-from pipeline.diagnosis.observations.simulation import Run, base_derivatives, moved, observed, run
+from rod.inverse.bending import bending_numbers, combined, plainly
+from rod.inverse.extension import STEP, Extension, Term
+from rod.inverse.linearised import columns_of
+from rod.inverse.observation import Observation, residual
+from rod.inverse.prediction import Model, Prediction, end_for_end
+from rod.inverse.simulation import Run, base_derivatives, moved, observed, run
 
 Array = NDArray[np.float64]
 
@@ -123,7 +122,7 @@ def profile_columns(
         return np.zeros((len(extension.prior) + observation.rows.count, 0))
     facts = extension.facts
     cable = end_for_end(here.model) if extension.turned else here.model
-    given = [along_cable(term.cause, term.variant, cable) for term in terms]
+    given = [term.cause.along_cable(term.variant, cable) for term in terms]
     by = base_derivatives(here, facts, [(name, phi[::-1] if extension.turned else phi) for name, phi in given])
     assert here.prediction is not None and here.bare is not None
     steps = np.array([STEP * term.cause.plausible(facts) for term in terms])

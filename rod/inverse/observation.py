@@ -24,28 +24,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pipeline.diagnosis.observations.common_errors import CommonErrors, common_errors
-from pipeline.diagnosis.observations.force_noise import common_rounding, force_noise
-from pipeline.diagnosis.observations.noise import (
+from rod.inverse.common_errors import CommonErrors, common_errors
+from rod.inverse.force_noise import common_rounding, force_noise
+from rod.inverse.noise import (
     PhotoNoise,
-    Sections,
-    block_means,
     by_axes,
     section_covariance,
     smooth_basis,
 )
-from pipeline.diagnosis.observations.prediction import Prediction
-from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.prediction import Prediction
 from rod.measurement import MeasuredTest
+from rod.midline import LEAST_SECTIONS, NOWHERE, Midline, midline
 
 Array = NDArray[np.float64]
 
 HOLD_NOISE_LEVEL = 1e-3
 """Probability; holds have noise levels of their own only if equality is refuted at this level."""
 
-SECTION_BLOCKS, SHAPE_FUNCTIONS = 96, 20
-"""Block means a photo, four per shape function, so that noise and misfit are measured apart; Legendre polynomials a
-photo, which resolve a kink to L / 20, and seven photos stay a problem of 150 rows."""
+SHAPE_FUNCTIONS = 20
+"""Legendre polynomials a photo, which resolve a kink to L / 20, and seven photos stay a problem of 150 rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +70,15 @@ class Row:
         return np.flatnonzero(~self.force & (self.step == step))
 
 
+FORCE_FLOOR = 5e-4
+"""Of the largest force: repeatability of a load cell of class 0.05; below it digits repeat."""
+
+CHORD_STD = 3e-5
+"""Relative, of a photographed chord where the photo states none: 0.05 px of 1700."""
+
+DISPLACEMENT_STD = 2e-6
+"""Of one displacement of the log against the chord, m: spindle and last digit of a log in 0.001 mm."""
+
 KINDS = ("force", "chord", "shape", "prior")
 
 
@@ -84,7 +90,7 @@ class PhotoData:
     ----------
     step : int
         Index of the step.
-    sections : Sections
+    sections : Midline
     chord, chord_std : m
     stated_chord_std : m
         By the bearing axes alone, without the displacement's error.
@@ -95,7 +101,7 @@ class PhotoData:
     """
 
     step: int
-    sections: Sections
+    sections: Midline
     chord: float
     chord_std: float
     stated_chord_std: float
@@ -180,7 +186,6 @@ class Observation:
 
 def observe(
     test: MeasuredTest,
-    settings: DiagnosisSettings,
     *,
     photo_noise: PhotoNoise | None = None,
     without_photos: frozenset[int] = frozenset(),
@@ -191,7 +196,6 @@ def observe(
     Parameters
     ----------
     test : MeasuredTest
-    settings : DiagnosisSettings
     photo_noise : PhotoNoise or None
         Calibrated noise of the sections; as stated by the photos if None.
     without_photos, without_forces : sets of int
@@ -199,7 +203,7 @@ def observe(
     """
     noise = photo_noise or PhotoNoise()
     scale = max(abs(step.force) for step in test.steps)
-    level = force_noise(test.steps, floor=settings.force_floor * scale, distinct=HOLD_NOISE_LEVEL)
+    level = force_noise(test.steps, floor=FORCE_FLOOR * scale, distinct=HOLD_NOISE_LEVEL)
     forces, photos = [], []
     kind: list[Array] = []
     where: list[Array] = []
@@ -209,9 +213,9 @@ def observe(
         kind.append(np.zeros(len(forces[-1]), dtype=int))
         where.append(np.full(len(forces[-1]), i))
     for i, step in enumerate(test.steps):
-        if step.shape is None or step.chord is None or i in without_photos:
+        if step.chord is None or i in without_photos:
             continue
-        photo = _photo_data(i, test, settings, noise)
+        photo = _photo_data(i, test, noise)
         photos.append(photo)
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
@@ -222,24 +226,24 @@ def observe(
     return replace(observed, force_own=level.own, force_common=rounding)
 
 
-def _photo_data(index: int, test: MeasuredTest, settings: DiagnosisSettings, noise: PhotoNoise) -> PhotoData:
+def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise) -> PhotoData:
     step = test.steps[index]
-    assert step.shape is not None and step.chord is not None
-    sections = block_means(step.shape, blocks=SECTION_BLOCKS)
+    assert step.chord is not None
+    seen = step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
+    sections = midline(step.shape) if seen and step.shape is not None else NOWHERE
     functions = min(SHAPE_FUNCTIONS, len(sections.s) // 2)
-    basis = smooth_basis(sections.s, float(step.shape.s[-1]), functions=functions)
-    stated = step.chord_std if step.chord_std is not None else settings.chord_std * step.chord
-    whiten = _whitening(step.chord, stated, sections, basis, settings, noise)
-    whole = float(np.hypot(stated, settings.displacement_std))
+    basis = smooth_basis(sections.s, test.length, functions=functions)
+    stated = step.chord_std if step.chord_std is not None else CHORD_STD * step.chord
+    whiten = _whitening(step.chord, stated, sections, basis, noise)
+    whole = float(np.hypot(stated, DISPLACEMENT_STD))
     return PhotoData(index, sections, step.chord, whole, stated, basis, whiten)
 
 
 def _whitening(
     chord: float,
     chord_std: float,
-    sections: Sections,
+    sections: Midline,
     basis: Array,
-    settings: DiagnosisSettings,
     noise: PhotoNoise,
 ) -> Array:
     """Root of the information of (chord, shape components): rows have unit variance and compress the sections.
@@ -251,7 +255,7 @@ def _whitening(
     by_axis = by_axes(sections, chord)
     joint = np.zeros((1 + len(sections.s), 1 + len(sections.s)))
     joint[1:, 1:] = section_covariance(sections, factor=noise.factor, stretch=noise.stretch)
-    joint[0, 0] = axis**2 + settings.displacement_std**2
+    joint[0, 0] = DISPLACEMENT_STD**2
     joint += axis**2 * by_axis @ by_axis.T
     design = linalg.block_diag(np.ones((1, 1)), basis)
     # by orthogonal factors: the polynomials of a cable seen in part are nearly dependent, and squaring them loses that
@@ -286,7 +290,7 @@ def of_hold(off: Array, common: float) -> Array:
     return np.asarray(off - (1.0 - 1.0 / np.sqrt(1.0 + len(off) * common**2)) * off.mean(axis=0))
 
 
-def normal_distance(sections: Sections, prediction: Prediction, step: int) -> Array:
+def normal_distance(sections: Midline, prediction: Prediction, step: int) -> Array:
     """Distance (k,) m of the sections from the predicted curve, positive along its normal."""
     steps = np.full(len(sections.s), step)
     return _distance(Places(steps, sections.s, sections.x, sections.y, ()), prediction)

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.observations.observation import Observation, foot_points, of_hold
-from pipeline.diagnosis.observations.prediction import Prediction
+from rod.inverse.observation import Observation, foot_points, of_hold
+from rod.inverse.prediction import Prediction
 
 Array = NDArray[np.float64]
 

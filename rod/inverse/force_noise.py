@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from pipeline.faults.stuck_forces import last_digit
 from rod.measurement import MeasuredStep
 
 Array = NDArray[np.float64]
@@ -145,6 +144,19 @@ def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:
     scatter = np.maximum((std / digit) ** 2 - 1.0 / 12.0, 0.0)
     variance = np.exp(-4.0 * np.pi**2 * np.outer(scatter, HARMONICS**2)) / (2.0 * np.pi**2 * HARMONICS**2)
     return np.asarray(digit * np.sqrt(variance.sum(axis=1)))
+
+
+ROUNDING = 1e-9
+"""Of the largest force: numbers that close are the same number."""
+
+
+def last_digit(forces: Array) -> float:
+    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
+    top = float(np.max(np.abs(forces), initial=0.0))
+    for places in range(-3, 13):
+        if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):
+            return 10.0**-places
+    return 0.0
 
 
 class _Scatter(NamedTuple):

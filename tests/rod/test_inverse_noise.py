@@ -8,33 +8,23 @@ from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, THREE, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis.diagnose import diagnose
-from pipeline.diagnosis.observations.force_noise import force_noise
-from pipeline.diagnosis.observations.noise import (
-    block_correlation,
-    block_means,
+from pipeline.faults import faults_of_input
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.force_noise import force_noise
+from rod.inverse.noise import (
     calibrate_photo_noise,
     section_covariance,
     smooth_basis,
 )
-from pipeline.diagnosis.observations.observation import observe, residual
-from pipeline.diagnosis.observations.prediction import Prediction
-from pipeline.faults import faults_of_input
-from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.observation import observe, residual
+from rod.inverse.prediction import Prediction
 from rod.measurement import MeasuredStep
-
-
-def test_covariance_of_block_means_is_that_of_the_averages():
-    members, pitch, length = 7, 0.3, 1.1
-    s = pitch * np.arange(5 * members)
-    full = np.exp(-np.abs(np.subtract.outer(s, s)) / length)
-    mean = np.kron(np.eye(5), np.full((1, members), 1.0 / members))
-    assert np.allclose(
-        block_correlation(5, members=members, pitch=pitch, length=length), mean @ full @ mean.T, atol=1e-12
-    )
+from rod.midline import block_covariance, midline
 
 
 def test_uncorrelated_sections_average_by_the_square_root():
-    assert np.allclose(block_correlation(3, members=4, pitch=1.0, length=0.0), np.eye(3) / 4.0)
+    s, first = 0.3 * np.arange(12), np.array([0, 4, 8])
+    assert np.allclose(block_covariance(s, np.ones(12), first, np.full(3, 4), 0.0), np.eye(3) / 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +36,15 @@ def test_block_means_lie_on_the_curve(shape):
     """Without noise a block mean lies on the curve, not inside the arc: the mean of positions would be 0.4 um off."""
     exact = Reading(section_px=1e-9, axis_px=1e-9)
     clean = hidden_test(Cable(), THREE, largest=0.0138, seed=5, reading=exact).steps[-1].shape
-    blocks = block_means(clean, blocks=90)
+    blocks = midline(clean, blocks=90)
     radius = 1.0 / np.interp(blocks.s, clean.s, clean.kappa)
     inside = np.interp(blocks.s, clean.section_s, clean.section_y) - blocks.y
-    assert np.max(np.abs(inside)) < 2e-8 < (blocks.members * blocks.pitch) ** 2 / 24.0 / radius.min()
+    assert np.max(np.abs(inside)) < 2e-8 < np.diff(blocks.s).max() ** 2 / 24.0 / radius.min()
 
 
 @pytest.mark.parametrize(("factor", "stretch"), [(1.0, 1.0), (1.4, 1.0), (1.0, 2.8), (0.7, 0.6)])
 def test_noise_is_measured_beside_a_smooth_misfit(shape, factor, stretch):
-    blocks = block_means(shape, blocks=96)
+    blocks = midline(shape, blocks=96)
     basis = smooth_basis(blocks.s, 0.181, functions=20)
     smooth = np.linalg.qr(basis)[0]
     root = np.linalg.cholesky(section_covariance(blocks, factor=factor, stretch=stretch))
@@ -185,16 +175,23 @@ def test_stated_level_where_there_are_no_samples():
 @pytest.mark.parametrize("scatter", [0.02, 0.2, 0.4, 1.0])
 def test_forces_in_coarse_digits_are_as_uncertain_as_they_are(scatter):
     """The mean of a hold, whitened, has unit variance, whether its samples repeat one number or scatter."""
-    rng, digit, settings, found = np.random.default_rng(11), 0.01, DiagnosisSettings(), []
+    rng, digit, found = np.random.default_rng(11), 0.01, []
     test = hidden_test(Cable(), THREE, largest=0.0138, seed=1)
     for _ in range(150):
         true = rng.uniform(0.4, 1.0, 6)
         holds = true[:, None] + scatter * digit * rng.standard_normal((6, 30))
         steps = tuple(
-            replace(test.steps[0], force=float(hold[-1]), hold_forces=hold, hold_times=np.arange(30.0), shape=None)
+            replace(
+                test.steps[0],
+                force=float(hold[-1]),
+                hold_forces=hold,
+                hold_times=np.arange(30.0),
+                shape=None,
+                chord=None,
+            )
             for hold in np.round(holds, 2)
         )
-        observation = observe(replace(test, steps=steps), settings)
+        observation = observe(replace(test, steps=steps))
         none = np.zeros((6, 2))
         shown = Prediction(true, tuple(np.full(30, f) for f in true), none[:, 0], np.arange(2.0), none, none, none)
         off = residual(observation, shown).reshape(6, 30)

@@ -1,1 +1,0 @@
-"""What was observed and what a model predicts for it: circumstances, simulation, noise, whitened residuals."""

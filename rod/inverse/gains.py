@@ -1,0 +1,100 @@
+"""How a fitted law answers to every source of error, and what it is without the force-free photo.
+
+To first order the law moves by ``response J^T W dr`` where the whitened residual changes by dr, and by
+``-response L d`` where a nuisance is off by d that its prior, of precision L, takes for zero. Sources are named as
+those of the balance equations, so that a comparison of both ways knows what they have in common.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rod.inverse.base import AXES
+from rod.inverse.fit import Fit
+from rod.inverse.mean_law import force_rows, linearised, rows_posterior, weights
+from rod.inverse.noise import by_axes
+from rod.inverse.observation import DISPLACEMENT_STD, Observation, PhotoData, observe
+from rod.measured_law import Source
+from rod.measurement import MeasuredTest
+
+Array = NDArray[np.float64]
+
+
+def gains(test: MeasuredTest, observation: Observation, fitted: Fit, response: Array) -> dict[Source, Array]:
+    """Response of log(tangent) to the sources of error, each per standard deviation, see `rod.measured_law`.
+
+    Parameters
+    ----------
+    test : MeasuredTest
+    observation : Observation
+    fitted : Fit
+    response : (n, p)
+        Change of log(tangent) by the gradient of half of chi-square, its sign turned.
+    """
+    base = fitted.extension.base
+    count, known = observation.rows.count, fitted.extension.prior[: base.known]
+    found = {name: -response @ (known.T @ (known @ d))[:, None] for name, d in _nuisances(test, fitted).items()}
+    onto = response @ (fitted.jacobian[:count].T * weights(observation, fitted) ** 2)
+    for photo in observation.photos:
+        for name, columns in _errors_of(photo).items():
+            rows = np.zeros((count, columns.shape[1]))
+            rows[observation.rows.of_photo(photo.step)] = photo.whiten @ columns
+            found[name, test.steps[photo.step].step] = onto @ observation.joined(rows)
+    for i, step in enumerate(test.steps):
+        if len(observation.forces[i]):
+            rows = np.zeros((count, 1))
+            newtons = step.force_std * np.eye(len(test.steps))[i]
+            rows[observation.rows.force, 0] = np.concatenate(force_rows(observation, newtons))
+            found["force", step.step] = onto @ rows
+    return found
+
+
+def _nuisances(test: MeasuredTest, fitted: Fit) -> dict[Source, Array]:
+    """What one standard deviation of each common error is of the vector, (p,)."""
+    base = fitted.extension.base
+    unit = dict(zip(base.names, np.eye(fitted.extension.size), strict=False))
+    found: dict[Source, Array] = {("scale", -1): base.scale_std * unit["scale"]}
+    found["length", -1] = base.length_std * unit["length"]
+    if base.axes:
+        found |= {(name, -1): base.axis_std * unit[name] for name in AXES[:4]}
+        beside = base.axis_parallax_std * base.camera_foot_std
+        for way in ("along", "across"):
+            found[f"foot_{way}", -1] = beside * (unit[f"left_{way}"] + unit[f"right_{way}"])
+        found["parallax", -1] = base.axis_parallax_std * unit["parallax"]
+    names = base.names[-2 - len(base.moved) : -2]
+    for name, step, std in zip(names, base.moved, base.moved_std, strict=True):
+        found["displacement", test.steps[step].step] = std * unit[name]
+    return found
+
+
+def _errors_of(photo: PhotoData) -> dict[str, Array]:
+    """Errors of one photo: what a standard deviation of each does to (chord, sections), (1 + b, k)."""
+    axis = photo.stated_chord_std / np.sqrt(2.0) * by_axes(photo.sections, photo.chord)
+    chord = np.eye(len(axis), 1)
+    return {
+        "photo": np.vstack([np.zeros(len(photo.sections.s)), photo.sections.factor]),
+        "chord": DISPLACEMENT_STD * chord,
+    } | {name: axis[:, [k]] for k, name in enumerate(AXES[:4])}
+
+
+def loaded_pre_curvature(
+    test: MeasuredTest, observation: Observation, fitted: Fit, rest: frozenset[int]
+) -> tuple[float, float]:
+    """K0 and its standard deviation, 1/m, without the photos of the steps ``rest``: a witness of its own."""
+    at = fitted.extension.base.pre_curvature_index
+    value, J = linearised(observation, fitted, np.zeros((len(fitted.residual), 0)))
+    count = observation.rows.count
+    kept = ~np.isin(observation.rows.step, list(rest))
+    if not kept.all():
+        alone = observe(test, photo_noise=observation.photo_noise, without_photos=rest, without_forces=rest)
+        weight = weights(observation, fitted)
+
+        def without(rows: Array) -> Array:
+            scaled = (rows[:count].T / weight).T
+            left = alone.joined(observation.separated(scaled)[kept])
+            return np.concatenate([(left.T * weight[kept]).T, rows[count:]])
+
+        value, J = without(value), without(J)
+    found = rows_posterior(fitted, value, J)
+    return float(found.mean[at]), float(np.sqrt(found.covariance[at, at]))
