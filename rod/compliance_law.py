@@ -129,8 +129,11 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
     return _basis(np.array([low, high]), np.array([0.0, 1.0]), lambda m: np.full(m.shape, span), unit=unit, size=size)
 
 
-def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float) -> LawBasis:
-    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi along a law, known to a covariance (p, p)."""
+def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *, size: int | None = None) -> LawBasis:
+    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi along a law, known to a covariance (p, p).
+
+    It has ``size`` coefficients, or as many as that of the law.
+    """
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
     m = m[(m >= low) & (m <= high)]
@@ -147,7 +150,7 @@ def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float) ->
         change = weight * law.known_slopes(covariance, at)
         return np.asarray(total / (1.0 / ranges[0] + law.compliance(at) / ranges[1] + change))
 
-    return _basis(m, share, pace, unit=law.basis.unit, size=law.basis.size)
+    return _basis(m, share, pace, unit=law.basis.unit, size=size or law.basis.size)
 
 
 def _with_rest(low: float, high: float) -> tuple[float, float]:
@@ -284,6 +287,11 @@ class ComplianceLaw(LawOfBend):
     def parameters(self) -> int:
         """Number of coefficients."""
         return self.basis.size
+
+    def log_tangent_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of log f by K0 at fixed curvature, (n,) m."""
+        m, f = self.bound(np.asarray(K0, float))(np.asarray(K, float))
+        return self.log_slope(m) * f
 
     def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment by the coefficients at fixed curvature, (n, p) N m."""

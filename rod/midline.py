@@ -117,21 +117,23 @@ def midline(shape: MeasuredShape, *, blocks: int = BLOCKS) -> Midline:
     ----------
     shape : MeasuredShape
     blocks : int
-        At most that many, of equal length.
+        At least that many, of equally many sections each, if there are as many; what is left over at the ends is dropped.
 
     Raises
     ------
     ValueError
         If there are fewer than eight sections.
     """
-    order = np.argsort(shape.section_s, kind="stable")
+    size = shape.section_s.size
+    if size < LEAST_SECTIONS:
+        raise ValueError(f"{size} midline sections do not make a shape")
+    members = max(1, size // blocks)
+    left = size % members
+    order = np.argsort(shape.section_s, kind="stable")[left // 2 : size - (left - left // 2)]
     s, std = shape.section_s[order], shape.section_std[order]
-    if s.size < LEAST_SECTIONS:
-        raise ValueError(f"{s.size} midline sections do not make a shape")
     distance = shape.section_offsets()[order]
-    count = min(blocks, s.size)
-    label = np.minimum(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), count - 1)
-    _, first, sections = np.unique(label, return_index=True, return_counts=True)
+    first = np.arange(0, s.size, members)
+    sections = np.full(first.size, members)
     mean = np.add.reduceat(s, first) / sections
     offset = np.add.reduceat(distance, first) / sections
     x, y, theta = shape.at(mean)

@@ -62,6 +62,6 @@ class StiffnessLaw(LawOfBend):
         """Derivative of log f by the coefficients at fixed curvature, (n, p)."""
         return self.basis.at(np.asarray(K, float) - np.asarray(K0, float))
 
-    def log_slope(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative of log f by K, (n,) m."""
-        return self.rise.log_slope(np.asarray(K, float) - np.asarray(K0, float))
+    def log_tangent_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative of log f by K0 at fixed curvature, (n,) m."""
+        return -self.rise.log_slope(np.asarray(K, float) - np.asarray(K0, float))

@@ -21,11 +21,12 @@ from pipeline.result import (
 )
 from rod.balance import BalanceGraph
 from rod.balance.moment_points import pointwise_graph
+from rod.compliance_law import ComplianceLaw
 from rod.inverse import Estimate, InverseOutcome
+from rod.inverse.laws import FreeLaw
 from rod.inverse.observation import KINDS
 from rod.inverse.photo_fit import photo_fit
 from rod.measured_law import MeasuredLaw
-from rod.stiffness_law import StiffnessLaw
 
 READINGS = 8
 """Points of the fitted law that are listed; the curve has them all."""
@@ -111,9 +112,10 @@ def inverse_part(found: Identification) -> InversePart:
     )
 
 
-def _readings(law: MeasuredLaw, fitted: StiffnessLaw) -> list[KnotPart]:
+def _readings(law: MeasuredLaw, fitted: FreeLaw) -> list[KnotPart]:
     """Points of the law, dense where it bends most: evenly along its own abscissa (`rod.stiffness_law`)."""
-    place = fitted.basis.place(law.kappa - law.pre_curvature)
+    over_moments = isinstance(fitted, ComplianceLaw)
+    place = fitted.basis.place(law.moment if over_moments else law.kappa - law.pre_curvature)
     even = np.linspace(place[0], place[-1], READINGS)
     return [
         KnotPart(kappa_per_m=float(k), tangent_Nm2=float(f), std_Nm2=float(std))

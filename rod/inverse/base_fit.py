@@ -1,8 +1,8 @@
 """The base model fitted to a test: the start of every inverse problem, with and without causes that extend it.
 
-Strategy: a rough start by what photos show over the moment P y, or a constant; where no force-free photo holds K0, or
-what was found leaves more than noise, starts on both sides of it; the photos' noise by what is faster along the cable
-than any misfit; and once more, with the abscissa of the law laid along the law found.
+Strategy: a rough start by what photos show over the moment P y, or a constant; where no force-free photo holds K0,
+starts on both sides of it; the photos' noise by what is faster along the cable than any misfit; and once more, with the
+abscissa of the law laid along the law found.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.compliance_law import refreshed
+from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, start
 from rod.inverse.extension import Extension
-from rod.inverse.fit import FITS, ITERATIONS, Fit, fit, fit_from
-from rod.inverse.laws import AnyLaw
+from rod.inverse.fit import ITERATIONS, Fit, fit, fit_from
+from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, turned
 from rod.inverse.noise import calibrate_photo_noise
-from rod.inverse.observation import DISPLACEMENT_STD, Observation, normal_distance, observe
+from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
 from rod.inverse.prediction import Facts
 from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredTest
@@ -46,6 +46,7 @@ def base_fit(
     near: MeasuredLaw | None = None,
     begin: tuple[float, float] | None = None,
     elements: int = ELEMENTS,
+    functions: int = SHAPE_FUNCTIONS,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
 ) -> BaseFit:
@@ -62,6 +63,8 @@ def base_fit(
         Constant EI and K0 to start from instead of what photos show.
     elements : int
         Of the simulated cable.
+    functions : int
+        Of the shapes that a photo is compared by.
     without_photos, without_forces : sets of int
         Indices of steps whose photo or force is not to be trusted.
 
@@ -70,7 +73,8 @@ def base_fit(
     ValueError
         If no step has both a photo and a force.
     """
-    observation = observe(test, without_photos=without_photos, without_forces=without_forces)
+    without = {"without_photos": without_photos, "without_forces": without_forces}
+    observation = observe(test, functions=functions, **without)
     base = replace(start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin), elements=elements)
     fitted = _first_fit(observation, base, facts)
     if fitted.run.prediction is None or not observation.photos:
@@ -102,8 +106,7 @@ def _first_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
         if best.converged:
             break
     assert best is not None
-    held = "mounted" in facts.branch and best.reduced_chi2 < FITS
-    if best.run.prediction is not None and not held:
+    if best.run.prediction is not None and "mounted" not in facts.branch:
         for vector in _beside(base, best.vector, SIDE * facts.curvature_scale):
             best = better(vector)
     return best
@@ -118,17 +121,25 @@ def _beside(base: Base, vector: Array, apart: float) -> Iterator[Array]:
         yield moved
 
 
-def laid_along(fitted: Fit) -> tuple[Extension, Array]:
-    """The model with the abscissa of its law laid along the law found, over the bends visited, and its vector there."""
+def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
+    """The model with the abscissa of its law laid along the law found, over what was visited, and its vector there."""
     base, count = fitted.extension.base, fitted.extension.base.law.size
-    law, bends = law_of(fitted), fitted.excess
-    basis = refreshed(law.rise, fitted.covariance[:count, :count], float(bends.min()), float(bends.max()))
-    extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis)))
-    return extension, np.r_[basis.projected(law.rise), fitted.vector[count:]]
+    assert isinstance(base.law, AnyLaw)
+    law, visited = law_of(fitted), np.append(fitted.excess, 0.0)
+    rise, known, size = base.law.basis.law(fitted.vector[:count]), fitted.covariance[:count, :count], count
+    if base.law.over != over:
+        size = COEFFICIENTS
+        rise = turned(law, visited, over)
+        known = np.zeros((rise.basis.size, rise.basis.size))
+    if over == "moment":
+        visited = law.moment(visited, np.zeros(1))
+    basis = refreshed(rise, known, float(visited.min()), float(visited.max()), size=size)
+    extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis, over)))
+    return extension, np.r_[basis.projected(rise), fitted.vector[count:]]
 
 
-def law_of(fitted: Fit) -> StiffnessLaw:
+def law_of(fitted: Fit) -> FreeLaw:
     """f_EI of a fitted model whose law may have any form."""
     law = fitted.extension.base.characteristic(fitted.vector)
-    assert isinstance(law, StiffnessLaw)
+    assert isinstance(law, StiffnessLaw | ComplianceLaw)
     return law

@@ -22,18 +22,19 @@ from functools import cached_property
 
 import numpy as np
 
+from rod.compliance_law import ComplianceLaw
 from rod.equilibrium import Outcome
 from rod.inverse.base import ELEMENTS, measured_curvatures
 from rod.inverse.base_fit import base_fit, law_of
 from rod.inverse.fit import Fit
 from rod.inverse.gains import gains, loaded_pre_curvature
+from rod.inverse.laws import FreeLaw
 from rod.inverse.mean_law import linearised, mean_law, moved_by_forces, rows_posterior, weights
 from rod.inverse.observation import KINDS, Observation
 from rod.inverse.prediction import facts_of
 from rod.measured_law import POINTS, Array, MeasuredLaw, propagated
 from rod.measurement import MeasuredStep, MeasuredTest
 from rod.midline import LEAST_SECTIONS
-from rod.stiffness_law import StiffnessLaw
 
 OPPOSITE = -0.5
 """Correlation of curvature and moment below which forces contradict photos; noise brings it to zero, not below."""
@@ -111,7 +112,7 @@ class Estimate:
         return self.outcome is InverseOutcome.CONVERGED
 
     @property
-    def characteristic(self) -> StiffnessLaw | None:
+    def characteristic(self) -> FreeLaw | None:
         """The fitted law."""
         return None if self.fitted is None else law_of(self.fitted)
 
@@ -194,7 +195,8 @@ def estimate(
     if fitted.run.prediction is None:
         limit = fitted.run.failed is Outcome.LIMIT_POINT
         return Estimate(InverseOutcome.LIMIT_POINT if limit else InverseOutcome.NO_EQUILIBRIUM)
-    return _read_off(test, observation, mean_law(observation, fitted), rest)
+    found = mean_law(observation, fitted, ("bend",) if rest else ("bend", "moment"))
+    return _read_off(test, observation, found, rest)
 
 
 def _tells(step: MeasuredStep) -> bool:
@@ -257,13 +259,15 @@ def _read_off(test: MeasuredTest, observation: Observation, fitted: Fit, rest: f
         by_pre_curvature=np.eye(size + 1)[base.law.size],
         covariance=np.pad(covariance, (0, 1)) + np.diag(np.eye(size + 1)[-1]),
     )
-    splines, (loaded, loaded_std) = law.basis.at(kappa - K0), loaded_pre_curvature(test, observation, fitted, rest)
+    over_moments = isinstance(law, ComplianceLaw)
+    splines = law.basis.at(moment if over_moments else kappa - K0)
+    loaded, loaded_std = loaded_pre_curvature(test, observation, fitted, rest)
     measured = replace(
         measured,
         gains=gains(test, observation, fitted, by_log @ posterior.covariance)
         | {("common_force", -1): by_log @ by_forces},
-        # coefficients of log f by least squares on the grid, which covers the bends of the basis
-        shortfall=-by_log @ posterior.shrinkage @ np.linalg.pinv(splines),
+        # coefficients of log f, or of log c = -log f, by least squares on the grid, which covers the basis
+        shortfall=(by_log if over_moments else -by_log) @ posterior.shrinkage @ np.linalg.pinv(splines),
         loaded_pre_curvature=loaded,
         loaded_pre_curvature_std=loaded_std,
     )
@@ -283,7 +287,7 @@ def by_parameters(fitted: Fit, K: Array) -> tuple[Array, Array]:
     by_log[:, :own] = law.log_tangent_by_parameters(K, K0)
     by_moment[:, :own] = law.moment_by_parameters(K, K0)
     if bend is not None:
-        by_log[:, bend] = -law.log_slope(K, K0)
+        by_log[:, bend] = law.log_tangent_by_pre_curvature(K, K0)
         by_moment[:, bend] = law.moment_by_pre_curvature(K, K0)
     return by_log, by_moment
 

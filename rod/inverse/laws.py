@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
 from rod.characteristic import Characteristic, ParametricCurve
-from rod.compliance_law import LawBasis, moment_basis, refreshed
+from rod.compliance_law import ComplianceLaw, LawBasis, moment_basis, refreshed
 from rod.law_prior import priors
 from rod.measured_law import MeasuredLaw
 from rod.stiffness_law import StiffnessLaw
@@ -34,6 +34,10 @@ bearings for its own."""
 
 REST_SLOPE = 1.0
 """Prior size of d log f / dxi at rest: a cable that bends alike to both sides has none."""
+
+
+FreeLaw = StiffnessLaw | ComplianceLaw
+Abscissa = Literal["bend", "moment"]
 
 
 class Law(Protocol):
@@ -58,18 +62,25 @@ class Law(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class AnyLaw:
-    """Coefficients of log f_EI on a basis of bends."""
+    """Coefficients of log f_EI on a basis of bends, or of the log compliance on one of moments.
+
+    Over bends other causes may carry a part of the moment, and the law stays what it is at all other bends. Over
+    moments K0 is added to all curvatures alike, whatever the law: what photos without a force-free one leave open of
+    both is told rightly by the linear model.
+    """
 
     basis: LawBasis
+    over: Abscissa = "bend"
 
     @property
     def size(self) -> int:
         """Number of coefficients."""
         return self.basis.size
 
-    def curve(self, unknowns: Array) -> StiffnessLaw:
+    def curve(self, unknowns: Array) -> FreeLaw:
         """The law at coefficients (size,)."""
-        return StiffnessLaw(self.basis.law(unknowns))
+        law = self.basis.law(unknowns)
+        return StiffnessLaw(law) if self.over == "bend" else law
 
     def by(self, unknowns: Array) -> Array:
         """The coefficients are the law's own parameters."""
@@ -77,7 +88,7 @@ class AnyLaw:
 
     def stiffer(self, factor: float) -> Array:
         """B-splines of equal coefficients are a constant."""
-        return np.full(self.size, np.log(factor))
+        return np.full(self.size, np.log(factor) if self.over == "bend" else -np.log(factor))
 
     def prior(self) -> Array:
         """A rough law that is flat at rest, as far as `ROUGHNESS` and `REST_SLOPE` let it."""
@@ -206,3 +217,17 @@ def following(tangent: Array, bend: Array, *, unit: float) -> tuple[AnyLaw, Arra
     basis = moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS)
     log_f = np.interp(basis.moments, bend, np.log(tangent / unit))
     return AnyLaw(basis), np.asarray(np.linalg.lstsq(basis.at_ends, log_f, rcond=None)[0])
+
+
+FINE = 256
+"""Coefficients of a law on its way from one abscissa to another: a plateau is hardly anything of the moments."""
+
+
+def turned(law: FreeLaw, bends: Array, over: Abscissa) -> ComplianceLaw:
+    """The rise of a law over the moments of given bends (n,) 1/m, or over these bends."""
+    bend = np.linspace(min(float(bends.min()), 0.0), max(float(bends.max()), 0.0), 20 * FINE)
+    moment, f = law.bound(np.zeros(1))(bend)
+    at, rate, unit = (bend, f, law.stiffness_scale) if over == "bend" else (moment, 1.0 / f, 1.0 / law.stiffness_scale)
+    basis = moment_basis(float(at[0]), float(at[-1]), unit=unit, size=FINE)
+    log_rate = np.interp(basis.moments, at, np.log(rate / unit))
+    return basis.law(np.asarray(np.linalg.lstsq(basis.at_ends, log_rate, rcond=None)[0]))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rod.inverse.base_fit import laid_along
 from rod.inverse.fit import Fit, evaluated
-from rod.inverse.laws import AnyLaw
+from rod.inverse.laws import Abscissa, AnyLaw
 from rod.inverse.observation import Observation, of_hold
 from rod.law_prior import Posterior, averaged, priors
 
@@ -35,11 +35,24 @@ FORGOTTEN = 100.0
 """Plausible sizes: prior of the amount of a cause where data tell nothing of it, so that its band is not infinite."""
 
 
-def mean_law(observation: Observation, fitted: Fit) -> Fit:
-    """The model at the mean over all priors of its law; the fit as it is where that has no equilibrium."""
+def mean_law(observation: Observation, fitted: Fit, overs: Sequence[Abscissa] = ("bend",)) -> Fit:
+    """The model at the mean over all priors of its law, on the likeliest of some abscissae.
+
+    The fit as it is where that has no equilibrium. For ``overs`` see `rod.inverse.laws.AnyLaw`.
+    """
+    found = [_mean_over(observation, fitted, over) for over in overs]
+    return found[0] if len(found) == 1 else max(found, key=lambda one: _log_evidence(observation, one))
+
+
+def _log_evidence(observation: Observation, fitted: Fit) -> float:
+    louder = float(np.log(weights(observation, fitted)).sum())
+    return mean_posterior(observation, fitted).log_evidence + louder
+
+
+def _mean_over(observation: Observation, fitted: Fit, over: Abscissa) -> Fit:
     found = fitted
     for _ in range(LAYINGS):
-        extension, vector = laid_along(found)
+        extension, vector = laid_along(found, over)
         there = _at(observation, replace(found, extension=extension), vector)
         mean = None if there is None else _at_mean(observation, there)
         # a mean is off by a standard deviation of each unknown at most; farther off, what is linear is no guide (two

@@ -188,6 +188,7 @@ def observe(
     test: MeasuredTest,
     *,
     photo_noise: PhotoNoise | None = None,
+    functions: int = SHAPE_FUNCTIONS,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
 ) -> Observation:
@@ -198,6 +199,8 @@ def observe(
     test : MeasuredTest
     photo_noise : PhotoNoise or None
         Calibrated noise of the sections; as stated by the photos if None.
+    functions : int
+        Of the shapes that a photo is compared by.
     without_photos, without_forces : sets of int
         Indices of steps whose photo or force is not to be trusted.
     """
@@ -215,7 +218,7 @@ def observe(
     for i, step in enumerate(test.steps):
         if step.chord is None or i in without_photos:
             continue
-        photo = _photo_data(i, test, noise)
+        photo = _photo_data(i, test, noise, functions)
         photos.append(photo)
         kind.append(np.r_[1, np.full(len(photo.whiten) - 1, 2)])
         where.append(np.full(len(photo.whiten), i))
@@ -226,13 +229,12 @@ def observe(
     return replace(observed, force_own=level.own, force_common=rounding)
 
 
-def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise) -> PhotoData:
+def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise, functions: int) -> PhotoData:
     step = test.steps[index]
     assert step.chord is not None
     seen = step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
     sections = midline(step.shape) if seen and step.shape is not None else NOWHERE
-    functions = min(SHAPE_FUNCTIONS, len(sections.s) // 2)
-    basis = smooth_basis(sections.s, test.length, functions=functions)
+    basis = smooth_basis(sections.s, test.length, functions=min(functions, len(sections.s) // 2))
     stated = step.chord_std if step.chord_std is not None else CHORD_STD * step.chord
     whiten = _whitening(step.chord, stated, sections, basis, noise)
     whole = float(np.hypot(stated, DISPLACEMENT_STD))

@@ -75,7 +75,7 @@ def test_the_covariance_with_the_pre_curvature_is_that_of_the_fit(way, result):
     by_tangent = np.zeros((way.law.kappa.size + 1, len(way.covariance)))
     f = law.tangent(way.law.kappa, K0)
     by_tangent[:-1, :p] = f[:, None] * law.log_tangent_by_parameters(way.law.kappa, K0)
-    by_tangent[:-1, p] = -f * law.log_slope(way.law.kappa, K0)  # the law moves along with K0
+    by_tangent[:-1, p] = f * law.log_tangent_by_pre_curvature(way.law.kappa, K0)  # the law moves along with K0
     by_tangent[-1, p] = 1.0
     exact = by_tangent @ way.covariance @ by_tangent.T
     found = identified_model(result)

@@ -144,8 +144,8 @@ def test_the_band_holds_the_distance_to_another_answer(plain):
     other = replace(
         plain.base, vector=plain.base.vector + np.r_[np.full(count, 0.03), np.zeros(len(plain.base.vector) - count)]
     )
-    alone = curve(plain.base, points=21)
-    shared = curve(plain.base, points=21, other=other)
+    alone = curve(plain.base)
+    shared = curve(plain.base, other=other)
     apart = np.expm1(0.03) * np.array(alone.tangent_Nm2)
     expected = np.hypot(alone.tangent_std_Nm2, apart)
     assert shared.tangent_Nm2 == alone.tangent_Nm2

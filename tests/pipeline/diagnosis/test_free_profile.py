@@ -56,7 +56,7 @@ def test_a_profile_of_no_form_is_found_to_the_noise_and_f_comes_back(name, cable
     found = refit_one(bench.observation, bench.base, bench.suspicion, 0)
     assert found.fitted.reduced_chi2 < FITS
     again = identified_again(bench.observation, found.fitted)
-    law = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)
+    law = curve(again.fitted, covariance=again.covariance, other=again.other)
     assert f_error(law, cable)[0] < 0.02
     extension, vector = found.fitted.extension, found.fitted.vector
     uniform, varying = extension.base_model(vector), extension.model(vector)

@@ -26,7 +26,7 @@ def off(cable, name, protocol, largest, seed):
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     accepted = refit_one(bench.observation, bench.base, bench.suspicion, 0)
     again = identified_again(bench.observation, accepted.fitted)
-    found = curve(again.fitted, points=61, covariance=again.covariance, other=again.other)
+    found = curve(again.fitted, covariance=again.covariance, other=again.other)
     kappa, tangent, std = (np.array(v) for v in (found.kappa_per_m, found.tangent_Nm2, found.tangent_std_Nm2))
     truth = cable.law(kappa - cable.K0)[1]
     errors = (tangent / truth - 1.0, std / truth, (tangent - truth) / std)

@@ -17,6 +17,7 @@ from pipeline.faults import faults_of_input
 from pipeline.result import Curve
 from pipeline.run import measure
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.balance import balance
 from tests.rod.virtual_photo import parted_axes
 
 SETTINGS = DiagnosisSettings()
@@ -58,7 +59,8 @@ def test_covers_above_the_cable_are_no_cause(protocol):
 def test_a_law_with_an_early_knee_is_begun_on_the_side_where_its_cable_is_bent(seed, steps):
     """A straight line through all curvatures asks for a K0 of the other sign, and moments alone show no law."""
     trial = LawTrial("knee-20", seed, steps)
-    bench = workbench.prepare(faults_of_input(trial.measured()[0]), SETTINGS)
+    test = trial.measured()[0]
+    bench = workbench.prepare(faults_of_input(test), SETTINGS, graph=balance(test))
     found = bench.base.extension.base.pre_curvature(bench.base.vector)
     # a hundredth of the curvatures met is what photos without one at rest tell
     assert found == pytest.approx(trial.cable.law.K0, abs=0.01 * trial.cable.law.reach)
