@@ -117,7 +117,7 @@ def midline(shape: MeasuredShape, *, blocks: int = BLOCKS) -> Midline:
     ----------
     shape : MeasuredShape
     blocks : int
-        At least that many, of equally many sections each, if there are as many; what is left over at the ends is dropped.
+        At least that many, of equally many sections each; what is left over at the ends is dropped.
 
     Raises
     ------

@@ -73,8 +73,7 @@ def base_fit(
     ValueError
         If no step has both a photo and a force.
     """
-    without = {"without_photos": without_photos, "without_forces": without_forces}
-    observation = observe(test, functions=functions, **without)
+    observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
     base = replace(start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin), elements=elements)
     fitted = _first_fit(observation, base, facts)
     if fitted.run.prediction is None or not observation.photos:
@@ -85,7 +84,9 @@ def base_fit(
         [photo.sections for photo in shown],
         [photo.basis for photo in shown],
     )
-    observation = observe(test, photo_noise=noise, without_photos=without_photos, without_forces=without_forces)
+    observation = observe(
+        test, photo_noise=noise, functions=functions, without_photos=without_photos, without_forces=without_forces
+    )
     here = fitted.extension, fitted.vector
     # laid along itself the law moves a little, and a cable that was about to snap over may do so
     again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))

@@ -43,6 +43,10 @@ INVISIBLE = 0.5
 """Standard deviation of log f, or K0 times length, beyond which it counts as not visible: a factor of 1.6."""
 
 
+FUNCTIONS = 32
+"""Of the shapes that a photo is compared by: an early knee is met by a twentieth of the cable at either end."""
+
+
 class InverseOutcome(Enum):
     """How the inverse problem ended; the value is advice to the reader."""
 
@@ -191,7 +195,9 @@ def estimate(
     curvatures, moments = measured_curvatures(test)
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
-    observation, fitted = base_fit(test, facts_of(test), near=near, begin=begin, elements=elements, without_forces=rest)
+    observation, fitted = base_fit(
+        test, facts_of(test), near=near, begin=begin, elements=elements, functions=FUNCTIONS, without_forces=rest
+    )
     if fitted.run.prediction is None:
         limit = fitted.run.failed is Outcome.LIMIT_POINT
         return Estimate(InverseOutcome.LIMIT_POINT if limit else InverseOutcome.NO_EQUILIBRIUM)
@@ -261,7 +267,7 @@ def _read_off(test: MeasuredTest, observation: Observation, fitted: Fit, rest: f
     )
     over_moments = isinstance(law, ComplianceLaw)
     splines = law.basis.at(moment if over_moments else kappa - K0)
-    loaded, loaded_std = loaded_pre_curvature(test, observation, fitted, rest)
+    loaded, loaded_std = loaded_pre_curvature(test, observation, fitted, rest, functions=FUNCTIONS)
     measured = replace(
         measured,
         gains=gains(test, observation, fitted, by_log @ posterior.covariance)

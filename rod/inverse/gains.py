@@ -79,7 +79,7 @@ def _errors_of(photo: PhotoData) -> dict[str, Array]:
 
 
 def loaded_pre_curvature(
-    test: MeasuredTest, observation: Observation, fitted: Fit, rest: frozenset[int]
+    test: MeasuredTest, observation: Observation, fitted: Fit, rest: frozenset[int], *, functions: int
 ) -> tuple[float, float]:
     """K0 and its standard deviation, 1/m, without the photos of the steps ``rest``: a witness of its own."""
     at = fitted.extension.base.pre_curvature_index
@@ -87,7 +87,9 @@ def loaded_pre_curvature(
     count = observation.rows.count
     kept = ~np.isin(observation.rows.step, list(rest))
     if not kept.all():
-        alone = observe(test, photo_noise=observation.photo_noise, without_photos=rest, without_forces=rest)
+        alone = observe(
+            test, photo_noise=observation.photo_noise, functions=functions, without_photos=rest, without_forces=rest
+        )
         weight = weights(observation, fitted)
 
         def without(rows: Array) -> Array:

@@ -245,7 +245,7 @@ def test_more_blocks_of_a_photo_change_nothing_beyond_the_band(monkeypatch):
     one = law_of(test)
     monkeypatch.setattr("rod.balance.moment_points.midline", partial(midline, blocks=192))
     two = law_of(test)
-    assert max(p.photo.s.size for p in moment_points(test)) == 192
+    assert max(p.photo.s.size for p in moment_points(test)) >= 192
     assert np.all(np.abs(np.interp(one.kappa, two.kappa, two.tangent) - one.tangent) < 0.5 * one.tangent_std)
 
 

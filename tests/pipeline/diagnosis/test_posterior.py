@@ -170,7 +170,7 @@ def test_one_shape_that_comes_and_goes_from_step_to_step(bench, grid, size, word
 
     A rate of 0.9 shows less than 6 of 10 once in a hundred.
     """
-    right, scatter = 0, np.median([np.median(photo.sections.std) for photo in bench.observation.photos])
+    right, scatter = 0, np.median([np.median(photo.sections.section_std) for photo in bench.observation.photos])
     for seed in range(10):
         rng = np.random.default_rng([5, seed])
         field, phase = np.zeros(bench.observation.rows.count), rng.uniform(0.0, np.pi)
