@@ -63,7 +63,7 @@ def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, A
 
 def checked(folder: Path, settings: Settings) -> dict[str, Any]:
     """What a run would find in one folder and on its photos; whatever breaks in it is told as the run would tell it."""
-    from pipeline.batch.specimen import refusal
+    from pipeline.batch.specimen import refusals
     from pipeline.intake.folder import read_specimen
     from pipeline.vision.look import look_at_photos
 
@@ -71,7 +71,7 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
         specimen = read_specimen(folder, settings.intake)
         seen = look_at_photos(specimen, settings.vision)
     except Exception as error:  # one folder never costs the others
-        return _failed(folder, refusal(error))
+        return _failed(folder, refusals(error))
     told = dict.fromkeys((*specimen.findings, *seen))
     levels = {finding.level for finding in told}
     status = "error" if "error" in levels else "warning" if "warning" in levels else "ok"
@@ -87,12 +87,12 @@ def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any
     from pipeline.result import FindingPart
 
     died = FindingPart.of("error", Message("specimen/worker-died.once"))
-    return _failed(folder, overdue(seconds) if over else died)
+    return _failed(folder, [overdue(seconds) if over else died])
 
 
-def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
+def _failed(folder: Path, findings: list[FindingPart]) -> dict[str, Any]:
     row = {"folder": str(folder), "id": None, "status": "error", "runs": False, "steps": 0, "photos": 0}
-    return row | {"findings": [told.model_dump()]}
+    return row | {"findings": [finding.model_dump() for finding in findings]}
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:

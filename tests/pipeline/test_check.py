@@ -116,6 +116,45 @@ def test_all_values_that_are_missing_or_wrong_are_named_at_once(folder):
     assert "length_mm = 0.0 and diameter_mm = 0.0 cannot be used" in message
 
 
+def test_a_wrong_value_hides_no_missing_one_and_no_missing_file(folder):
+    file = folder / "specimen.toml"
+    text = file.read_text().replace("length_mm = 181.0000", "length_mm = 0").replace("diameter_mm = 4.600\n", "")
+    file.write_text(text.replace('moving_bearing = "left"', 'moving_bearing = "links"\ncolour = "red"'))
+    (folder / "force.csv").unlink()
+    shutil.rmtree(folder / "images")
+    code, row = checked(folder)
+    assert (code, row["runs"]) == (3, False)
+    told = [(finding["code"], finding["message"]) for finding in row["findings"]]
+    assert [code for code, _ in told] == [
+        "toml/wrong-value",
+        "toml/unknown-key",
+        "toml/wrong-value",
+        "toml/missing-key",
+        "folder/no-force-log",
+        "folder/no-photos",
+    ]
+    for words, (_, message) in zip(
+        ("length_mm = 0 cannot", "colour", "links", "diameter_mm is missing", "force log", "no photos"),
+        told,
+        strict=True,
+    ):
+        assert words in message
+
+
+def test_a_description_that_cannot_be_parsed_hides_no_missing_file(folder):
+    (folder / "specimen.toml").write_text("[specimen\n")
+    (folder / "force.csv").unlink()
+    shutil.rmtree(folder / "images")
+    codes = {finding["code"] for finding in checked(folder)[1]["findings"]}
+    assert codes == {"toml/syntax", "folder/no-force-log", "folder/no-photos"}
+
+
+def test_a_misspelt_size_is_told_once(folder):
+    file = folder / "specimen.toml"
+    file.write_text(file.read_text().replace("diameter_mm", "diamter_mm"))
+    assert [finding["code"] for finding in checked(folder)[1]["findings"]] == ["toml/unknown-key"]
+
+
 def test_a_spreadsheet_in_place_of_the_log_is_named(folder):
     (folder / "force.csv").unlink()
     (folder / "Messung 3.xlsx").write_bytes(b"PK\x03\x04")
