@@ -21,7 +21,7 @@ from pipeline import __version__
 from pipeline.identify import Identification, IdentificationParts, identification_parts
 from pipeline.identify.parts import PhotoResidual
 from pipeline.messages import Message
-from pipeline.records import Centerline, Finding, Level, LoadStep, Preview, Rejected, Specimen, Traces, of_photo
+from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces, said_once
 from pipeline.result import (
     BalancePart,
     DiagnosisPart,
@@ -177,22 +177,11 @@ def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) 
 
 def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
     """What was noticed on photos, and why some were refused; what is the same on several is said once, with names."""
-    groups: dict[str, list[tuple[str, Level, Message]]] = {}
-    for photo in photos:
-        told = photo.findings if isinstance(photo, Centerline) else [Finding(photo.code, "warning", photo.said)]
-        for finding in told:
-            groups.setdefault(finding.said.key, []).append((photo.image, finding.level, finding.said))
-    return [_said_once(group) for group in groups.values()]
-
-
-def _said_once(group: list[tuple[str, Level, Message]]) -> Finding:
-    image, level, said = group[0]
-    names = list(dict.fromkeys(image for image, _, _ in group))
-    if len(names) == 1:
-        return of_photo(image, level, said)
-    alike = len({str(one) for _, _, one in group}) == 1
-    key = "photos.several" if alike else "photos.several-on"  # the numbers are those of one photo
-    return Finding(said.code, level, Message(key, count=len(names), names=names, image=image, said=said))
+    return said_once(
+        (photo.image, finding)
+        for photo in photos
+        for finding in (photo.findings if isinstance(photo, Centerline) else [photo.finding])
+    )
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:

@@ -44,6 +44,10 @@ def smaller(path, _):
     cv2.imwrite(str(path), cv2.resize(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2)))
 
 
+def turned(path, _):
+    cv2.imwrite(str(path), cv2.rotate(picture(path), cv2.ROTATE_90_COUNTERCLOCKWISE))
+
+
 def doubled(path, other):
     shutil.copy(other, path)
 
@@ -67,6 +71,7 @@ def test_good_photos_are_no_news(folder):
         (blurred, {"photo/blur", "photo/contrast"}),  # a cable smeared over forty pixels may hardly stand out
         (smaller, {"photo/size"}),
         (doubled, {"photo/doubled"}),
+        (turned, {"photo/turned"}),
     ],
 )
 def test_a_spoilt_photo_is_told(folder, spoil, codes):
@@ -83,6 +88,20 @@ def test_no_photo_that_can_be_used_is_an_error(folder):
     code, row = checked(folder)
     assert (code, row["status"], row["runs"]) == (3, "error", False)
     assert {f["code"] for f in row["findings"] if f["level"] == "error"} == {"photo/blank"}
+
+
+def test_a_fault_of_several_photos_is_one_sentence_with_their_names(folder):
+    for path in (folder / "images").iterdir():
+        black(path, None)
+    (message,) = [f["message"] for f in checked(folder)[1]["findings"] if f["code"] == "photo/blank"]
+    assert message.startswith("3 photos (images/step_00.jpg, images/step_01.jpg, ")
+
+
+def test_sizes_that_all_differ_are_named(folder):
+    for number, path in enumerate(sorted((folder / "images").iterdir())):
+        cv2.imwrite(str(path), cv2.copyMakeBorder(picture(path), *[8 * number] * 4, cv2.BORDER_REPLICATE))
+    (told,) = [f for f in checked(folder)[1]["findings"] if f["code"] == "photo/size"]
+    assert all(size in told["message"] for size in ("1120 x 420 px", "1136 x 436 px", "1152 x 452 px"))
 
 
 def test_a_picture_of_a_telephone_is_told_once(folder):
