@@ -93,6 +93,8 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
             share = words("does_not_suffice")
         line = f"{words.cause(cause.name)}: {estimate} ({share})"
+        if forms := cause.in_what_form(words.language):
+            line += f"; {words('form_of', forms=', '.join(forms))}"
         settled = {twin.name: twin for twin in cause.twins}
         alike = [name for name in cause.class_ if name != cause.name]
         fitting = [name for name in settled if name not in cause.class_]

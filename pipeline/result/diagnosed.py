@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from pipeline.messages import Message, catalogue
 from pipeline.result.lists import Floats, Number
 from pipeline.result.parts import Curve, Part, SaidPart, Widening
 
@@ -53,6 +54,16 @@ class CausePart(Part):
     unit: str = Field(description="of the amount; - is a plain number")
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
     twins: list[TwinPart] = Field([], description="other causes that leave no more than noise, whether likely or not")
+
+    def in_what_form(self, language: str) -> list[str]:
+        """The forms that the cause has in the extended model, in words; with figures where these were fitted."""
+        known = catalogue("en")
+        said = []
+        for form in self.forms:
+            message = Message(f"form.{self.name}.{form.label}", at=form.at, width=form.width)
+            if message.key in known:
+                said.append(message.parts(language)[-1 if form.tuned else 0])
+        return list(dict.fromkeys(said))
 
 
 class HypothesisPart(Part):
