@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.batch.orders import Order, fingerprint
+from pipeline.batch.processes import deadline
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
@@ -115,7 +114,7 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
             refused = _earlier_attempts(store, order, limit.attempts, limit.timeout_s)
             if refused is not None:
                 return store_failure(order, [refused], started)
-            with _deadline(limit.timeout_s, store.overdue(order.name)):
+            with deadline(limit.timeout_s, store.overdue(order.name).touch):
                 outcome = _measured(store, order, stages, started, doing)
             store.end(order.name)
             return outcome
@@ -152,24 +151,6 @@ def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: floa
 def overdue(timeout_s: float) -> FindingPart:
     """What is told of a specimen that took longer than it may."""
     return FindingPart.of("error", Message("specimen/timeout", seconds=timeout_s))
-
-
-@contextlib.contextmanager
-def _deadline(seconds: float, note: Path) -> Iterator[None]:
-    """End this process when the time is over: code in a library that hangs cannot be asked to stop."""
-
-    def end() -> None:
-        with contextlib.suppress(OSError):
-            note.touch()
-        os._exit(124)  # the customary exit code of a timeout
-
-    timer = threading.Timer(seconds, end)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def _measured(store: Store, order: Order, stages: Stages, started: float, doing: Doing) -> Outcome:
