@@ -12,7 +12,7 @@ import datetime
 import importlib.metadata
 import platform
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -128,12 +128,17 @@ WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium
 """Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
 
 
+EXPLAINED = {"identify/misfit-force", "identify/misfit-shape", "identify/branches"}
+"""What the simulation without a cause leaves: no warning where the cause was found."""
+
+
 def without_advice(earlier: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
-    """Findings, those of a fit that failed for want of a cause told as that where the curve is that with the cause."""
+    """Findings, those of a fit that lacked a cause told as that where the curve is that with the cause."""
     if diagnosis is None or diagnosis.extended is None or diagnosis.verdict not in CAUSES_NAMED:
         return list(earlier)
     said = Message("way.inverse-extended")
-    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in earlier]
+    told = [replace(one, level="info") if one.code in EXPLAINED else one for one in earlier]
+    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in told]
 
 
 def _gathered(

@@ -67,7 +67,7 @@ class ParametricCurve(MomentCurve, Protocol):
 
     @property
     def parameters(self) -> int:
-        """How many."""
+        """Number of them."""
 
     def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment by them at fixed curvature, (n, p)."""

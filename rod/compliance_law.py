@@ -130,7 +130,10 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
 
 
 def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float) -> LawBasis:
-    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi along a law, known to a covariance (p, p)."""
+    """Basis over the moments [min(low, 0), max(high, 0)] N m on which a law found before changes evenly along xi.
+
+    ``covariance`` (p, p) says how well it is known: of its changes counts what is.
+    """
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
     m = m[(m >= low) & (m <= high)]

@@ -71,9 +71,10 @@ class Point(NamedTuple):
 
 
 class Ramp:
-    """What is imposed as it grows with the share, and the geometry of the path; ``steps`` counts Newton steps.
+    """A load or displacement that grows from nothing (share 0) to all of it (1), and steps along its equilibria.
 
-    From ``None``, the mounted cable, loads and supports grow; from a start they stand, and its residuals fade.
+    ``steps`` counts Newton steps. From ``None``, the mounted cable, loads and supports grow; from a start they stand,
+    and its residuals fade.
     """
 
     def __init__(self, system: System, start: Start | None) -> None:

@@ -85,7 +85,10 @@ def _separates(experiment: NextExperiment, words: Words) -> str:
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
-    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says."""
+    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says.
+
+    A cause that does not suffice may not be there at all: nobody is told to mend it.
+    """
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
@@ -101,7 +104,8 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         for key, names in (("same_class", alike), ("fits_too", fitting[:LIKELIEST])):
             if names:
                 line += f"; {words(key, names=', '.join(_twin(name, settled.get(name), words) for name in names))}"
-        named.append(NamedCause(line, *words.about(cause.name)))
+        about = ("", "") if part.verdict == "unexplained" else words.about(cause.name)
+        named.append(NamedCause(line, *about))
     return named
 
 

@@ -34,7 +34,7 @@ class CauseForm(Part):
 
 
 class TwinPart(Part):
-    """A cause that stands instead of the one that was named: improbable, or of its class."""
+    """Another cause that may act in place of the one named: less probable, or not to be told from it."""
 
     name: str = Field(description="of the cause")
     probability: Number = Field(description="of the cause, given the data")
@@ -102,7 +102,7 @@ class CauseRow(Part):
 
 
 class GainPart(Part):
-    """What the extension bought, on steps it had not seen."""
+    """How much of the misfit the extended model removes, on steps it had not seen."""
 
     heldout_excess_removed: Number = Field(
         description="share of the misfit beyond noise that the extension removes, on steps it had not seen"
@@ -172,7 +172,7 @@ class ForceCorrectionPart(Part):
 
 
 class LeftoverPart(SaidPart):
-    """What no cause explains, as it is likeliest."""
+    """What no cause explains: how much of it there is, where it sits, and its pattern."""
 
     message: str = Field(description="where it sits, in words")
     probability: Number = Field(1.0, description="that something acts that is no cause of the catalogue")

@@ -1,4 +1,4 @@
-"""Numbers of a size that can be reckoned with, and lists that belong together."""
+"""Types of the fields: numbers whose cube is a number still, and a check that lists belong together."""
 
 from __future__ import annotations
 

@@ -186,7 +186,7 @@ class Curve(Part):
 
 
 class Widening(Part):
-    """What all that is believed adds to the band of the curve that answers, beyond what its own way tells."""
+    """How much wider the band of the answer is than its own fit tells: for weak causes and for what nobody knows."""
 
     kappa_per_m: Floats = Field(description="curvature, increasing, 1/m")
     tangent_factor: list[Floats] = Field(
@@ -230,7 +230,7 @@ class KnotPart(Part):
 
 
 class MisfitPart(Part):
-    """How well the fitted simulation explains the data, in units and in sigma."""
+    """How well the fitted simulation explains the data: what it leaves, in units and in standard deviations."""
 
     force_rmse_N: Number = Field(description="measured minus simulated force, root mean square, N")
     shape_rmse_m: Number = Field(description="measured minus simulated position, root mean square, m")

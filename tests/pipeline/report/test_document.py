@@ -215,7 +215,7 @@ def test_nothing_of_a_user_is_markup(partial_result):
 def test_failed_specimen_says_why(failed_result):
     text = Page(report_html(failed_result)).text
     assert "Specimen cable-13 was not measured: force.csv: the log is empty; export it again." in text
-    assert "Mend that and run the same command again" in text
+    assert "Mend what is listed below and run the same command again" in text
 
 
 def test_specimen_whose_photos_were_all_refused_says_so_first(full_result):
@@ -328,7 +328,7 @@ def test_curve_without_covariance_gives_a_bound(full_result):
 
 def test_answer_of_an_extended_model_speaks_of_its_own_pre_curvature(named_page):
     assert "K0 = 2.00000 ± 0.00005 1/m" in headline(named_page)  # where the moment of its own curve is zero
-    assert "This was before the extension." in named_page
+    assert "Both are still without what the extended model adds." in named_page
 
 
 def without(*names):

@@ -168,7 +168,7 @@ def test_failed_specimen_gets_a_report_that_says_why_and_what_to_do(failed_resul
     page = write_index(tmp_path, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
     assert 'href="cable-13/report.html"' in page
     report = (tmp_path / "cable-13/report.html").read_text(encoding="utf-8")
-    assert "Das beheben und denselben Befehl noch einmal ausführen" in report
+    assert "Das unten Genannte beheben und denselben Befehl noch einmal ausführen" in report
 
 
 def test_no_link_leads_nowhere(failed_result, tmp_path):
