@@ -23,6 +23,7 @@ from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
+from pipeline.result.row import as_entry, index_row
 from pipeline.settings import Settings
 from pipeline.threads import keep_memory, one_thread
 
@@ -189,16 +190,14 @@ def draw_again(store: Store, name: str, result: Result, stages: Stages, settings
     """Write tables and reports of a stored result again, without measuring."""
     with store.staging() as staged:
         stages.write(result, staged, settings)
-        told = {"reports": settings.batch.reports, **_in_index(result, settings)}
+        told = {"reports": settings.batch.reports, **_in_index(result)}
         write_entry((store.entry(name) or {}) | told, staged)
         store.install(staged, name)
 
 
-def _in_index(result: Result, settings: Settings) -> dict[str, Any]:
+def _in_index(result: Result) -> dict[str, Any]:
     """What the index and the next run read in place of a result."""
-    from pipeline.report.row import as_entry, index_row
-
-    row = index_row(result, settings.report)
+    row = index_row(result)
     return {"state": row.state, "row": as_entry(row)}
 
 
@@ -214,7 +213,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "said": _said(result),
         "code": reasons[0].code if reasons else None,
         "reports": order.settings.batch.reports,
-        **_in_index(result, order.settings),
+        **_in_index(result),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
 

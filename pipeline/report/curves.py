@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pipeline.report.row import RowCurve
     from pipeline.result import PhotoPart, Result, Visited
+    from pipeline.result.row import RowCurve
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from pipeline.report.curves import Equivalent, equivalent
-from pipeline.report.row import RowCurve
+from pipeline.result.row import RowCurve
 
 Array = NDArray[np.float64]
 POINTS = 41

@@ -11,9 +11,8 @@ from click.testing import CliRunner
 from pipeline.batch.store import write_entry
 from pipeline.cli import main
 from pipeline.report.index import write_index
-from pipeline.report.row import as_entry, index_row
 from pipeline.report.tables import write_result
-from pipeline.settings import ReportSettings
+from pipeline.result.row import as_entry, index_row
 from tests.pipeline.report.virtual_result import measured_result
 
 
@@ -51,7 +50,7 @@ def stored(out, *names):
     for name in names:
         named = result.model_copy(update={"specimen": result.specimen.model_copy(update={"id": name})})
         write_result(named, out / name)
-        write_entry({"status": "measured", "row": as_entry(index_row(named, ReportSettings()))}, out / name)
+        write_entry({"status": "measured", "row": as_entry(index_row(named))}, out / name)
     return result
 
 

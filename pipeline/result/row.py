@@ -20,7 +20,6 @@ from pipeline.messages import UNREADABLE, Message
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart, Result, Visited
-    from pipeline.settings.report import ReportSettings
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -118,7 +117,7 @@ class IndexRow:
         return "unusable" if self.status != "failed" and self.method and not self.usable else self.status
 
 
-def index_row(result: Result, settings: ReportSettings) -> IndexRow:
+def index_row(result: Result) -> IndexRow:
     """Row of one result, without its report."""
     told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
     curve, worst = told.curve, _worst(result.findings)
