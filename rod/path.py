@@ -110,7 +110,7 @@ class Ramp:
 
     def product(self, a: Array, b: Array, near: Array) -> float:
         """Inner product of two directions near a state."""
-        unit = REACTION * self.system.force_scale + 0.5 * float(np.hypot(*near[-3:-1]))
+        unit = REACTION * self.system.force_scale + float(np.hypot(*near[-3:-1]))
         turns = self.system.mass @ (a[:-3] * b[:-3])
         return float(turns + a[-3:-1] @ b[-3:-1] / unit**2 + 1e-4 * a[-1] * b[-1])
 

@@ -11,7 +11,7 @@ from rod.characteristic import Characteristic
 from rod.compliance_law import CELLS, moment_basis, refreshed
 from rod.inverse.photo_residual import Pose, curve_distance
 from rod.law_prior import NEAR_REST, integrals
-from rod.paper import _graph
+from rod.paper import _from_photo, _graph
 from rod.reduction import Hold
 from rod.support import Support
 
@@ -127,6 +127,21 @@ def test_the_papers_graph_is_the_ratio_of_the_slopes_where_the_curvature_changes
     kept = np.abs(np.cos(s)) > 0.05
     kept[[0, -1]] = False
     assert kappa == pytest.approx(9.0 * np.sin(s)[kept]) and graph == pytest.approx(np.full(kappa.size, 3.0))
+
+
+def test_noise_of_the_papers_photo_lies_along_the_normal(monkeypatch):
+    """Points of a curve all moved by d along its normal are those of the parallel curve."""
+    d, s = 2e-3, np.linspace(0.0, LENGTH, 20_001)
+    theta = 0.5 - 25.0 * s**2
+    x, y = (np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * s[1])]) for v in (np.cos(theta), np.sin(theta)))
+    step = SimpleNamespace(s=s, x=x, y=y, theta=theta, force=1.0)
+    parallel = SimpleNamespace(s=s, x=x - d * np.sin(theta), y=y + d * np.cos(theta), theta=theta, force=1.0)
+    monkeypatch.setattr("rod.paper.POSITION_NOISE", d)
+    moved = _from_photo(step, SimpleNamespace(standard_normal=np.ones))
+    exact = _from_photo(parallel, SimpleNamespace(standard_normal=np.zeros))
+    assert moved[0].size > 500
+    for told, meant in zip(moved, exact, strict=True):
+        assert told == pytest.approx(meant, rel=1e-3)
 
 
 @pytest.mark.parametrize(
