@@ -104,3 +104,10 @@ def test_the_form_of_a_cause_is_told_where_it_is_named(language, grows, late):
     part = DiagnosisPart(verdict="two_causes", headline="", causes=causes)
     first, second = (cause.line for cause in _named(part, Words(language)))
     assert first.count(grows) == 1 and late in second
+
+
+def test_nobody_is_told_to_mend_a_cause_that_does_not_suffice():
+    cause = CausePart(name="rigid_ends", probability=0.9, estimate=0.004, std=3e-4, unit="m")
+    for verdict, told in (("named", True), ("unexplained", False)):
+        (named,) = _named(DiagnosisPart(verdict=verdict, headline="", causes=[cause]), Words())
+        assert bool(named.summary) == bool(named.remedy) == told
