@@ -185,7 +185,7 @@ def _explicit(
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):
-        load = np.array([_load_beyond(step, moves, axis) for axis in (0, 1)])
+        load = _load_beyond(step, moves)
     curvature = -balance.K / rod.weights * moves.weights if moves.geometric else np.zeros_like(moves.pre_curvature)
     ends = (
         _end_moment(step, moves, rest.left, past.left, side="left"),
@@ -194,13 +194,12 @@ def _explicit(
     return _Explicit(_moment(step, balance.K, moves, past), curvature, ends, load, position, reaction)
 
 
-def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
-    """Change of the dead load to the right of each edge, one component, (q, n + 1) N."""
-    load = step.rod.load[axis]
-    change = moves.scalar("load_y" if axis else "load_x")[:, None] * step.rod.length_beyond
-    if load and moves.geometric:
+def _load_beyond(step: Equilibrium, moves: Directions) -> Array:
+    """Change of the dead load to the right of each edge, (2, q, n + 1) N."""
+    change = np.multiply.outer((moves.scalar("load_x"), moves.scalar("load_y")), step.rod.length_beyond)
+    if any(step.rod.load) and moves.geometric:
         after = np.cumsum(moves.edges[:, ::-1], axis=1)[:, ::-1] - moves.edges
-        change += load * (0.5 * moves.edges + after)
+        change += np.multiply.outer(step.rod.load, 0.5 * moves.edges + after)
     return np.asarray(change)
 
 
