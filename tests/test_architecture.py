@@ -30,7 +30,6 @@ ROD = [
 ]
 INSIDE = {
     "rod.inverse": [
-        ("options",),
         ("photo_residual",),
         ("fit_model",),
         ("evaluation",),

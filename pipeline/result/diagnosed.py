@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from pipeline.messages import Message, catalogue
-from pipeline.result.lists import Floats, Number
-from pipeline.result.parts import Curve, Part, SaidPart, Widening
+from pipeline.result.parts import Curve, Floats, Number, Part, SaidPart, Widening
 
 CAUSES_NAMED = ("named", "class", "two_causes")
 """Verdicts that name causes."""

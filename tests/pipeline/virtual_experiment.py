@@ -9,7 +9,7 @@ from dataclasses import replace
 from pipeline.identify.parts import curve
 from pipeline.result import InversePart, Result, ScalePart, SpecimenPart
 from rod.inverse import estimate
-from rod.inverse.options import InverseOptions
+from rod.inverse.problem import InverseOptions
 
 QUICK = InverseOptions(elements=80, blocks=80)
 

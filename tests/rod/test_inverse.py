@@ -10,7 +10,7 @@ from fixtures.hidden import LOOP, hidden_test
 from rod.characteristic import Characteristic
 from rod.inverse import InverseOutcome, estimate
 from rod.inverse.estimate import invisible_combinations
-from rod.inverse.options import InverseOptions
+from rod.inverse.problem import InverseOptions
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, random_cable, scaled, stretched
