@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -324,8 +324,11 @@ class Foot(NamedTuple):
     gap_y: Array
 
 
+@lru_cache(maxsize=2)
 def foot_points(places: Places, prediction: Prediction) -> Foot:
     """Foot points on curves that are cubic (Hermite, from positions and directions) between their nodes.
+
+    Remembered, since the columns of a model follow its residual.
 
     They are found by two Newton steps from the section's own arc length; what is left along the curve enters the
     distance by its square only.
