@@ -272,7 +272,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     sections = observation.all_sections
     across = _distance(sections, prediction)
     for photo, own in zip(observation.photos, sections.of_photo, strict=True):
-        parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across[own]])
+        parts.append(photo.whiten @ np.concatenate(([photo.chord - prediction.chord[photo.step]], across[own])))
     return np.asarray(observation.joined(np.concatenate(parts)) + observation.added)
 
 
