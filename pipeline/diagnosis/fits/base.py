@@ -226,14 +226,12 @@ def start(
     ValueError
         If no step has both a photo and a force.
     """
-    curvature, moment, at_rest = [], [], []
+    curvature, moment = [], []
     for step in test.steps:
         if step.shape is not None:
             inside = slice(len(step.shape.s) // 10, -(len(step.shape.s) // 10) or None)
             curvature.append(step.shape.kappa[inside])
             moment.append(step.force * step.shape.y[inside])
-            if step.branch == "mounted":
-                at_rest.append(float(curvature[-1].mean()))
     if not curvature:
         raise ValueError("no step has a measured shape")
     K, m = np.concatenate(curvature), np.concatenate(moment)
@@ -248,7 +246,8 @@ def start(
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
         shown = as_photographed(m, K, unit=stiffness)
         # from the other side of straight a law with an early knee is never found; else the line will do
-        if shown is None and not any(bend * rest > 0.0 for bend in at_rest):
+        at_rest = (step.shape for step in test.steps if step.branch == "mounted" and step.shape is not None)
+        if shown is None and not any(np.median(shape.kappa) * rest > 0.0 for shape in at_rest):
             balanced = as_balanced(graph or balance(test), unit=stiffness)
             shown = balanced if balanced is not None and balanced[2] * rest < 0.0 else None
         if shown is not None:
