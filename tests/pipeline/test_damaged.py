@@ -44,9 +44,10 @@ DAMAGE = {
 }
 
 
-def stored(out, *names):
-    """Results as a run leaves them, with their entries."""
+def stored(out, *names, photos=None):
+    """Results as a run leaves them, with their entries; of ``photos`` only so many, where each is drawn."""
     result = measured_result()
+    result = result.model_copy(update={"photos": result.photos[:photos]})
     for name in names:
         named = result.model_copy(update={"specimen": result.specimen.model_copy(update={"id": name})})
         write_result(named, out / name)
@@ -85,7 +86,7 @@ def test_one_sentence_for_it(how, text, tmp_path):
 
 
 def test_report_draws_the_others(tmp_path):
-    stored(tmp_path, "a", "b", "c")
+    stored(tmp_path, "a", "b", "c", photos=1)
     (tmp_path / "b/result.json").write_text("{")
     done = call("report", tmp_path)
     assert done.exit_code == 0

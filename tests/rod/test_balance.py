@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rod.balance import BalanceOptions, BalanceOutcome, balance
+from rod.balance import BalanceOptions, BalanceOutcome, balance, moment_regression
 from rod.balance.moment_points import CommonErrors, _between, moment_points, pointwise_graph, residual
 from rod.compliance_law import moment_basis
 from rod.measurement import MeasuredTest
@@ -167,6 +167,16 @@ def test_one_wrong_force_shows_photo_against_photo():
     step = test.steps[2]
     wrong = replace(step, force=1.05 * step.force)
     assert balance(replace(test, steps=(*test.steps[:2], wrong, *test.steps[3:]))).checks["photos_p"] < 1e-6
+
+
+def test_noise_within_which_no_curve_is_found_is_given_up_soon(monkeypatch):
+    """Forces halved in mid-test: each photo was linearised 186 times until the noise was large enough."""
+    counted = []
+    monkeypatch.setattr(moment_regression, "residual", lambda *a, **k: counted.append(0) or residual(*a, **k))
+    steps = measured().steps
+    graph = balance(replace(measured(), steps=(*steps[:2], *(replace(s, force=0.5 * s.force) for s in steps[2:]))))
+    assert graph.measured and graph.checks["noise_factor"] > 100.0
+    assert len(counted) < 100 * len(steps)
 
 
 def test_what_forces_have_in_common_moves_the_law_as_each_of_them_would():

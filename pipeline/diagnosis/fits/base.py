@@ -217,8 +217,9 @@ def start(
     """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
-    The law is one of any form, or a spline of ``points``; where the moments show none, it begins with that of the
-    balance equations (``graph``). A displacement that is known to ``exact`` (m) or better has no error of its own.
+    The law is one of any form, or a spline of ``points``; where the moments show none, and no force-free photo the side
+    to which the cable is bent at rest, it begins with that of the balance equations (``graph``). A displacement that is
+    known to ``exact`` (m) or better has no error of its own.
 
     Raises
     ------
@@ -244,8 +245,9 @@ def start(
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
         shown = as_photographed(m, K, unit=stiffness)
-        if shown is None:
-            # from the other side of straight a law with an early knee is never found; else the line will do
+        # from the other side of straight a law with an early knee is never found; else the line will do
+        at_rest = (step.shape for step in test.steps if step.branch == "mounted" and step.shape is not None)
+        if shown is None and not any(np.median(shape.kappa) * rest > 0.0 for shape in at_rest):
             balanced = as_balanced(graph or balance(test), unit=stiffness)
             shown = balanced if balanced is not None and balanced[2] * rest < 0.0 else None
         if shown is not None:
