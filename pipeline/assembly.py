@@ -12,7 +12,7 @@ import datetime
 import importlib.metadata
 import platform
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,7 +21,7 @@ from pipeline import __version__
 from pipeline.identify import Identification, IdentificationParts, identification_parts
 from pipeline.identify.parts import PhotoResidual
 from pipeline.messages import Message
-from pipeline.records import Centerline, Finding, Level, LoadStep, Preview, Rejected, Specimen, Traces, of_photo
+from pipeline.records import Centerline, Finding, LoadStep, Preview, Rejected, Specimen, Traces, said_once
 from pipeline.result import (
     BalancePart,
     DiagnosisPart,
@@ -128,12 +128,17 @@ WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium
 """Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
 
 
+EXPLAINED = {"identify/misfit-force", "identify/misfit-shape", "identify/branches"}
+"""What the simulation without a cause leaves: no warning where the cause was found."""
+
+
 def without_advice(earlier: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
-    """Findings, those of a fit that failed for want of a cause told as that where the curve is that with the cause."""
+    """Findings, those of a fit that lacked a cause told as that where the curve is that with the cause."""
     if diagnosis is None or diagnosis.extended is None or diagnosis.verdict not in CAUSES_NAMED:
         return list(earlier)
     said = Message("way.inverse-extended")
-    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in earlier]
+    told = [replace(one, level="info") if one.code in EXPLAINED else one for one in earlier]
+    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in told]
 
 
 def _gathered(
@@ -177,22 +182,11 @@ def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) 
 
 def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
     """What was noticed on photos, and why some were refused; what is the same on several is said once, with names."""
-    groups: dict[str, list[tuple[str, Level, Message]]] = {}
-    for photo in photos:
-        told = photo.findings if isinstance(photo, Centerline) else [Finding(photo.code, "warning", photo.said)]
-        for finding in told:
-            groups.setdefault(finding.said.key, []).append((photo.image, finding.level, finding.said))
-    return [_said_once(group) for group in groups.values()]
-
-
-def _said_once(group: list[tuple[str, Level, Message]]) -> Finding:
-    image, level, said = group[0]
-    names = list(dict.fromkeys(image for image, _, _ in group))
-    if len(names) == 1:
-        return of_photo(image, level, said)
-    alike = len({str(one) for _, _, one in group}) == 1
-    key = "photos.several" if alike else "photos.several-on"  # the numbers are those of one photo
-    return Finding(said.code, level, Message(key, count=len(names), names=names, image=image, said=said))
+    return said_once(
+        (photo.image, finding)
+        for photo in photos
+        for finding in (photo.findings if isinstance(photo, Centerline) else [photo.finding])
+    )
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:

@@ -6,11 +6,15 @@ nature's refusal (a blurred photo, no equilibrium, an invisible parameter) is a 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from pipeline.messages import Message, free_text, printable, shortened
+
+Given = ParamSpec("Given")
+Read = TypeVar("Read")
 
 
 class InputError(Exception):
@@ -29,6 +33,8 @@ class InputError(Exception):
         ``fixtures/broken``.
     remedy : str
         Beside a text: what to do, as an order: "rename it to length_mm".
+    others : tuple of InputError
+        What else is wrong with the same specimen.
     """
 
     def __init__(
@@ -39,10 +45,11 @@ class InputError(Exception):
         line: int | None = None,
         code: str = "",
         remedy: str = "",
+        others: tuple[InputError, ...] = (),
     ) -> None:
         self.said = free_text(f"{shortened(said)}; {shortened(remedy)}") if isinstance(said, str) else said
         self.message, self.remedy = (said, remedy) if isinstance(said, str) else (said.parts()[0], said.parts()[-1])
-        self.path, self.line, self.code = path, line, code or self.said.code
+        self.path, self.line, self.code, self.others = path, line, code or self.said.code, others
         self._said = said
         self._given: dict[str, Any] = {"path": path, "line": line, "code": code, "remedy": remedy}
         super().__init__(self.sentence)
@@ -61,4 +68,30 @@ class InputError(Exception):
         return printable(str(self.placed))
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
-        return partial(InputError, **self._given), (self._said,)
+        return partial(InputError, **self._given, others=self.others), (self._said,)
+
+
+class Complaints:
+    """Collect what is wrong with the files of a user, so that all of it is told at once and not one by one."""
+
+    def __init__(self) -> None:
+        self._found: list[InputError] = []
+
+    def kept(self, read: Callable[Given, Read], /, *args: Given.args, **kwargs: Given.kwargs) -> Read | None:
+        """What a call returns; None where it raised an `InputError`, which is kept."""
+        try:
+            return read(*args, **kwargs)
+        except InputError as error:
+            self.note(error)
+            return None
+
+    def note(self, error: InputError) -> None:
+        """Keep an error and what came with it."""
+        self._found += [error, *error.others]
+
+    def settle(self) -> None:
+        """Raise the first error with all others; nothing where there is none."""
+        if self._found:
+            first, *others = self._found
+            first.others = tuple(others)
+            raise first

@@ -6,7 +6,8 @@ Pixel coordinates: (0, 0) is the centre of the top-left pixel of the photo as di
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -53,9 +54,22 @@ def doubtful(key: str, /, **values: object) -> Finding:
     return Finding(said.code, "warning", said)
 
 
-def of_photo(image: str, level: Level, said: Message) -> Finding:
-    """Something noticed on one photo, told with its name."""
-    return Finding(said.code, level, Message("photos.one", image=image, said=said))
+def said_once(noticed: Iterable[tuple[str, Finding]]) -> list[Finding]:
+    """What was noticed on photos, each beside the photo's name; what is the same on several is one sentence."""
+    groups: dict[str, list[tuple[str, Finding]]] = {}
+    for image, finding in noticed:
+        groups.setdefault(finding.said.key, []).append((image, finding))
+    return [_of_photos(group) for group in groups.values()]
+
+
+def _of_photos(group: list[tuple[str, Finding]]) -> Finding:
+    image, first = group[0]
+    names = list(dict.fromkeys(name for name, _ in group))
+    if len(names) == 1:
+        return replace(first, said=Message("photos.one", image=image, said=first.said))
+    alike = len({finding.message for _, finding in group}) == 1
+    key = "photos.several" if alike else "photos.several-on"  # the numbers are those of one photo
+    return replace(first, said=Message(key, count=len(names), names=names, image=image, said=first.said))
 
 
 @dataclass(frozen=True)
@@ -194,6 +208,11 @@ class Rejected:
     def code(self) -> str:
         """Stable code of the reason."""
         return self.said.code
+
+    @property
+    def finding(self) -> Finding:
+        """The reason as something that a reader must know."""
+        return Finding(self.code, "warning", self.said)
 
     @property
     def reason(self) -> str:

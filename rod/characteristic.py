@@ -67,7 +67,7 @@ class ParametricCurve(MomentCurve, Protocol):
 
     @property
     def parameters(self) -> int:
-        """How many."""
+        """Number of them."""
 
     def moment_by_parameters(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative of the moment by them at fixed curvature, (n, p)."""
@@ -163,14 +163,14 @@ class Characteristic:
         """Tangent reading dm/dK, N m^2."""
         u, _, D = self._arguments(K, K0)
         if self.reading == "tangent":
-            return self.f(u) + np.zeros_like(D)
+            return self.f(u)
         return np.asarray(self.f(u) + evaluate(slope(self._value), self._cardinal, u) * D)
 
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
         u, u0, D = self._arguments(K, K0)
         if self.reading == "secant":
-            return self.f(u) + np.zeros_like(D)
+            return self.f(u)
         # Mean of f over [u0, u]. Where the interval is short the difference of primitives loses digits, and Simpson's
         # rule is exact (f is a cubic there) but for a knot inside, whose share is of the order of interval^3.
         span = max(float(np.ptp(self.knots)), float(np.max(np.abs(u - u0), initial=0.0)))
@@ -213,9 +213,9 @@ class Characteristic:
         u, u0, D = self._arguments(K, K0)
         c = self._cardinal
         if self.reading == "secant":
-            return np.moveaxis(evaluate(slope(c.primitive), c, u + 0.0 * D) * D, 0, -1)
+            return np.moveaxis(evaluate(slope(c.primitive), c, u) * D, 0, -1)
         rest = u0 if u0.size == 1 else u0 + 0.0 * D
-        both = evaluate(c.primitive, c, np.append(rest, u + 0.0 * D))
+        both = evaluate(c.primitive, c, np.concatenate((rest.ravel(), u.ravel())))
         return np.asarray((both[:, rest.size :] - both[:, : rest.size]).T.reshape(*D.shape, -1))
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
@@ -226,9 +226,9 @@ class Characteristic:
         return np.full_like(D, -self.f(u if self.reading == "secant" else u0))
 
     def _arguments(self, K: ArrayLike, K0: ArrayLike) -> tuple[Array, Array, Array]:
-        """Abscissae of the state and of rest, and the excess K - K0."""
+        """Abscissae of the state, (n,), and of rest, and the excess K - K0, (n,)."""
         K_, K0_ = np.asarray(K, float), np.asarray(K0, float)
         D = np.asarray(K_ - K0_)
         if self.abscissa == "excess":
             return D, np.zeros(()), D
-        return K_, K0_, D
+        return K_ if K_.shape == D.shape else K_ + 0.0 * D, K0_, D

@@ -130,9 +130,10 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
 
 
 def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *, size: int | None = None) -> LawBasis:
-    """Basis over the moments [min(low, 0), max(high, 0)] N m with xi along a law, known to a covariance (p, p).
+    """Basis over the moments [min(low, 0), max(high, 0)] N m on which a law found before changes evenly along xi.
 
-    It has ``size`` coefficients, or as many as that of the law.
+    ``covariance`` (p, p) says how well it is known: of its changes counts what is. The basis has ``size`` coefficients,
+    or as many as the law.
     """
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))

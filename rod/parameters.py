@@ -127,15 +127,17 @@ class Directions:
     def weights(self) -> Array:
         """Change of the joint weights with the edges, (q, n)."""
         inner = 0.5 * self.edges[:, 1:-1]
-        weights = np.zeros((inner.shape[0], inner.shape[1] + 1))
-        weights[:, 1:] += inner
+        weights = np.zeros_like(self.pre_curvature)
+        weights[:, 1:] = inner
         weights[:, :-1] += inner
         return weights
 
     @cached_property
     def vertices(self) -> Array:
         """Change of the arc lengths of all vertices with the edges, (q, n + 2)."""
-        return np.concatenate((np.zeros((len(self.names), 1)), np.cumsum(self.edges, axis=1)), axis=1)
+        vertices = np.zeros((len(self.names), self.edges.shape[1] + 1))
+        np.add.accumulate(self.edges, axis=1, out=vertices[:, 1:])
+        return vertices
 
     @cached_property
     def lawful(self) -> bool:

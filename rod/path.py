@@ -71,9 +71,10 @@ class Point(NamedTuple):
 
 
 class Ramp:
-    """What is imposed as it grows with the share, and the geometry of the path; ``steps`` counts Newton steps.
+    """A load or displacement that grows from nothing (share 0) to all of it (1), and steps along its equilibria.
 
-    From ``None``, the mounted cable, loads and supports grow; from a start they stand, and its residuals fade.
+    ``steps`` counts Newton steps. From ``None``, the mounted cable, loads and supports grow; from a start they stand,
+    and its residuals fade.
     """
 
     def __init__(self, system: System, start: Start | None) -> None:
@@ -109,7 +110,7 @@ class Ramp:
 
     def product(self, a: Array, b: Array, near: Array) -> float:
         """Inner product of two directions near a state."""
-        unit = REACTION * self.system.force_scale + 0.5 * float(np.hypot(*near[-3:-1]))
+        unit = REACTION * self.system.force_scale + float(np.hypot(*near[-3:-1]))
         turns = self.system.mass @ (a[:-3] * b[:-3])
         return float(turns + a[-3:-1] @ b[-3:-1] / unit**2 + 1e-4 * a[-1] * b[-1])
 

@@ -70,9 +70,10 @@ class _Past(NamedTuple):
 
 
 class _Rest(NamedTuple):
-    """Derivative of the mounted shape, edge angles (q, n + 1), and of the axes' distance at displacement zero (q,)."""
+    """Derivative, (q,), of the angles of the mounted cable's ends, and of the chord at displacement zero."""
 
-    angles: Array
+    left: Array
+    right: Array
     zero: Array
 
 
@@ -117,7 +118,7 @@ def derivatives(
     moves = directions(test, parameters)
     rest = _mounted(test, moves)
     start = moves.pre_curvature[None], moves.scalar("set_threshold")[:, None]
-    past = _Past(*start, rest.angles[:, 0], rest.angles[:, -1])
+    past = _Past(*start, rest.left, rest.right)
     if test.zero == "loaded":
         rest = rest._replace(zero=_step(test, test.free, moves, rest, past)[0].chord)
     found = []
@@ -140,12 +141,14 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     turn = rod.weights * moves.pre_curvature
     if moves.geometric:
         turn += moves.weights * rod.section.pre_curvature
-    relative = -np.concatenate((np.zeros((len(turn), 1)), np.cumsum(turn, axis=1)), axis=1)
-    along, across = -relative @ (h * sin), relative @ (h * cos)
+    # each joint turns all edges beyond it; the chord frame then turns with the right end
+    beyond = np.ascontiguousarray(np.array((h * sin, -h * cos))[:, :0:-1].cumsum(axis=1)[:, ::-1])
+    along, across = beyond @ turn.T
     if moves.geometric:
         along, across = along + moves.edges @ cos, across + moves.edges @ sin
     zero = {"natural": along, "length": moves.scalar("length")}.get(str(test.zero), moves.none)
-    return _Rest(relative - across[:, None] / rod.mounted.chord, zero)
+    left = -across / rod.mounted.chord
+    return _Rest(left, left - turn.sum(axis=1), zero)
 
 
 def _step(
@@ -182,22 +185,21 @@ def _explicit(
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):
-        load = np.array([_load_beyond(step, moves, axis) for axis in (0, 1)])
+        load = _load_beyond(step, moves)
     curvature = -balance.K / rod.weights * moves.weights if moves.geometric else np.zeros_like(moves.pre_curvature)
     ends = (
-        _end_moment(step, moves, rest.angles[:, 0], past.left, side="left"),
-        _end_moment(step, moves, rest.angles[:, -1], past.right, side="right"),
+        _end_moment(step, moves, rest.left, past.left, side="left"),
+        _end_moment(step, moves, rest.right, past.right, side="right"),
     )
     return _Explicit(_moment(step, balance.K, moves, past), curvature, ends, load, position, reaction)
 
 
-def _load_beyond(step: Equilibrium, moves: Directions, axis: int) -> Array:
-    """Change of the dead load to the right of each edge, one component, (q, n + 1) N."""
-    load = step.rod.load[axis]
-    change = moves.scalar("load_y" if axis else "load_x")[:, None] * step.rod.length_beyond
-    if load and moves.geometric:
+def _load_beyond(step: Equilibrium, moves: Directions) -> Array:
+    """Change of the dead load to the right of each edge, (2, q, n + 1) N."""
+    change = np.multiply.outer((moves.scalar("load_x"), moves.scalar("load_y")), step.rod.length_beyond)
+    if any(step.rod.load) and moves.geometric:
         after = np.cumsum(moves.edges[:, ::-1], axis=1)[:, ::-1] - moves.edges
-        change += load * (0.5 * moves.edges + after)
+        change += np.multiply.outer(step.rod.load, 0.5 * moves.edges + after)
     return np.asarray(change)
 
 
@@ -290,9 +292,10 @@ def _clamps(
 ) -> None:
     """A clamped angle follows its clamp; what that does to the neighbour and to the gap is explicit."""
     rod = system.rod
-    for end, near, support, name in ((0, 1, rod.left, "clamp_angle_left"), (-1, -2, rod.right, "clamp_angle_right")):
+    sides = ((0, 1, rod.left, rest.left, "clamp_angle_left"), (-1, -2, rod.right, rest.right, "clamp_angle_right"))
+    for end, near, support, mounted, name in sides:
         if support.kind == "clamp":
-            angle = rest.angles[:, end] if support.angle is None else moves.scalar(name)
+            angle = mounted if support.angle is None else moves.scalar(name)
             gradient[:, end] = -system.moment_scale * angle
             gradient[:, near] -= balance.tangent[end] / rod.weights[end] * angle
             gap += border[:, end][:, None] * angle

@@ -29,7 +29,7 @@ from pipeline.intake.tomltable import read_toml
 from pipeline.messages import free_text
 from pipeline.report.document import write_report
 from pipeline.report.index import write_index, write_rows
-from pipeline.report.row import index_row
+from pipeline.result.row import index_row
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
@@ -71,7 +71,7 @@ def batch(result, count):
 
 def many_rows(result):
     """Rows of 5,000 specimens, stiffness falling with their number; every hundredth has its forces in mN."""
-    row = index_row(result, ReportSettings())
+    row = index_row(result)
     hostile = "<img src=x onerror=alert(1)></script>"
     for number in range(MANY):
         fault = {"usable": False, "fault": free_text(f"forces of {hostile} are in mN")} if number % 100 == 50 else {}

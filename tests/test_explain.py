@@ -3,11 +3,18 @@
 import ast
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.causes.profile import step, wave
+from pipeline.diagnosis.causes.rig import BearingFriction, by_step
 from pipeline.messages import catalogue
+from pipeline.report.diagnosed import _named
 from pipeline.report.words import Words, documented_codes
+from pipeline.result import CauseForm, CausePart, DiagnosisPart
 from tests.test_cli import call
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -57,3 +64,50 @@ def test_every_code_of_a_message_is_documented():
     assert {code for code in told if not code.startswith(families)} == set(documented_codes()) - made
     for texts in documented_codes().values():
         assert len(set(texts)) == 4 and all(text.endswith(".") for text in texts)
+
+
+def test_every_form_of_a_cause_is_said_in_words():
+    facts = SimpleNamespace(
+        branch=("mounted", "loading", "loading", "unloading"),
+        bends=np.ones(4),
+        hold_times=(np.arange(3.0),),
+        timed=True,
+        returns=True,
+        rest_side="natural",
+        pushed=(1, 2, 3),
+        **dict.fromkeys(("curvature_scale", "moment_scale", "force_scale", "length"), 1.0),
+    )
+    labels = {(cause.name, form.label) for cause in CATALOGUE for form in cause.variants(facts)}
+    labels |= {("bearing_friction", form.label) for form in by_step(BearingFriction(), 1.0, facts)}
+    for name in ("pre_curvature_varying", "stiffness_varying"):
+        labels |= {(name, form.label) for form in (step(), wave(1))}
+    said = {tuple(key.split(".", 2)[1:]) for key in catalogue("en") if key.startswith("form.")}
+    assert {one for one in labels if one[1]} == said
+
+
+@pytest.mark.parametrize(
+    ("language", "grows", "late"),
+    [
+        ("en", "a moment that grows with the force", "from a bend of 3.2 1/m on"),
+        ("de", "ein Moment, das mit der Kraft wächst", "ab einer Biegung von 3,2 1/m"),
+    ],
+)
+def test_the_form_of_a_cause_is_told_where_it_is_named(language, grows, late):
+    assert grows in call("explain", "bearing_friction", "--language", language).stdout
+    friction = CauseForm(label="that grows with the force", amount=0.001, std=1e-4)
+    bent = CauseForm(label="alike all along the cable", amount=0.1, std=0.01, width=3.2, at=2.0, tuned=["width"])
+    told = {"probability": 0.9, "estimate": 0.001, "std": 1e-4, "unit": "N m"}
+    causes = [
+        CausePart(name="bearing_friction", forms=[friction, friction], **told),
+        CausePart(name="plastic_set", forms=[bent], **told),
+    ]
+    part = DiagnosisPart(verdict="two_causes", headline="", causes=causes)
+    first, second = (cause.line for cause in _named(part, Words(language)))
+    assert first.count(grows) == 1 and late in second
+
+
+def test_nobody_is_told_to_mend_a_cause_that_does_not_suffice():
+    cause = CausePart(name="rigid_ends", probability=0.9, estimate=0.004, std=3e-4, unit="m")
+    for verdict, told in (("named", True), ("unexplained", False)):
+        (named,) = _named(DiagnosisPart(verdict=verdict, headline="", causes=[cause]), Words())
+        assert bool(named.summary) == bool(named.remedy) == told

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
 
 from pipeline.batch.orders import Order
-from pipeline.batch.specimen import Outcome, Stages, measure_order
+from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
 from pipeline.settings.batch import BatchSettings
 
 
@@ -49,9 +49,17 @@ def measure_all(
         return
     with _interrupts() as interrupted:
         if scheduler is None:
-            from pipeline.batch.processes import measure_in_processes
+            from pipeline.batch.processes import in_processes
 
-            yield from measure_in_processes(orders, settings, stages, interrupted, doing)
+            yield from in_processes(
+                lambda order, tell: measure_order(order, stages, doing=tell),
+                orders,
+                settings,
+                lost=lambda order, code, started: store_death(order, f"exit {code}", started),
+                attempts=settings.attempts,
+                interrupted=interrupted,
+                doing_now=lambda order, stage: doing(order.name, stage),
+            )
         else:
             from pipeline.batch.cluster import measure_on_cluster  # dask takes half a second to load
 

@@ -1,8 +1,8 @@
-"""Orders -> outcomes by processes of this machine, each at the end of a pipe of its own.
+"""Work on specimens in processes of this machine, each at the end of a pipe of its own.
 
 A pipe has no name and no port: nobody but this process and its worker can write into it, and what is pickled there
-(orders and stages on the way out, outcomes on the way back) was made by the program itself. A worker takes one specimen
-at a time, and ends when this process does, however that ends.
+(work and specimens on the way out, outcomes on the way back) was made by the program itself. A worker takes one
+specimen at a time, and ends when this process does, however that ends. One that dies costs its specimen alone.
 """
 
 from __future__ import annotations
@@ -21,12 +21,11 @@ from functools import partial
 from multiprocessing import connection, resource_tracker
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from typing import TypeVar
 
 import cloudpickle
 import psutil
 
-from pipeline.batch.orders import Order
-from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
 from pipeline.settings.batch import BatchSettings
 from pipeline.threads import ONE_THREAD
 
@@ -37,6 +36,10 @@ CONTAINER = tuple(Path("/sys/fs/cgroup") / name for name in ("memory.max", "memo
 # A worker is begun anew, not forked: a fork would take over locks that threads of libraries hold at that moment.
 SPAWN = multiprocessing.get_context("spawn")
 Pipe = connection.Connection
+Item = TypeVar("Item")
+Done = TypeVar("Done")
+OVER = 124
+"""Exit code of a worker that took longer than it may, as `timeout` has it."""
 
 
 @dataclass(frozen=True)
@@ -60,32 +63,51 @@ class _Worker:
         self.pipe.close()
 
 
-def measure_in_processes(
-    orders: Sequence[Order],
+def in_processes(
+    work: Callable[[Item, Callable[[str], None]], Done],
+    items: Sequence[Item],
     settings: BatchSettings,
-    stages: Stages,
+    *,
+    lost: Callable[[Item, int | None, float], Done],
+    attempts: int,
     interrupted: threading.Event,
-    doing_now: Callable[[str, str], None],
-) -> Iterator[Outcome]:
-    """Measure orders in processes of this machine; outcomes in the order in which they end.
+    doing_now: Callable[[Item, str], None] = lambda item, stage: None,
+) -> Iterator[Done]:
+    """Work on items in processes of this machine; outcomes in the order in which they end.
+
+    Parameters
+    ----------
+    work : callable
+        Takes an item and a callable to be told the stage that begins; never raises. What it gives is no str.
+    items : sequence
+    settings : BatchSettings
+        Number of processes, and their memory.
+    lost : callable
+        What is given for an item whose processes died: the item, the last one's exit code (`OVER` where its time was
+        over) and when that began (s, `time.monotonic`).
+    attempts : int
+        Times that an item whose process died is tried again.
+    interrupted : Event
+    doing_now : callable
+        Told the item and the stage that begins.
 
     Raises
     ------
     KeyboardInterrupt
         Once ``interrupted`` is set.
     """
-    count = min(settings.workers or _cores(), len(orders))
-    limit, by_value = _bytes_per_worker(settings, count), cloudpickle.dumps(stages)
-    waiting, deaths = deque(orders), Counter[str]()
+    count = min(settings.workers or _cores(), len(items))
+    limit, by_value = _bytes_per_worker(settings, count), cloudpickle.dumps(work)
+    waiting, deaths = deque(enumerate(items)), Counter[int]()
     idle: list[_Worker] = []
-    doing: dict[Pipe, tuple[_Worker, Order, float]] = {}
+    doing: dict[Pipe, tuple[_Worker, int, Item, float]] = {}
     try:
         while waiting or doing:
             while waiting and len(doing) < count:
-                worker, order = idle.pop() if idle else _begun(by_value), waiting.popleft()
-                doing[worker.pipe] = worker, order, time.monotonic()
+                worker, (number, item) = idle.pop() if idle else _begun(by_value), waiting.popleft()
+                doing[worker.pipe] = worker, number, item, time.monotonic()
                 with contextlib.suppress(OSError):  # it died while it had nothing to do: seen at once below
-                    worker.pipe.send(order)
+                    worker.pipe.send(item)
             ended = connection.wait(list(doing), LOOK_S)
             if interrupted.is_set():
                 raise KeyboardInterrupt
@@ -93,21 +115,21 @@ def measure_in_processes(
                 if worker.fatter_than(limit):
                     worker.process.kill()
             for pipe in [pipe for pipe in doing if pipe in ended]:
-                worker, order, started = doing[pipe]
+                worker, number, item, started = doing[pipe]
                 try:
                     outcome = worker.pipe.recv()
                     if isinstance(outcome, str):
-                        doing_now(order.name, outcome)
+                        doing_now(item, outcome)
                         continue
                     del doing[pipe]
                 except (EOFError, OSError):
                     del doing[pipe]
                     worker.end()
-                    deaths[order.name] += 1
-                    if deaths[order.name] <= settings.attempts:
-                        waiting.appendleft(order)  # whether it is to blame it knows itself, by the notes of attempts
+                    deaths[number] += 1
+                    if deaths[number] <= attempts:
+                        waiting.appendleft((number, item))  # whether it is to blame the notes of its attempts tell
                     else:
-                        yield store_death(order, f"exit {worker.process.exitcode}", started)
+                        yield lost(item, worker.process.exitcode, started)
                 else:
                     idle.append(worker)
                     yield outcome
@@ -175,19 +197,38 @@ def _inherited() -> Iterator[None]:
 
 
 def _work(pipe: Pipe, by_value: bytes) -> None:
-    """Measure what comes through the pipe, one after the other."""
+    """Work on what comes through the pipe, one after the other. What a library prints goes where errors go."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    stages = pickle.loads(by_value)
+    work = pickle.loads(by_value)
     with contextlib.suppress(EOFError, OSError):  # the parent closed its end
         while True:
-            pipe.send(measure_order(pipe.recv(), stages, doing=partial(_tell, pipe)))
+            pipe.send(work(pipe.recv(), partial(_tell, pipe)))
 
 
 def _tell(pipe: Pipe, stage: str) -> None:
     """Name the stage that begins; nobody listens where the parent closed its end, which ends this worker anyway."""
     with contextlib.suppress(OSError):
         pipe.send(stage)
+
+
+@contextlib.contextmanager
+def deadline(seconds: float, note: Callable[[], object] = lambda: None) -> Iterator[None]:
+    """End this process when the time is over, after ``note``: code in a library that hangs cannot be asked to stop."""
+
+    def end() -> None:
+        with contextlib.suppress(OSError):
+            note()
+        os._exit(OVER)
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _end_with_parent() -> None:

@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.batch.orders import Order, fingerprint
+from pipeline.batch.processes import deadline
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
+from pipeline.result.row import as_entry, index_row
 from pipeline.settings import Settings
 from pipeline.threads import keep_memory, one_thread
 
@@ -114,28 +114,30 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
             limit = order.settings.batch
             refused = _earlier_attempts(store, order, limit.attempts, limit.timeout_s)
             if refused is not None:
-                return store_failure(order, refused, started)
-            with _deadline(limit.timeout_s, store.overdue(order.name)):
+                return store_failure(order, [refused], started)
+            with deadline(limit.timeout_s, store.overdue(order.name).touch):
                 outcome = _measured(store, order, stages, started, doing)
             store.end(order.name)
             return outcome
         return _measured(store, order, stages, started, doing)
     except InputError as error:
-        return store_failure(order, refusal(error), started)
+        return store_failure(order, refusals(error), started)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
-        return store_failure(order, refusal(error), started, trace=traceback.format_exc())
+        return store_failure(order, refusals(error), started, trace=traceback.format_exc())
 
 
-def refusal(error: Exception) -> FindingPart:
-    """What is told about an error that costs a specimen: a file of the user, or what nobody foresaw."""
+def refusals(error: Exception) -> list[FindingPart]:
+    """What is told about an error that costs a specimen: all that is wrong in its files, or what nobody foresaw."""
     if isinstance(error, InputError):
-        return FindingPart.of("error", error.placed, code=error.code)
+        return [FindingPart.of("error", one.placed, code=one.code) for one in (error, *error.others)]
     if isinstance(error, MemoryError):
-        return FindingPart.of("error", Message("specimen/memory"))
-    if isinstance(error, OSError):
-        return FindingPart.of("error", Message("specimen/file-system", why=error.strerror or str(error)))
-    told = " ".join(str(error).split())[:300]
-    return FindingPart.of("error", Message("specimen/program-error", error=type(error).__name__, told=told))
+        said = Message("specimen/memory")
+    elif isinstance(error, OSError):
+        said = Message("specimen/file-system", why=error.strerror or str(error))
+    else:
+        told = " ".join(str(error).split())[:300]
+        said = Message("specimen/program-error", error=type(error).__name__, told=told)
+    return [FindingPart.of("error", said)]
 
 
 def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
@@ -150,24 +152,6 @@ def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: floa
 def overdue(timeout_s: float) -> FindingPart:
     """What is told of a specimen that took longer than it may."""
     return FindingPart.of("error", Message("specimen/timeout", seconds=timeout_s))
-
-
-@contextlib.contextmanager
-def _deadline(seconds: float, note: Path) -> Iterator[None]:
-    """End this process when the time is over: code in a library that hangs cannot be asked to stop."""
-
-    def end() -> None:
-        with contextlib.suppress(OSError):
-            note.touch()
-        os._exit(124)  # the customary exit code of a timeout
-
-    timer = threading.Timer(seconds, end)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def _measured(store: Store, order: Order, stages: Stages, started: float, doing: Doing) -> Outcome:
@@ -206,16 +190,14 @@ def draw_again(store: Store, name: str, result: Result, stages: Stages, settings
     """Write tables and reports of a stored result again, without measuring."""
     with store.staging() as staged:
         stages.write(result, staged, settings)
-        told = {"reports": settings.batch.reports, **_in_index(result, settings)}
+        told = {"reports": settings.batch.reports, **_in_index(result)}
         write_entry((store.entry(name) or {}) | told, staged)
         store.install(staged, name)
 
 
-def _in_index(result: Result, settings: Settings) -> dict[str, Any]:
+def _in_index(result: Result) -> dict[str, Any]:
     """What the index and the next run read in place of a result."""
-    from pipeline.report.row import as_entry, index_row
-
-    row = index_row(result, settings.report)
+    row = index_row(result)
     return {"state": row.state, "row": as_entry(row)}
 
 
@@ -231,7 +213,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "said": _said(result),
         "code": reasons[0].code if reasons else None,
         "reports": order.settings.batch.reports,
-        **_in_index(result, order.settings),
+        **_in_index(result),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
 
@@ -245,7 +227,7 @@ def _said(result: Result) -> dict[str, Any]:
     return (result.findings[0].said if result.findings else free_text(result.headline)).stored()
 
 
-def store_failure(order: Order, finding: FindingPart, started: float, *, trace: str | None = None) -> Outcome:
+def store_failure(order: Order, findings: list[FindingPart], started: float, *, trace: str | None = None) -> Outcome:
     """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
 
     Parameters
@@ -256,7 +238,7 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
         Where in the program it failed, kept in the provenance.
     """
     store = Store(order.out)
-    result = failed_result(order, finding, trace)
+    result = failed_result(order, findings, trace)
     entry = _entry(order, result, "")
     unstored: dict[str, Any] | None = entry
     with contextlib.suppress(OSError, InputError), store.staging() as staged:
@@ -265,22 +247,22 @@ def store_failure(order: Order, finding: FindingPart, started: float, *, trace: 
         store.install(staged, order.name)
         store.end(order.name)
         unstored = None
-    took, said = time.monotonic() - started, finding.said
-    return Outcome(order.name, "failed", finding.message, False, took, unstored, said=said)
+    took, said = time.monotonic() - started, findings[0].said
+    return Outcome(order.name, "failed", findings[0].message, False, took, unstored, said=said)
 
 
 def store_death(order: Order, told: str, started: float) -> Outcome:
     """Store a specimen whose worker ended without an outcome, as far as its notes tell not by its own fault."""
-    return store_failure(order, FindingPart.of("error", Message("specimen/worker-died.told", told=told)), started)
+    return store_failure(order, [FindingPart.of("error", Message("specimen/worker-died.told", told=told))], started)
 
 
-def failed_result(order: Order, finding: FindingPart, trace: str | None = None) -> Result:
+def failed_result(order: Order, findings: list[FindingPart], trace: str | None = None) -> Result:
     """The result of a specimen that could not be measured."""
     provenance = {"command": order.command, "version": order.version}
     return Result(
         status="failed",
-        headline=finding.message,
+        headline=findings[0].message,
         specimen=SpecimenPart(id=order.name, folder=str(order.folder).encode("utf-8", "replace").decode()),
-        findings=[finding],
+        findings=findings,
         provenance=provenance if trace is None else provenance | {"traceback": trace},
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import threading
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, 
     specimens, refused = found(folders, settings.intake)
     if not specimens:
         ctx.exit(nothing_found(refused))
-    rows = list(checked_all(specimens, settings))
+    rows = checked_all(specimens, settings)
     failed = sum(not row["runs"] for row in rows)
     wrong = sum(row["status"] == "error" for row in rows)
     if as_json:
@@ -46,24 +46,31 @@ def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, 
     ctx.exit(3 if failed == len(rows) else 1 if wrong or refused else 0)
 
 
-def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, Any]]:
+def checked_all(folders: list[Path], settings: Settings) -> list[dict[str, Any]]:
     """What a run would find in each folder, each within the time that a specimen has.
 
     In this process where there is only one and no limit was asked for, as a run does it.
     """
-    from pipeline.batch.apart import apart
+    from pipeline.batch.processes import in_processes
 
     limit = settings.batch
-    work = partial(checked, settings=settings)
     if limit.in_process or (len(folders) == 1 and "timeout_s" not in limit.model_fields_set):
-        return map(work, folders)
-    lost = partial(without_answer, seconds=limit.timeout_s)
-    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.vision.look")
+        return [checked(folder, settings) for folder in folders]
+    rows = in_processes(
+        partial(checked_in_time, settings=settings),
+        folders,
+        limit,
+        lost=partial(without_answer, seconds=limit.timeout_s),
+        attempts=0,
+        interrupted=threading.Event(),
+    )
+    places = {str(folder): place for place, folder in enumerate(folders)}
+    return sorted(rows, key=lambda row: places[row["folder"]])
 
 
 def checked(folder: Path, settings: Settings) -> dict[str, Any]:
     """What a run would find in one folder and on its photos; whatever breaks in it is told as the run would tell it."""
-    from pipeline.batch.specimen import refusal
+    from pipeline.batch.specimen import refusals
     from pipeline.intake.folder import read_specimen
     from pipeline.vision.look import look_at_photos
 
@@ -71,7 +78,7 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
         specimen = read_specimen(folder, settings.intake)
         seen = look_at_photos(specimen, settings.vision)
     except Exception as error:  # one folder never costs the others
-        return _failed(folder, refusal(error))
+        return _failed(folder, refusals(error))
     told = dict.fromkeys((*specimen.findings, *seen))
     levels = {finding.level for finding in told}
     status = "error" if "error" in levels else "warning" if "warning" in levels else "ok"
@@ -81,18 +88,28 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
     return row | {"findings": [finding.document for finding in told]}
 
 
-def without_answer(folder: Path, over: bool, *, seconds: float) -> dict[str, Any]:
+def checked_in_time(folder: Path, tell: object, *, settings: Settings) -> dict[str, Any]:
+    """The same in a process that ends when the time of a specimen is over."""
+    import pipeline.vision.look  # noqa: F401  # loaded before the time begins
+    from pipeline.batch.processes import deadline
+
+    with deadline(settings.batch.timeout_s):
+        return checked(folder, settings)
+
+
+def without_answer(folder: Path, code: int | None, started: float, *, seconds: float) -> dict[str, Any]:
     """The row of a folder whose reading did not come to an end, because its time was over or its process died."""
+    from pipeline.batch.processes import OVER
     from pipeline.batch.specimen import overdue
     from pipeline.result import FindingPart
 
     died = FindingPart.of("error", Message("specimen/worker-died.once"))
-    return _failed(folder, overdue(seconds) if over else died)
+    return _failed(folder, [overdue(seconds) if code == OVER else died])
 
 
-def _failed(folder: Path, told: FindingPart) -> dict[str, Any]:
+def _failed(folder: Path, findings: list[FindingPart]) -> dict[str, Any]:
     row = {"folder": str(folder), "id": None, "status": "error", "runs": False, "steps": 0, "photos": 0}
-    return row | {"findings": [told.model_dump()]}
+    return row | {"findings": [finding.model_dump() for finding in findings]}
 
 
 def echo_rows(rows: list[dict[str, Any]]) -> None:

@@ -11,6 +11,7 @@ import click
 from pipeline.cli.options import language_option
 from pipeline.cli.speech import entry, language
 from pipeline.cli.spoken import Spoken, wrong_use
+from pipeline.messages import Message, catalogue
 
 if TYPE_CHECKING:
     from pipeline.report.words import Words
@@ -55,7 +56,10 @@ def _line(text: str) -> str:
 
 
 def _cause(cause: str, words: Words) -> str:
-    """The page of a cause."""
+    """The page of a cause, and the forms it may have."""
     from pipeline.diagnosis import explain as page
 
-    return page(cause, words.language)
+    known = catalogue(words.language)
+    forms = [texts[0] for key, texts in known.items() if key.startswith(f"form.{cause}.")]
+    more = f"{Message('explain.forms', forms=forms).said(words.language)}\n" if forms else ""
+    return page(cause, words.language) + more

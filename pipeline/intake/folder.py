@@ -13,13 +13,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Literal
 
-from pipeline.errors import InputError
+from pipeline.errors import Complaints, InputError
 from pipeline.intake.access import inside, is_folder, outside, sha256, unreadable
 from pipeline.intake.forcelog import read_force_log
 from pipeline.intake.photohints import obeyed
-from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key
+from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key, no_photos
 from pipeline.intake.plausibility import size_findings
-from pipeline.intake.specimenfile import NAME, SpecimenFile, read_specimen_file
+from pipeline.intake.specimenfile import NAME, LogSpec, SpecimenFile, asked_of_log, described, read_source
+from pipeline.intake.tomltable import TomlFile
 from pipeline.messages import Message
 from pipeline.records import Finding, Specimen, inferred
 from pipeline.settings.intake import IntakeSettings
@@ -160,7 +161,7 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     ------
     InputError
         If a file cannot be used, whatever the operating system has against it; photos never raise as long as one is
-        left.
+        left. All that is wrong with description, log and photos comes together.
     """
     try:
         return _specimen(folder, settings)
@@ -169,16 +170,30 @@ def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
 
 
 def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
-    file = read_specimen_file(folder, settings)
-    log_path, noted = _log_path(folder, file, settings)
-    log = read_force_log(log_path, file.log, settings)
-    photos = match_photos(
-        folder, log.steps, calibration=file.camera.calibration, log_name=log_path.name, settings=settings
-    )
+    wrong = Complaints()
+    source = wrong.kept(read_source, folder, settings)
+    file = wrong.kept(described, source, folder, settings) if source else None
+    # what is wrong with it is told with the rest of the description
+    asked = file.log if file else Complaints().kept(asked_of_log, source, settings) if source else None
+    place = wrong.kept(_log_path, folder, asked, source, settings) if source and asked else None
+    log = wrong.kept(read_force_log, place[0], asked, settings) if place and asked else None
+    if asked is None and not candidate_logs(folder):
+        wrong.note(_no_log(folder))
+    calibration = file.camera.calibration if file else None
+    photos = None
+    if place and log:
+        photos = wrong.kept(
+            match_photos, folder, log.steps, calibration=calibration, log_name=place[0].name, settings=settings
+        )
+    elif not list_photos(folder, without=calibration, settings=settings):
+        wrong.note(no_photos(folder, settings))
+    calibrating = wrong.kept(_calibration_photos, folder, file, settings) if file else None
+    wrong.settle()
+    assert file and place and log and photos and calibrating
+    (log_path, noted), (calibrated, doubts) = place, calibrating
     steps, hinted = obeyed(photos.steps, file.hints)
     scale = file.camera.scale_px_per_m
     sizes = size_findings(file.length_m, file.diameter_m, photos.steps, scale_px_per_m=scale, settings=settings)
-    calibration, doubts = _calibration_photos(folder, file, settings)
     names = {NAME: folder / NAME, log_path.relative_to(folder).as_posix(): log_path}
     return Specimen(
         id=file.id,
@@ -191,20 +206,21 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
         images=photos.paths,
         description=file.description,
         findings=(*noted, *log.findings, *photos.findings, *hinted, *doubts, *sizes),
-        hashes={name: sha256(path) for name, path in names.items()} | photos.hashes | calibration,
+        hashes={name: sha256(path) for name, path in names.items()} | photos.hashes | calibrated,
         hints=file.hints,
     )
 
 
-def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tuple[Path, list[Finding]]:
+def _log_path(folder: Path, asked: LogSpec, source: TomlFile, settings: IntakeSettings) -> tuple[Path, list[Finding]]:
     """The force log: the one named, else ``force.csv``, else the only text table in the folder."""
-    if file.log.file is not None:
-        path = inside(folder, file.log.file, allow_outside=settings.allow_outside)
+    if asked.file is not None:
+        name = asked.file
+        path = inside(folder, name, allow_outside=settings.allow_outside)
         if path is None:
-            raise outside(file.source.path, file.log.file, lambda: file.source.line_of("force_log", "file"))
+            raise outside(source.path, name, lambda: source.line_of("force_log", "file"))
         if not os.path.lexists(path):
-            told = Message("folder/no-force-log.named", name=repr(file.log.file))
-            raise file.source.error(told, table="force_log", key="file")
+            told = Message("folder/no-force-log.named", name=repr(name))
+            raise source.error(told, table="force_log", key="file")
         return path, []
     if os.path.lexists(folder / LOG_NAME):
         path = inside(folder, LOG_NAME, allow_outside=settings.allow_outside)
@@ -213,15 +229,19 @@ def _log_path(folder: Path, file: SpecimenFile, settings: IntakeSettings) -> tup
         return path, []
     names = candidate_logs(folder)
     if not names:
-        sheets = sorted(entry.name for entry in folder.iterdir() if entry.suffix.casefold() in SPREADSHEETS)
-        key = "folder/no-force-log.sheet" if sheets else "folder/no-force-log"
-        raise InputError(Message(key, log=LOG_NAME, sheet=next(iter(sheets), "")), path=folder)
+        raise _no_log(folder)
     if len(names) > 1:
         raise InputError(Message("folder/several-logs", names=names[:5], first=names[0]), path=folder)
     path = inside(folder, names[0], allow_outside=settings.allow_outside)
     if path is None:
         raise outside(folder / names[0], names[0])
     return path, [inferred("log/file-inferred", file=names[0])]
+
+
+def _no_log(folder: Path) -> InputError:
+    sheets = sorted(entry.name for entry in folder.iterdir() if entry.suffix.casefold() in SPREADSHEETS)
+    key = "folder/no-force-log.sheet" if sheets else "folder/no-force-log"
+    return InputError(Message(key, log=LOG_NAME, sheet=next(iter(sheets), "")), path=folder)
 
 
 def candidate_logs(folder: Path) -> list[str]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from pipeline.errors import Complaints
 from pipeline.intake.access import inside, is_folder, outside
 from pipeline.intake.photohints import read_hints
 from pipeline.intake.tomltable import (
@@ -19,6 +20,7 @@ from pipeline.intake.tomltable import (
     checked_table,
     flag,
     free_text,
+    nearest,
     number,
     number_in,
     one_of,
@@ -32,6 +34,7 @@ from pipeline.records import Board, CameraSpec, PhotoHints, RigSpec
 from pipeline.settings.intake import IntakeSettings
 
 NAME = "specimen.toml"
+SIZES = ("length_mm", "diameter_mm")
 DESCRIPTION = ("type", "batch", "notes", "temperature_C")
 ROLES = ("step", "branch", "time", "displacement", "force", "image")
 MEASURED = ("time", "displacement", "force")  # the roles that have a unit
@@ -70,37 +73,72 @@ class SpecimenFile:
 
 
 def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
-    """Read ``specimen.toml`` of a folder.
+    """Read ``specimen.toml`` of a folder; see `read_source` and `described` for what is raised."""
+    return described(read_source(folder, settings), folder, settings)
+
+
+def read_source(folder: Path, settings: IntakeSettings) -> TomlFile:
+    """Parse ``specimen.toml`` of a folder.
 
     Raises
     ------
     InputError
-        Codes ``file/...`` and ``toml/...``: not readable, not TOML, unknown or missing key, value that cannot be meant.
+        ``file/...``, ``toml/encoding`` and ``toml/syntax``.
     """
     path = inside(folder, NAME, allow_outside=settings.allow_outside)
     if path is None:
         raise outside(folder / NAME, NAME)
-    source = read_toml(path, limit=settings.toml_max_bytes)
-    tables = _checks(settings)
-    check_names(source, source.tables, (*tables, "photos"))
-    values = {table: checked_table(source, table, checks) for table, checks in tables.items()}
+    return read_toml(path, limit=settings.toml_max_bytes)
+
+
+def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> SpecimenFile:
+    """The contents of a ``specimen.toml``.
+
+    Raises
+    ------
+    InputError
+        ``toml/...``, ``file/outside``, ``camera/...``: unknown or missing key, value that cannot be meant; all at once.
+    """
+    tables, wrong = _checks(settings), Complaints()
+    wrong.kept(check_names, source, source.tables, (*tables, "photos"))
+    values = {table: wrong.kept(checked_table, source, table, checks) or {} for table, checks in tables.items()}
+    wrong.kept(_check_sizes_given, source)
+    camera = wrong.kept(_camera, source, values["camera"], folder, settings)
+    hints = wrong.kept(read_hints, source)
+    wrong.settle()
+    assert camera is not None and hints is not None
     cable = values["specimen"]
-    missing = [key for key in ("length_mm", "diameter_mm") if key not in cable]
-    if missing:
-        add = [Message(f"toml/missing-key.{key}") for key in missing]
-        key = "toml/missing-key" if len(missing) == 1 else "toml/missing-key.several"
-        raise source.error(Message(key, names=missing, add=add), table="specimen")
     return SpecimenFile(
         id=cable.get("id", folder_name(folder)),
         length_m=cable["length_mm"] * 1e-3,
         diameter_m=cable["diameter_mm"] * 1e-3,
-        camera=_camera(source, values["camera"], folder, settings),
+        camera=camera,
         rig=_rig(values["rig"]),
-        log=_log(values["force_log"], values["rig"]),
+        log=LogSpec(**values["force_log"], force_sign=values["rig"].get("force_sign")),
         description={key: cable[key] for key in DESCRIPTION if key in cable},
         source=source,
-        hints=read_hints(source),
+        hints=hints,
     )
+
+
+def asked_of_log(source: TomlFile, settings: IntakeSettings) -> LogSpec:
+    """What the user says about the force log in a file of which other parts may be wrong; raises as `described`."""
+    tables = _checks(settings)
+    log, rig = (checked_table(source, table, tables[table]) for table in ("force_log", "rig"))
+    return LogSpec(**log, force_sign=rig.get("force_sign"))
+
+
+def _check_sizes_given(source: TomlFile) -> None:
+    """Refuse a cable without length or diameter, unless a misspelt key is told that means it."""
+    given = source.tables.get("specimen", {})
+    if not isinstance(given, dict):
+        return
+    meant = {*given, *(nearest(key, SIZES) for key in given)}
+    missing = [key for key in SIZES if key not in meant]
+    if missing:
+        add = [Message(f"toml/missing-key.{key}") for key in missing]
+        key = "toml/missing-key" if len(missing) == 1 else "toml/missing-key.several"
+        raise source.error(Message(key, names=missing, add=add), table="specimen")
 
 
 def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
@@ -167,10 +205,6 @@ def _rig(values: dict[str, Any]) -> RigSpec:
         bearings_px=values.get("bearings_px"),
         force_sign=values.get("force_sign", "compression"),
     )
-
-
-def _log(values: dict[str, Any], rig: dict[str, Any]) -> LogSpec:
-    return LogSpec(**values, force_sign=rig.get("force_sign"))
 
 
 def folder_name(folder: Path) -> str:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.errors import InputError
+from pipeline.errors import Complaints, InputError
 from pipeline.intake.access import LONGEST_PATH, read_bytes
 from pipeline.intake.tomldepth import too_deep
 from pipeline.messages import Message
@@ -90,13 +90,15 @@ def read_toml(path: Path, *, limit: int) -> TomlFile:
 
 def check_names(file: TomlFile, names: Collection[str], known: Collection[str], *, table: str = "") -> None:
     """Refuse unknown keys (``toml/unknown-key``) or, with ``table=""``, unknown tables (``toml/unknown-table``)."""
+    wrong = Complaints()
     for name in names:
         if name in known:
             continue
         near = nearest(name, known)
         key = f"toml/unknown-{'key' if table else 'table'}{'' if near else '.far'}"
         told = Message(key, name=shown(name), table=table, near=near, known=known)
-        raise InputError(told, path=file.path, line=file.line_of(table, name) or file.line_of(name))
+        wrong.note(InputError(told, path=file.path, line=file.line_of(table, name) or file.line_of(name)))
+    wrong.settle()
 
 
 def nearest(name: str, known: Collection[str]) -> str | None:
@@ -118,9 +120,10 @@ def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> di
     values = file.tables.get(table, {})
     if not isinstance(values, dict):
         raise file.error(Message("toml/wrong-value.table", table=table), table="", key=table)
-    check_names(file, values, tuple(checks), table=table)
+    wrong = Complaints()
+    wrong.kept(check_names, file, values, tuple(checks), table=table)
     result, refused = {}, {}
-    for key, value in values.items():
+    for key, value in ((key, value) for key, value in values.items() if key in checks):
         try:
             result[key] = checks[key](value)
         except ValueError as error:
@@ -128,7 +131,8 @@ def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> di
     if refused:  # all of them at once: a template that was filled in halfway has several
         given = [f"{key} = {shown(values[key])}" for key in refused]
         told = Message("toml/wrong-value", given=given, wanted=dict.fromkeys(refused.values()))
-        raise file.error(told, table=table, key=next(iter(refused)))
+        wrong.note(file.error(told, table=table, key=next(iter(refused))))
+    wrong.settle()
     return result
 
 

@@ -1,9 +1,9 @@
 """Sentences of the program in every language it speaks: a key and named values in, a sentence out.
 
 Whoever notices something makes a `Message`: which sentence it is, and the values that go into it, in SI units. The
-sentences stand in ``en.toml`` and ``de.toml`` beside this module under the same keys: the code of the finding or error,
-and behind a dot which of its sentences, where it has several. Two texts are what is wrong and what to do. A gap is
-written as in `str.format`; what may stand behind its colon:
+sentences stand in the ``.toml`` files beside this module, English and German side by side under a key: the code of the
+finding or error, and behind a dot which of its sentences, where it has several. Two texts are what is wrong and what to
+do. A gap is written as in `str.format`; what may stand behind its colon:
 
 ``.3g mm``, ``.1f %``
     A number in that unit (mm, %), with the decimal sign of the language.
@@ -149,9 +149,15 @@ def _outcomes() -> dict[str, tuple[str, ...]]:
 @cache
 def catalogue(language: str) -> dict[str, tuple[str, ...]]:
     """All sentences of a language by key: one text, or two where the second says what to do."""
-    file = Path(__file__).with_name(f"{language}.toml")
-    rows = tomllib.loads(file.read_text(encoding="utf-8")).items()
+    place = list(DECIMAL).index(language)
+    rows = ((key, both[place]) for key, both in _sentences().items() if both[place])  # outcomes are English in `rod`
     return {key: (texts,) if isinstance(texts, str) else tuple(texts) for key, texts in rows}
+
+
+@cache
+def _sentences() -> dict[str, list[Any]]:
+    files = sorted(Path(__file__).parent.glob("*.toml"))
+    return {key: both for file in files for key, both in tomllib.loads(file.read_text(encoding="utf-8")).items()}
 
 
 def sentence(text: str) -> str:

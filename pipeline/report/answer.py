@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +14,6 @@ from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
 from pipeline.settings import ReportSettings
 
-NO_BREAK = "\N{NO-BREAK SPACE}"
-TOGETHER = re.compile(r" (?=±)|(?<=±) |(?<=\d) (?=1/m|px|mm|%)|(?<=N) (?=m)")
-"""Blanks within a quantity, where no line may break."""
 K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
@@ -69,7 +65,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
     else:
         verdict, tone = "", "good" if adequate else "warn"
     return FirstScreen(
-        sentence=TOGETHER.sub(NO_BREAK, words.said(opening(result)).sentence),
+        sentence=words.said(opening(result)).sentence,
         agreement=_agreement(result, words),
         model=model,
         advice=_advice(result, words),

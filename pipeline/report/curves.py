@@ -7,35 +7,16 @@ is the stiffness of the linear rod that changes its moment by as much over that 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pipeline.result import PhotoPart, Result
+    from pipeline.result import PhotoPart, Result, Visited
+    from pipeline.result.row import RowCurve
 
 Array = NDArray[np.float64]
-
-
-class TangentCurve(Protocol):
-    """A visited characteristic, as `pipeline.result.Visited` and rows of the index have it."""
-
-    @property
-    def kappa(self) -> Array:
-        """(n,) 1/m, increasing."""
-
-    @property
-    def tangent(self) -> Array:
-        """(n,) N m^2."""
-
-    @property
-    def tangent_std(self) -> Array:
-        """(n,) N m^2."""
-
-    @property
-    def factor(self) -> NDArray[np.floating[Any]]:
-        """(n, r) N m^2."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +41,12 @@ class Equivalent:
     departure: float
 
 
-def equivalent(curve: TangentCurve, bounds: tuple[float, float] | None = None) -> Equivalent | None:
+def equivalent(curve: Visited | RowCurve, bounds: tuple[float, float] | None = None) -> Equivalent | None:
     """Equivalent constant stiffness over a range of curvature.
 
     Parameters
     ----------
-    curve : TangentCurve
+    curve : Visited or RowCurve
     bounds : (low, high) in 1/m, optional
         Cut to the visited range; the whole of it by default.
 

@@ -85,7 +85,10 @@ def _separates(experiment: NextExperiment, words: Words) -> str:
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
-    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says."""
+    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says.
+
+    A cause that does not suffice may not be there at all: nobody is told to mend it.
+    """
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
@@ -93,13 +96,16 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
         if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
             share = words("does_not_suffice")
         line = f"{words.cause(cause.name)}: {estimate} ({share})"
+        if forms := cause.in_what_form(words.language):
+            line += f"; {words('form_of', forms=', '.join(forms))}"
         settled = {twin.name: twin for twin in cause.twins}
         alike = [name for name in cause.class_ if name != cause.name]
         fitting = [name for name in settled if name not in cause.class_]
         for key, names in (("same_class", alike), ("fits_too", fitting[:LIKELIEST])):
             if names:
                 line += f"; {words(key, names=', '.join(_twin(name, settled.get(name), words) for name in names))}"
-        named.append(NamedCause(line, *words.about(cause.name)))
+        about = ("", "") if part.verdict == "unexplained" else words.about(cause.name)
+        named.append(NamedCause(line, *about))
     return named
 
 

@@ -1,9 +1,10 @@
 """``index.html`` and ``summary.csv``: all specimens of a batch, also of one that is not finished.
 
-A specimen is a row of a few thousand bytes (`row`), read from its ``entry.json``; from its result only where there is
-no entry, or where the result has changed since. The page holds everything it needs: search, filters and sorting over
-all rows, which are drawn as the reader scrolls to them; characteristics of selected specimens laid over each other;
-repeat specimens of a type pooled. A failed specimen is a row with its reason and a report that says what to do.
+A specimen is a row of a few thousand bytes (`pipeline.result.row`), read from its ``entry.json``; from its result
+only where there is no entry, or where the result has changed since. The page holds everything it needs: search,
+filters and sorting over all rows, which are drawn as the reader scrolls to them; characteristics of selected
+specimens laid over each other; repeat specimens of a type pooled. A failed specimen is a row with its reason and a
+report that says what to do.
 """
 
 from __future__ import annotations
@@ -13,26 +14,25 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css
 from pipeline.report.repeats import Repeats, repeats, without_outlying
-from pipeline.report.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
+from pipeline.result import FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
+from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit, suited
-
-if TYPE_CHECKING:
-    from pipeline.result import Result
 
 BLOCK = 100
 """Rows that stand in the page as they are; all others are drawn as the reader scrolls to them, as many at a time."""
@@ -71,7 +71,7 @@ def index_rows(results: Iterable[Result] | Path, out: Path, settings: ReportSett
     if isinstance(results, str | Path):
         rows = (_row_of(Path(results), name, out, settings) for name in result_folders(Path(results)))
     else:
-        rows = (replace(index_row(r, settings), report=_report(r, r.specimen.id, out, settings)) for r in results)
+        rows = (replace(index_row(r), report=_report(r, r.specimen.id, out, settings)) for r in results)
     return without_outlying(list(rows))
 
 
@@ -108,14 +108,11 @@ def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> Ind
             return replace(row, report=report if (out / report).exists() else "")
     except (OSError, ValueError, AttributeError, RecursionError):
         pass  # none, or not ours: the result itself tells
-    from pipeline.errors import InputError
-    from pipeline.result import read_result
-
     try:
         result = read_result(place)
     except InputError as error:
         result = unreadable(name, error.said)
-    return replace(index_row(result, settings), report=_report(result, name, out, settings))
+    return replace(index_row(result), report=_report(result, name, out, settings))
 
 
 def _as_entered(path: Path, entered: float) -> bool:
@@ -131,8 +128,6 @@ def _as_entered(path: Path, entered: float) -> bool:
 
 def unreadable(name: str, why: Message) -> Result:
     """A failed result in the place of a ``result.json`` that cannot be read."""
-    from pipeline.result import FindingPart, Result, SpecimenPart
-
     return Result(
         status="failed",
         specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),

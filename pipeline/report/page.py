@@ -33,8 +33,10 @@ PALETTE = {
     "unvisited": ("#8a949f", "#77818c"),
 }
 
-BETWEEN = re.compile(r"(?<=\d) (?=%)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))")
-"""Spaces inside a quantity: a share, a p value, a product of units."""
+BETWEEN = re.compile(
+    r" (?=±)|(?<=±) |(?<=\d) (?=%|1/m|px|mm|µm|mN|N\b)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))"
+)
+"""Spaces inside a quantity: a number, its standard deviation and unit, a p value, a product of units."""
 
 
 def unbroken(value: Any) -> Any:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from pipeline.report.curves import Equivalent, TangentCurve, equivalent
+from pipeline.report.curves import Equivalent, equivalent
+from pipeline.result.row import RowCurve
 
 Array = NDArray[np.float64]
 POINTS = 41
@@ -68,7 +69,7 @@ class Pooled:
     stiffness: Scatter
 
 
-def pool(specimens: Sequence[TangentCurve]) -> Pooled | None:
+def pool(specimens: Sequence[RowCurve]) -> Pooled | None:
     """Pool the characteristics of repeat specimens.
 
     Returns

@@ -13,8 +13,9 @@ from itertools import groupby
 import numpy as np
 
 from pipeline.report.pooling import Pooled, Scatter, outlying, pool, scattered
-from pipeline.report.row import IndexRow, RowCurve
 from pipeline.report.words import Words
+from pipeline.result import none_of_its_type
+from pipeline.result.row import IndexRow, RowCurve
 from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit
 
@@ -62,8 +63,6 @@ def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
         for (number, _), mean, wrong in zip(group, means, outlying(means), strict=True):
             if not wrong:
                 continue
-            from pipeline.result import none_of_its_type  # loads what results are made of: for the few that need it
-
             times = mean / float(np.median(means[means != mean]))
             fault = none_of_its_type(times, others=len(group) - 1, kind=name)
             judged[number] = replace(rows[number], usable=False, fault=fault, outlying=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from pipeline.report.cells import csv_lines
-from pipeline.report.row import IndexRow
+from pipeline.result.row import IndexRow
 
 HEADS = (
     *("id", "status", "usable", "verdict", "causes", "answer_method", "K0_per_m", "K0_std_per_m"),

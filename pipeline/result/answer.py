@@ -165,7 +165,8 @@ def refusal(result: Result) -> Message | None:
 def _why(result: Result, method: str) -> Message:
     """Why a curve is the answer."""
     if method == "extended":
-        return Message("answer.extended")
+        unexplained = result.diagnosis is not None and result.diagnosis.verdict == "unexplained"
+        return Message("answer.nearest" if unexplained else "answer.extended")
     if refuted(result.diagnosis):
         return Message("answer.refuted")
     if method == "inverse" and result.inverse is not None and result.inverse.converged:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from pipeline.result.lists import Floats, Number
-from pipeline.result.parts import Curve, Part, SaidPart, Widening
+from pipeline.messages import Message, catalogue
+from pipeline.result.parts import Curve, Floats, Number, Part, SaidPart, Widening
 
 CAUSES_NAMED = ("named", "class", "two_causes")
 """Verdicts that name causes."""
@@ -33,7 +33,7 @@ class CauseForm(Part):
 
 
 class TwinPart(Part):
-    """A cause that stands instead of the one that was named: improbable, or of its class."""
+    """Another cause that may act in place of the one named: less probable, or not to be told from it."""
 
     name: str = Field(description="of the cause")
     probability: Number = Field(description="of the cause, given the data")
@@ -53,6 +53,16 @@ class CausePart(Part):
     unit: str = Field(description="of the amount; - is a plain number")
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
     twins: list[TwinPart] = Field([], description="other causes that leave no more than noise, whether likely or not")
+
+    def in_what_form(self, language: str) -> list[str]:
+        """The forms that the cause has in the extended model, in words; with figures where these were fitted."""
+        known = catalogue("en")
+        said = []
+        for form in self.forms:
+            message = Message(f"form.{self.name}.{form.label}", at=form.at, width=form.width)
+            if message.key in known:
+                said.append(message.parts(language)[-1 if form.tuned else 0])
+        return list(dict.fromkeys(said))
 
 
 class HypothesisPart(Part):
@@ -91,7 +101,7 @@ class CauseRow(Part):
 
 
 class GainPart(Part):
-    """What the extension bought, on steps it had not seen."""
+    """How much of the misfit the extended model removes, on steps it had not seen."""
 
     heldout_excess_removed: Number = Field(
         description="share of the misfit beyond noise that the extension removes, on steps it had not seen"
@@ -161,7 +171,7 @@ class ForceCorrectionPart(Part):
 
 
 class LeftoverPart(SaidPart):
-    """What no cause explains, as it is likeliest."""
+    """What no cause explains: how much of it there is, where it sits, and its pattern."""
 
     message: str = Field(description="where it sits, in words")
     probability: Number = Field(1.0, description="that something acts that is no cause of the catalogue")

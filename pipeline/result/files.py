@@ -20,7 +20,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def to_json(result: Result) -> str:
-    """Text of ``result.json``: contract names, no NaN, one line per top-level entry not guaranteed."""
+    """Text of ``result.json``, with the names of the contract, and null where nothing is known."""
     return result.model_dump_json(by_alias=True, indent=1)
 
 

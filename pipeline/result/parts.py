@@ -8,14 +8,30 @@ from __future__ import annotations
 
 from enum import Enum
 from itertools import pairwise
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.messages import UNREADABLE, Message, ended, free_text
 from pipeline.records import Level
-from pipeline.result.lists import Floats, Number, check_one_length
+
+# Nothing measured comes near it, and its square and cube are numbers still.
+Number = Annotated[float, Field(ge=-1e30, le=1e30)]
+Floats = list[Number]
+
+
+def check_one_length(part: BaseModel, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> None:
+    """Refuse lists of a part that differ in length; optional ones may be empty.
+
+    Raises
+    ------
+    ValueError
+        With the lengths.
+    """
+    lengths = {name: len(getattr(part, name)) for name in (*needed, *optional)}
+    if len({lengths[name] for name in lengths if name in needed or lengths[name]}) > 1:
+        raise ValueError(f"lists of different lengths: {', '.join(f'{n} {count}' for n, count in lengths.items())}")
 
 
 class Part(BaseModel):
@@ -186,7 +202,7 @@ class Curve(Part):
 
 
 class Widening(Part):
-    """What all that is believed adds to the band of the curve that answers, beyond what its own way tells."""
+    """How much wider the band of the answer is than its own fit tells: for weak causes and for what nobody knows."""
 
     kappa_per_m: Floats = Field(description="curvature, increasing, 1/m")
     tangent_factor: list[Floats] = Field(
@@ -230,7 +246,7 @@ class KnotPart(Part):
 
 
 class MisfitPart(Part):
-    """How well the fitted simulation explains the data, in units and in sigma."""
+    """How well the fitted simulation explains the data: what it leaves, in units and in standard deviations."""
 
     force_rmse_N: Number = Field(description="measured minus simulated force, root mean square, N")
     shape_rmse_m: Number = Field(description="measured minus simulated position, root mean square, m")

@@ -7,7 +7,9 @@ nothing is measured.
 
 from __future__ import annotations
 
-from pipeline.records import Finding, Level, Rejected, Specimen, of_photo
+from dataclasses import replace
+
+from pipeline.records import Finding, Level, Rejected, Specimen, said_once
 from pipeline.settings import VisionSettings
 from pipeline.vision.picture_size import of_one_size
 from pipeline.vision.series import given_calibration
@@ -26,4 +28,4 @@ def look_at_photos(specimen: Specimen, settings: VisionSettings) -> tuple[Findin
     shots, sizes = of_one_size(shots)
     refused = [shot.found for shot in shots if isinstance(shot.found, Rejected)]
     level: Level = "error" if len(refused) == len(shots) else "warning"
-    return (*covers, *sizes, *(of_photo(one.image, level, one.said) for one in refused))
+    return (*covers, *sizes, *said_once((one.image, replace(one.finding, level=level)) for one in refused))

@@ -129,7 +129,7 @@ def balance(test: MeasuredTest) -> BalanceGraph:
 
 
 def _regress_in_spite_of_misfit(model: MomentModel, start: float) -> Regression | None:
-    """Regression; where photos and forces contradict the one curve beyond their noise, the contradiction is noise.
+    """Regression that counts as noise, too, what photos and forces leave beside one curve.
 
     4 per degree of freedom is far above what noise alone does with more than a hundred of them.
     """

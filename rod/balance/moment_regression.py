@@ -149,14 +149,17 @@ def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
 def _settled(model: MomentModel, unknowns: Array, *, smooth: bool) -> Regression | None:
     """Gauss-Newton from given unknowns; see `rod.law_prior.priors` for `smooth`."""
     p = model.size
-    for _ in range(ITERATIONS):
+    for count in range(ITERATIONS):
         rows, value, J = model.linearised(unknowns)
         posterior = model.posterior(unknowns, value, J, smooth=smooth)
         move = posterior.mean - unknowns
+        std = np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0))
         # A fiftieth of a standard deviation is nothing anyone could see.
-        if np.all(np.abs(move) <= 0.02 * np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0)) + 1e-12):
+        if np.all(np.abs(move) <= 0.02 * std + 1e-12):
             mean = posterior.mean  # the last move is made, its rows are not taken again
             return Regression(model, model.basis.law(mean[:p]), mean, posterior, rows)
+        if 3 * count > ITERATIONS and np.any(np.abs(move) > std):
+            break  # what still goes to and fro by as much never comes to rest
         # One unit of log c is a factor e in stiffness: longer steps leave the range of the linearisation.
         unknowns = unknowns + move * min(1.0, 1.0 / max(float(np.max(np.abs(move[:p]))), 1e-12))
     return None

@@ -242,8 +242,10 @@ def start(
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
         shown = None if begin is not None else as_photographed(m, K, unit=stiffness)
-        if shown is None and near is not None:
-            # from the other side of straight a law with an early knee is never found; else the line will do
+        # from the other side of straight a law with an early knee is never found; else the line will do
+        at_rest = (step.shape for step in test.steps if step.branch == "mounted" and step.shape is not None)
+        told = any(np.median(shape.kappa) * rest > 0.0 for shape in at_rest)
+        if shown is None and near is not None and not told:
             measured = as_measured(near, unit=stiffness)
             shown = measured if measured is not None and measured[2] * rest < 0.0 else None
         if shown is not None:

@@ -9,6 +9,7 @@ Sign: that of the model, ``d residual = - column``.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +68,7 @@ def _forces(observation: Observation, at: Prediction, moved: Prediction) -> list
     return [of_hold((new - old).T[: len(data)] / std, alike / std) for data, old, new, std, alike in holds]
 
 
+@lru_cache(maxsize=1)
 def _across(observation: Observation, at: Prediction) -> tuple[Array, Array, tuple[_Nodes, _Nodes]]:
     """Sine and cosine (k,) of the curve at the foot points, and its two nodes beside each.
 

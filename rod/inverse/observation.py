@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -278,7 +278,7 @@ def residual(observation: Observation, prediction: Prediction) -> Array:
     sections = observation.all_sections
     across = _distance(sections, prediction)
     for photo, own in zip(observation.photos, sections.of_photo, strict=True):
-        parts.append(photo.whiten @ np.r_[photo.chord - prediction.chord[photo.step], across[own]])
+        parts.append(photo.whiten @ np.concatenate(([photo.chord - prediction.chord[photo.step]], across[own])))
     return np.asarray(observation.joined(np.concatenate(parts)) + observation.added)
 
 
@@ -330,8 +330,11 @@ class Foot(NamedTuple):
     gap_y: Array
 
 
+@lru_cache(maxsize=2)
 def foot_points(places: Places, prediction: Prediction) -> Foot:
     """Foot points on curves that are cubic (Hermite, from positions and directions) between their nodes.
+
+    Remembered, since the columns of a model follow its residual.
 
     They are found by two Newton steps from the section's own arc length; what is left along the curve enters the
     distance by its square only.

@@ -36,7 +36,7 @@ def whole_residual(
     """Residual (N,) with the rows of prior knowledge at the end; None where the model has no equilibrium."""
     if prediction is None:
         return None
-    return np.asarray(np.r_[residual(observation, prediction), -prior @ vector])
+    return np.concatenate((residual(observation, prediction), -prior @ vector))
 
 
 def sensitivities(observation: Observation, extension: Extension, vector: Array, base_model: Model, here: Run) -> Array:

@@ -86,9 +86,11 @@ def test_a_fit_that_failed_for_want_of_a_cause_advises_nothing_else(verdict, ext
     """Stiff ends were named, f_EI measured beside them, and above it stood that length_mm was wrong."""
     failed = Finding("identify/inverse-no-equilibrium", "error", "length_mm or the scale is wrong")
     contradicted = Finding("identify/inverse-opposite-forces", "error", "no cable does that")
+    misfit = Finding("identify/misfit-force", "warning", Message("identify/misfit-force", rms=7.0))
     part = SimpleNamespace(verdict=verdict, extended=extended)
-    told = without_advice([failed, contradicted], part)
-    assert [one.level for one in told] == [level, "error"] and told[1] == contradicted
+    told = without_advice([failed, contradicted, misfit], part)
+    explained = "info" if level == "info" else "warning"
+    assert [one.level for one in told] == [level, "error", explained] and told[1] == contradicted
     assert ("length_mm" in str(told[0].said)) == (level == "error")
 
 

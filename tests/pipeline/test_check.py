@@ -44,6 +44,10 @@ def smaller(path, _):
     cv2.imwrite(str(path), cv2.resize(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2)))
 
 
+def turned(path, _):
+    cv2.imwrite(str(path), cv2.rotate(picture(path), cv2.ROTATE_90_COUNTERCLOCKWISE))
+
+
 def doubled(path, other):
     shutil.copy(other, path)
 
@@ -67,6 +71,7 @@ def test_good_photos_are_no_news(folder):
         (blurred, {"photo/blur", "photo/contrast"}),  # a cable smeared over forty pixels may hardly stand out
         (smaller, {"photo/size"}),
         (doubled, {"photo/doubled"}),
+        (turned, {"photo/turned"}),
     ],
 )
 def test_a_spoilt_photo_is_told(folder, spoil, codes):
@@ -83,6 +88,20 @@ def test_no_photo_that_can_be_used_is_an_error(folder):
     code, row = checked(folder)
     assert (code, row["status"], row["runs"]) == (3, "error", False)
     assert {f["code"] for f in row["findings"] if f["level"] == "error"} == {"photo/blank"}
+
+
+def test_a_fault_of_several_photos_is_one_sentence_with_their_names(folder):
+    for path in (folder / "images").iterdir():
+        black(path, None)
+    (message,) = [f["message"] for f in checked(folder)[1]["findings"] if f["code"] == "photo/blank"]
+    assert message.startswith("3 photos (images/step_00.jpg, images/step_01.jpg, ")
+
+
+def test_sizes_that_all_differ_are_named(folder):
+    for number, path in enumerate(sorted((folder / "images").iterdir())):
+        cv2.imwrite(str(path), cv2.copyMakeBorder(picture(path), *[8 * number] * 4, cv2.BORDER_REPLICATE))
+    (told,) = [f for f in checked(folder)[1]["findings"] if f["code"] == "photo/size"]
+    assert all(size in told["message"] for size in ("1120 x 420 px", "1136 x 436 px", "1152 x 452 px"))
 
 
 def test_a_picture_of_a_telephone_is_told_once(folder):
@@ -114,6 +133,45 @@ def test_all_values_that_are_missing_or_wrong_are_named_at_once(folder):
     file.write_text("\n".join([*lines[:at], "length_mm = 0.0", "diameter_mm = 0.0", *lines[at:]]))
     message = checked(folder)[1]["findings"][0]["message"]
     assert "length_mm = 0.0 and diameter_mm = 0.0 cannot be used" in message
+
+
+def test_a_wrong_value_hides_no_missing_one_and_no_missing_file(folder):
+    file = folder / "specimen.toml"
+    text = file.read_text().replace("length_mm = 181.0000", "length_mm = 0").replace("diameter_mm = 4.600\n", "")
+    file.write_text(text.replace('moving_bearing = "left"', 'moving_bearing = "links"\ncolour = "red"'))
+    (folder / "force.csv").unlink()
+    shutil.rmtree(folder / "images")
+    code, row = checked(folder)
+    assert (code, row["runs"]) == (3, False)
+    told = [(finding["code"], finding["message"]) for finding in row["findings"]]
+    assert [code for code, _ in told] == [
+        "toml/wrong-value",
+        "toml/unknown-key",
+        "toml/wrong-value",
+        "toml/missing-key",
+        "folder/no-force-log",
+        "folder/no-photos",
+    ]
+    for words, (_, message) in zip(
+        ("length_mm = 0 cannot", "colour", "links", "diameter_mm is missing", "force log", "no photos"),
+        told,
+        strict=True,
+    ):
+        assert words in message
+
+
+def test_a_description_that_cannot_be_parsed_hides_no_missing_file(folder):
+    (folder / "specimen.toml").write_text("[specimen\n")
+    (folder / "force.csv").unlink()
+    shutil.rmtree(folder / "images")
+    codes = {finding["code"] for finding in checked(folder)[1]["findings"]}
+    assert codes == {"toml/syntax", "folder/no-force-log", "folder/no-photos"}
+
+
+def test_a_misspelt_size_is_told_once(folder):
+    file = folder / "specimen.toml"
+    file.write_text(file.read_text().replace("diameter_mm", "diamter_mm"))
+    assert [finding["code"] for finding in checked(folder)[1]["findings"]] == ["toml/unknown-key"]
 
 
 def test_a_spreadsheet_in_place_of_the_log_is_named(folder):

@@ -11,9 +11,8 @@ from click.testing import CliRunner
 from pipeline.batch.store import write_entry
 from pipeline.cli import main
 from pipeline.report.index import write_index
-from pipeline.report.row import as_entry, index_row
 from pipeline.report.tables import write_result
-from pipeline.settings import ReportSettings
+from pipeline.result.row import as_entry, index_row
 from tests.pipeline.report.virtual_result import measured_result
 
 
@@ -45,13 +44,14 @@ DAMAGE = {
 }
 
 
-def stored(out, *names):
-    """Results as a run leaves them, with their entries."""
+def stored(out, *names, photos=None):
+    """Results as a run leaves them, with their entries; of ``photos`` only so many, where each is drawn."""
     result = measured_result()
+    result = result.model_copy(update={"photos": result.photos[:photos]})
     for name in names:
         named = result.model_copy(update={"specimen": result.specimen.model_copy(update={"id": name})})
         write_result(named, out / name)
-        write_entry({"status": "measured", "row": as_entry(index_row(named, ReportSettings()))}, out / name)
+        write_entry({"status": "measured", "row": as_entry(index_row(named))}, out / name)
     return result
 
 
@@ -86,7 +86,7 @@ def test_one_sentence_for_it(how, text, tmp_path):
 
 
 def test_report_draws_the_others(tmp_path):
-    stored(tmp_path, "a", "b", "c")
+    stored(tmp_path, "a", "b", "c", photos=1)
     (tmp_path / "b/result.json").write_text("{")
     done = call("report", tmp_path)
     assert done.exit_code == 0

@@ -26,6 +26,7 @@ MADE = (
     "photo/no-",
     "settled.",
     "cause.",
+    "form.",
     "diagnosis.",
     "photo/outlier",
     "force/outlier",

@@ -35,6 +35,10 @@ def test_the_answer_says_which_curve_it_is_and_why(measured):
     extended = measured.model_copy(update={"diagnosis": diagnosis_of("named", measured.photos)})
     assert extended.answer.method == "extended"
     assert extended.answer.reason != told.reason
+    part = extended.diagnosis.model_copy(update={"verdict": "unexplained", "extended_refuted": False})
+    nearest = extended.model_copy(update={"diagnosis": part}).answer
+    assert nearest.method == "extended"
+    assert "no cause in the catalogue removes the misfit" in nearest.reason and "best" not in nearest.reason
 
 
 @pytest.mark.parametrize(

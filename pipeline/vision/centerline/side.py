@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.messages import Message
-from pipeline.records import Centerline, Finding, Rejected, of_photo
+from pipeline.records import Centerline, Finding, Rejected, inferred, said_once
 from rod.measurement import MeasuredShape
 
 Array = NDArray[np.float64]
@@ -47,11 +46,8 @@ def on_one_side(
     side = max(traced, key=_bow).side
     turned = [line for line in traced if line.side != side]
     names = {line.image for line in turned}
-    findings = tuple(
-        of_photo(line.image, "info", Message("photo/other-side", bow_m=_bow(line)))
-        for line in turned
-        if _bow(line) > _OTHER_SIDE_WIDTHS * diameter_m
-    )
+    bows = [(line.image, _bow(line)) for line in turned if _bow(line) > _OTHER_SIDE_WIDTHS * diameter_m]
+    findings = tuple(said_once((image, inferred("photo/other-side", bow_m=bow)) for image, bow in bows))
     return tuple(
         _turned(line) if isinstance(line, Centerline) and line.image in names else line for line in lines
     ), findings

@@ -14,9 +14,9 @@ import pytest
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
 from pipeline.report.index import write_index
-from pipeline.report.row import POINTS, as_entry, from_entry, index_row, thinned
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart, PhotoPart
+from pipeline.result.row import POINTS, as_entry, from_entry, index_row, thinned
 from pipeline.settings import ReportSettings
 
 
@@ -168,7 +168,7 @@ def test_failed_specimen_gets_a_report_that_says_why_and_what_to_do(failed_resul
     page = write_index(tmp_path, tmp_path, ReportSettings(language="de"))[0].read_text(encoding="utf-8")
     assert 'href="cable-13/report.html"' in page
     report = (tmp_path / "cable-13/report.html").read_text(encoding="utf-8")
-    assert "Das beheben und denselben Befehl noch einmal ausführen" in report
+    assert "Das unten Genannte beheben und denselben Befehl noch einmal ausführen" in report
 
 
 def test_no_link_leads_nowhere(failed_result, tmp_path):
@@ -185,7 +185,7 @@ def scaled(result, times, **changes):
 
 def test_a_row_is_the_same_from_its_entry(full_result, partial_result, failed_result, diagnosed):
     for result in (full_result, partial_result, failed_result, diagnosed("two_causes")):
-        row = index_row(result, ReportSettings())
+        row = index_row(result)
         again = from_entry(json.loads(json.dumps(as_entry(row))))
         assert as_entry(again) == as_entry(row)
 
@@ -204,7 +204,7 @@ def test_a_row_keeps_the_covariance_whatever_its_directions(full_result):
 
 def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
     result = diagnosed("two_causes")
-    row = index_row(result, ReportSettings())
+    row = index_row(result)
     assert row.causes == tuple(cause.name for cause in result.diagnosis.causes) and len(row.causes) == 2
     assert row.pre_curvature is not None
     levels = [finding.level for finding in result.findings]
@@ -230,7 +230,7 @@ def test_a_row_holds_causes_and_counts_of_findings(diagnosed):
     ids=str,
 )
 def test_an_entry_of_wrong_values_is_no_row(place, value, full_result):
-    whole = json.dumps(as_entry(index_row(full_result, ReportSettings())))
+    whole = json.dumps(as_entry(index_row(full_result)))
     from_entry(json.loads(whole))
     data = inside = json.loads(whole)
     for name in place[:-1]:
@@ -245,13 +245,13 @@ def test_an_entry_of_wrong_values_is_no_row(place, value, full_result):
 
 
 def test_a_row_is_small(full_result):
-    assert len(json.dumps(as_entry(index_row(full_result, ReportSettings())))) < 5000
+    assert len(json.dumps(as_entry(index_row(full_result)))) < 5000
 
 
 def test_results_with_entries_are_not_read(full_result, tmp_path, monkeypatch):
     for name in ("a", "b"):
         write_result(named(full_result, name), tmp_path / name)
-        write_entry({"row": as_entry(index_row(named(full_result, name), ReportSettings()))}, tmp_path / name)
+        write_entry({"row": as_entry(index_row(named(full_result, name)))}, tmp_path / name)
     monkeypatch.setattr("pipeline.result.read_result", lambda path: pytest.fail(f"{path} was read"))
     assert list(pd.read_csv(write_index(tmp_path, tmp_path)[1]).id) == ["a", "b"]
 

@@ -42,7 +42,7 @@ def test_figures_stand_alone_and_on_the_page(folder):
     page = (folder / "paper.html").read_text(encoding="utf-8")
     assert "http://" not in page.replace("http://www.w3.org/", "") and "https://" not in page
     assert "&#" not in page.partition("<style>")[2].partition("</style>")[0]  # escaped quotes end a style sheet
-    assert "−36, +14, +16 mN" in page
+    assert "−36, +14, +16\u00a0mN" in page
     for said in (
         "initial rod",
         "forces and curvatures over the iterations",

@@ -57,7 +57,7 @@ def test_findings_that_find_no_room_are_counted():
     long = Message("identify/force-zero", force_N=(0.3, 0.025), step=0, z=12.0)
     list_troubles(sheet, [FindingPart.of("warning", long)] * 60, Words("de"))
     told = [text.get_text() for text in sheet.figure.texts]
-    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 300 ± 25\u00a0mN") for line in told)
+    shown = sum(line.startswith("Warnung: Die Kraftmessdose zeigt 300\u00a0±\u00a025\u00a0mN") for line in told)
     assert 10 < shown < 60
     assert told[-1] == f"{60 - shown} weitere in report.html."
     assert sheet.room() > 0.0

@@ -7,22 +7,26 @@ summary, mean of repeat specimens) reads rows alone: a result with its photos is
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, PlainValidator, StrictBool, StrictInt, TypeAdapter
 
-from pipeline.messages import Message
+from pipeline.messages import UNREADABLE, Message
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart, Result, Visited
-    from pipeline.settings.report import ReportSettings
 
 Array = NDArray[np.float64]
-End = tuple[float, float, float]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+End = tuple[Finite, Finite, Finite]
+Text = Annotated[str, AfterValidator(lambda text: text.encode("utf-8", "replace").decode("utf-8"))]
+Told = Annotated[Message | None, PlainValidator(lambda said: said if said is None else Message.read(said))]
+STATUSES = ("measured", "partial", "failed")
 
 ROW = 4
 """Version of what stands in an entry; another one is made anew from the result."""
@@ -82,30 +86,30 @@ class IndexRow:
         Not usable because of the others of its type.
     """
 
-    id: str
-    type: str
-    status: str
-    verdict: str
-    causes: tuple[str, ...]
-    twins: tuple[str, ...]
-    usable: bool
-    fault: Message | None
-    method: str
+    id: Text
+    type: Text
+    status: Literal["measured", "partial", "failed"]
+    verdict: Literal["none", "adequate", "named", "class", "two_causes", "unexplained", "underpowered"]
+    causes: tuple[Text, ...]
+    twins: tuple[Text, ...]
+    usable: StrictBool
+    fault: Told
+    method: Text
     low: End | None
     high: End | None
-    pre_curvature: tuple[float, float] | None
-    rms_relative: float | None
-    compatible: bool | None
-    photos_used: int
-    photos_given: int
-    warnings: int
-    errors: int
-    worst: str
-    reason: Message | None
-    shapes: str
-    curve: RowCurve | None
-    report: str = ""
-    outlying: bool = False
+    pre_curvature: tuple[Finite, Finite] | None
+    rms_relative: Finite | None
+    compatible: StrictBool | None
+    photos_used: StrictInt
+    photos_given: StrictInt
+    warnings: StrictInt
+    errors: StrictInt
+    worst: Text
+    reason: Told
+    shapes: Text
+    curve: Annotated[RowCurve | None, PlainValidator(_curve)]
+    report: Text = ""
+    outlying: StrictBool = False
 
     @property
     def state(self) -> str:
@@ -113,13 +117,7 @@ class IndexRow:
         return "unusable" if self.status != "failed" and self.method and not self.usable else self.status
 
 
-TEXTS = ("id", "type", "status", "verdict", "method", "worst", "shapes")
-COUNTS = ("photos_used", "photos_given", "warnings", "errors")
-STATUSES = ("measured", "partial", "failed")
-VERDICTS = ("none", "adequate", "named", "class", "two_causes", "unexplained", "underpowered")
-
-
-def index_row(result: Result, settings: ReportSettings) -> IndexRow:
+def index_row(result: Result) -> IndexRow:
     """Row of one result, without its report."""
     told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
     curve, worst = told.curve, _worst(result.findings)
@@ -223,32 +221,14 @@ def from_entry(data: object) -> IndexRow:
     if not isinstance(data, dict) or data.get("version") != ROW:
         raise ValueError("no row of this version")
     try:
-        given: dict[str, Any] = {n: None if data[n] is None else read(data[n]) for n, read in READ.items()}
-        row = IndexRow(
-            **{name: _typed(data[name], str) for name in TEXTS},
-            **{name: _typed(data[name], int) for name in COUNTS},
-            causes=tuple(_typed(name, str) for name in _typed(data["causes"], list)),
-            twins=tuple(_typed(name, str) for name in _typed(data["twins"], list)),
-            usable=_typed(data["usable"], bool),
-            **given,
-        )
-    except (AttributeError, KeyError, TypeError, OverflowError) as error:
+        return _adapter().validate_python({name: value for name, value in data.items() if name != "version"})
+    except UNREADABLE as error:
         raise ValueError(f"no row: {error}") from error
-    if row.status not in STATUSES or row.verdict not in VERDICTS:
-        raise ValueError("no row: unknown status or verdict")
-    return row
 
 
-def _typed(value: Any, kind: type) -> Any:
-    """The value; `TypeError` if it is of another kind, which true and false are for numbers."""
-    if type(value) is not kind:
-        raise TypeError(f"{type(value).__name__} in place of {kind.__name__}")
-    return value.encode("utf-8", "replace").decode("utf-8") if isinstance(value, str) else value
-
-
-def _numbers(values: Any, count: int) -> tuple[Any, ...]:
-    """Finite numbers, so many of them."""
-    return tuple(_table(values, count).tolist())
+@cache
+def _adapter() -> TypeAdapter[IndexRow]:
+    return TypeAdapter(IndexRow)
 
 
 def _table(values: Any, *shape: int) -> Array:
@@ -260,9 +240,11 @@ def _table(values: Any, *shape: int) -> Array:
     return table if fits else table.reshape(shape)  # a view of each would be kept ten thousand times
 
 
-def _curve(data: Any) -> RowCurve:
+def _curve(data: Any) -> RowCurve | None:
+    if data is None:
+        return None
     tangent = _table(data["tangent"], -1)
-    (low, high), count = _numbers(data["range"], 2), tangent.size
+    (low, high), count = _table(data["range"], 2), tangent.size
     if count < 2 or not low < high:
         raise ValueError("a curve of nothing")
     return RowCurve(
@@ -288,16 +270,3 @@ def _triangle(text: str, count: int) -> NDArray[np.float32]:
 def _below(rows: int, columns: int) -> NDArray[np.bool_]:
     """Where the numbers of a lower triangle stand."""
     return np.tri(rows, columns, dtype=bool)
-
-
-READ: dict[str, Callable[[Any], Any]] = {
-    "fault": Message.read,
-    "reason": Message.read,
-    "low": lambda values: _numbers(values, 3),
-    "high": lambda values: _numbers(values, 3),
-    "pre_curvature": lambda values: _numbers(values, 2),
-    "rms_relative": lambda value: _numbers([value], 1)[0],
-    "compatible": lambda value: _typed(value, bool),
-    "curve": _curve,
-}
-"""How what may be missing in an entry is read."""

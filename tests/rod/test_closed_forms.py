@@ -1,0 +1,169 @@
+"""Pieces of the rod held against closed forms: circles, rotations, integrals over a logarithm, refused input."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rod.inverse.photo_residual import Pose, curve_distance
+
+from rod.balance.moment_points import HIDDEN, _arc, _tied
+from rod.bending_test import BendingTest, simulate
+from rod.characteristic import Characteristic
+from rod.compliance_law import CELLS, moment_basis, refreshed
+from rod.law_prior import NEAR_REST, integrals
+from rod.paper import _from_photo, _graph
+from rod.reduction import Hold
+from rod.support import Support
+
+LENGTH, RADIUS = 0.2, 0.15
+HALF = 0.5 * LENGTH / RADIUS
+CHORD = 2.0 * RADIUS * np.sin(HALF)
+
+
+def circle(s):
+    """Bow of a circle over its chord: x, y, theta of arc lengths from its left end."""
+    theta = HALF - s / RADIUS
+    return RADIUS * (np.sin(HALF) - np.sin(theta)), RADIUS * (np.cos(theta) - np.cos(HALF)), theta
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_an_arc_to_an_axis_is_the_rest_of_the_circle(way):
+    begin, end = 0.3 * LENGTH, LENGTH if way > 0.0 else 0.0
+    x, y, theta = circle(begin)
+    arc = _arc(np.array([begin, x, y, theta, 1.0 / RADIUS]), np.array(circle(end)[:2]), way)
+    s = np.linspace(begin, end, HIDDEN + 1)
+    assert arc == pytest.approx(np.column_stack([s, *circle(s), np.full(s.size, 1.0 / RADIUS)]), abs=1e-9)
+
+
+@pytest.mark.parametrize("hidden", [(0.0, 0.0), (0.02, 0.0), (0.02, 0.03)])
+def test_a_cable_under_covers_is_the_circle_that_is_seen_between_them(hidden):
+    s = np.linspace(0.0, LENGTH, 401)
+    x, y, theta = circle(s)
+    seen = (s >= hidden[0]) & (s <= LENGTH - hidden[1])
+    shape = SimpleNamespace(s=s, x=x, y=y, theta=theta, kappa=np.full(s.size, 1.0 / RADIUS), seen=seen)
+    curve, free = _tied(shape, CHORD)
+    assert np.all(np.diff(curve[:, 0]) >= 0.0)
+    assert curve[[0, -1], 1:3] == pytest.approx(np.array([[0.0, 0.0], [CHORD, 0.0]]), abs=1e-9)
+    assert curve[:, 1:4] == pytest.approx(np.column_stack(circle(curve[:, 0])), abs=1e-8)
+    inside = (curve[:, 0] > hidden[0] + 1e-9) & (curve[:, 0] < LENGTH - hidden[1] - 1e-9)
+    assert np.all(free[inside] == 1.0) and (free.min() == 0.0) == any(hidden)
+    under = curve[:, 0] < hidden[0]
+    assert free[under] == pytest.approx(curve[under, 0] / max(hidden[0], 1e-9), abs=1e-6)
+
+
+def test_a_photo_turned_about_its_left_axis_lies_on_the_curve_turned_alike():
+    s = np.linspace(0.0, LENGTH, 401)
+    x, y, theta = circle(s)
+    across, grown = 0.004, 1e-3
+    roll = across / CHORD
+    cos, sin = np.cos(roll), np.sin(roll)
+    stretch = 1.0 + grown
+    turned = SimpleNamespace(
+        s=stretch * s,
+        x=stretch * (cos * x - sin * y) + 1e-3,
+        y=stretch * (sin * x + cos * y) - 2e-3,
+        theta=theta + roll,
+        kappa=np.full(s.size, 1.0 / (stretch * RADIUS)),
+    )
+    pose = Pose(1e-3, -2e-3, 1e-3, -2e-3 + across, grown)
+    photo = SimpleNamespace(s=s[20:-20], x=x[20:-20], y=y[20:-20])
+    distance, feet = curve_distance(photo, turned, pose, CHORD)
+    assert np.abs(distance).max() < 1e-9
+    assert feet == pytest.approx(stretch * photo.s, abs=1e-8)
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.3])
+def test_the_prior_over_a_logarithm_integrates_the_powers_of_that_logarithm(rest):
+    """t = log(1 + |xi - rest| / (a N)) / log(1 + 1 / N), a the longer side; the functions are t, t^2, t^3."""
+    far = max(rest, 1.0 - rest)
+    scale = np.log1p(1.0 / NEAR_REST)
+
+    class Powers:
+        t = np.unique(np.concatenate([np.geomspace(1e-6, 1.0, 400), rest - np.geomspace(1e-6, 1.0, 400) * rest, [0.0]]))
+        t = np.unique(np.concatenate([np.clip(t, 0.0, 1.0), np.clip(rest + t * (1.0 - rest), 0.0, 1.0)]))
+
+        def __call__(self, xi, order):
+            apart = np.abs(xi - rest) + far * NEAR_REST
+            side = np.sign(xi - rest)
+            t = np.log(apart / (far * NEAR_REST)) / scale
+            one, two, three = side / (scale * apart), -1.0 / (scale * apart**2), 2.0 * side / (scale * apart**3)
+            powers = [
+                (one, two, three),
+                (2 * t * one, 2 * (one**2 + t * two), 2 * (3 * one * two + t * three)),
+                (
+                    3 * t**2 * one,
+                    6 * t * one**2 + 3 * t**2 * two,
+                    6 * one**3 + 18 * t * one * two + 3 * t**2 * three,
+                ),
+            ]
+            return np.column_stack([power[order - 1] for power in powers])
+
+    def over(power):
+        """Integral of t^power over both sides."""
+        ends = [np.log1p(side / (far * NEAR_REST)) / scale for side in (rest, 1.0 - rest)]
+        return sum(end ** (power + 1) for end in ends) / (power + 1)
+
+    exact = (
+        [[over(0), 2 * over(1), 3 * over(2)], [2 * over(1), 4 * over(2), 6 * over(3)], [0, 0, 9 * over(4)]],
+        [[0, 0, 0], [0, 4 * over(0), 12 * over(1)], [0, 0, 36 * over(2)]],
+        [[0, 0, 0], [0, 0, 0], [0, 0, 36 * over(0)]],
+    )
+    for told, upper in zip(integrals(Powers(), rest), exact, strict=True):
+        assert np.triu(told) == pytest.approx(np.triu(np.array(upper, float)), rel=1e-6, abs=1e-6)
+
+
+def test_the_abscissa_of_a_law_that_does_not_change_is_the_share_of_the_moment():
+    for low, high in ((0.0, 0.05), (-0.02, 0.05)):
+        law = moment_basis(low, high, unit=60.0).law(np.zeros(24))
+        basis = refreshed(law, 1e-4 * np.eye(24), low, high)
+        assert basis.moments.size == basis.at_ends.shape[0] == CELLS + 1
+        m = np.linspace(low, high, 11)
+        assert basis.place(m) == pytest.approx((m - low) / (high - low), abs=1e-9)
+
+
+def test_the_papers_graph_is_the_ratio_of_the_slopes_where_the_curvature_changes():
+    s = np.linspace(0.0, np.pi, 201)
+    kappa, graph = _graph(s, 9.0 * np.sin(s), 27.0 * np.sin(s), turn=9.0 * np.cos(s), lift=27.0 * np.cos(s))
+    kept = np.abs(np.cos(s)) > 0.05
+    kept[[0, -1]] = False
+    assert kappa == pytest.approx(9.0 * np.sin(s)[kept]) and graph == pytest.approx(np.full(kappa.size, 3.0))
+
+
+def test_noise_of_the_papers_photo_lies_along_the_normal(monkeypatch):
+    """Points of a curve all moved by d along its normal are those of the parallel curve."""
+    d, s = 2e-3, np.linspace(0.0, LENGTH, 20_001)
+    theta = 0.5 - 25.0 * s**2
+    x, y = (np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * s[1])]) for v in (np.cos(theta), np.sin(theta)))
+    step = SimpleNamespace(s=s, x=x, y=y, theta=theta, force=1.0)
+    parallel = SimpleNamespace(s=s, x=x - d * np.sin(theta), y=y + d * np.cos(theta), theta=theta, force=1.0)
+    monkeypatch.setattr("rod.paper.POSITION_NOISE", d)
+    moved = _from_photo(step, SimpleNamespace(standard_normal=np.ones))
+    exact = _from_photo(parallel, SimpleNamespace(standard_normal=np.zeros))
+    assert moved[0].size > 500
+    for told, meant in zip(moved, exact, strict=True):
+        assert told == pytest.approx(meant, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Characteristic.from_ordinates([0.0], [1.0], reading="chord"), "unknown reading"),
+        (lambda: Characteristic.from_ordinates([0.0], [1.0], abscissa="moment"), "unknown reading"),
+        (lambda: Hold(chord=0.1, compliance=-1.0), "compliance must not be negative"),
+        (
+            lambda: simulate(
+                BendingTest(
+                    LENGTH,
+                    Characteristic.constant(5e-3),
+                    left=Support(rigid_length=0.15),
+                    right=Support(rigid_length=0.1),
+                ),
+                [0.01],
+            ),
+            "rigid pieces leave nothing",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
