@@ -4,12 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rod.inverse.photo_residual import Pose, curve_distance
 
 from rod.balance.moment_points import HIDDEN, _arc, _tied
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
 from rod.compliance_law import CELLS, moment_basis, refreshed
+from rod.inverse.camera import axes_off, scaled
+from rod.inverse.observation import Places, foot_points
+from rod.inverse.prediction import Prediction
 from rod.law_prior import NEAR_REST, integrals
 from rod.paper import _from_photo, _graph
 from rod.reduction import Hold
@@ -18,6 +20,7 @@ from rod.support import Support
 LENGTH, RADIUS = 0.2, 0.15
 HALF = 0.5 * LENGTH / RADIUS
 CHORD = 2.0 * RADIUS * np.sin(HALF)
+FACTS = SimpleNamespace(length=LENGTH, picture_centre=np.zeros((1, 2)), half_diagonal=0.2)
 
 
 def circle(s):
@@ -51,25 +54,23 @@ def test_a_cable_under_covers_is_the_circle_that_is_seen_between_them(hidden):
     assert free[under] == pytest.approx(curve[under, 0] / max(hidden[0], 1e-9), abs=1e-6)
 
 
-def test_a_photo_turned_about_its_left_axis_lies_on_the_curve_turned_alike():
+def test_a_photo_whose_axes_were_found_beside_their_place_lies_on_the_curve_turned_alike():
+    """A scale too small by a thousandth and axes off by millimetres: the chord frame runs through what was found."""
     s = np.linspace(0.0, LENGTH, 401)
     x, y, theta = circle(s)
-    across, grown = 0.004, 1e-3
-    roll = across / CHORD
-    cos, sin = np.cos(roll), np.sin(roll)
-    stretch = 1.0 + grown
-    turned = SimpleNamespace(
-        s=stretch * s,
-        x=stretch * (cos * x - sin * y) + 1e-3,
-        y=stretch * (sin * x + cos * y) - 2e-3,
-        theta=theta + roll,
-        kappa=np.full(s.size, 1.0 / (stretch * RADIUS)),
-    )
-    pose = Pose(1e-3, -2e-3, 1e-3, -2e-3 + across, grown)
-    photo = SimpleNamespace(s=s[20:-20], x=x[20:-20], y=y[20:-20])
-    distance, feet = curve_distance(photo, turned, pose, CHORD)
-    assert np.abs(distance).max() < 1e-9
-    assert feet == pytest.approx(stretch * photo.s, abs=1e-8)
+    none = np.zeros(0)
+    true = Prediction(none, (), np.array([CHORD]), s, x[None], y[None], theta[None])
+    grown, left, right = 1e-3, np.array([1e-3, -2e-3]), np.array([-5e-4, 2e-3])
+    seen = axes_off(np.r_[left, right, np.zeros(4)])(scaled(grown)(true, FACTS), FACTS)
+    found = np.array([CHORD / (1.0 + grown), 0.0]) + right - left
+    turn = np.array([found, [-found[1], found[0]]]) / np.hypot(*found)
+    points = (np.column_stack([x, y]) / (1.0 + grown) - left) @ turn.T
+    assert seen.chord[0] == pytest.approx(np.hypot(*found), rel=1e-12)
+    assert np.column_stack([seen.x[0], seen.y[0]]) == pytest.approx(points, abs=1e-12)
+    places = Places(np.zeros(361, dtype=int), s[20:-20], points[20:-20, 0], points[20:-20, 1], ())
+    foot = foot_points(places, seen)
+    assert np.abs(np.cos(foot.direction) * foot.gap_y - np.sin(foot.direction) * foot.gap_x).max() < 1e-9
+    assert seen.s[foot.left] + foot.t * foot.width == pytest.approx(s[20:-20] / (1.0 + grown), abs=1e-8)
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.3])

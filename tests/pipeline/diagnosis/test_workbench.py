@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipeline.diagnosis.observations.prediction import facts_of
 
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
@@ -12,7 +11,7 @@ from fixtures.photographed.specimen import Order, make, write
 from fixtures.photographed.trial import answer
 from fixtures.trials import Trial, made
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.fits import base, workbench
+from pipeline.diagnosis.fits import workbench
 from pipeline.diagnosis.fits.extended import curve_change
 from pipeline.faults import faults_of_input
 from pipeline.result import Curve
@@ -99,10 +98,3 @@ def test_three_photos_without_a_force_free_one_leave_the_false_valley_of_pre_cur
     # with K0 at -0.7 1/m for 0.86 and a law that rises from rest: 22.6 % off, 77 % of it in the band
     assert found["f_error"] < 0.03
     assert found["f_covered"] > 0.9
-
-
-def test_the_balance_is_not_asked_where_a_photo_at_rest_tells_the_side(monkeypatch):
-    """It took a third of a diagnosis, and the law that it found was not used: K0 has the sign of the line's."""
-    monkeypatch.setattr(base, "balance", lambda test: pytest.fail("asked"))
-    test = hidden_test(Cable(), SIX, largest=0.0138, seed=21)
-    assert base.start(test, facts_of(test), elements=60).seen is None
