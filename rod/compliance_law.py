@@ -146,6 +146,8 @@ def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *,
     weight = 1.0 / (1.0 + change[-1])
     ranges, total = (high - low, bend[-1] - bend[0]), 2.0 + weight * change[-1]
     share = ((m - low) / ranges[0] + (bend - bend[0]) / ranges[1] + weight * change) / total
+    rises = np.append(True, np.diff(np.maximum.accumulate(share)) > 0.0)  # of what rounding leaves level, one place
+    m, share = m[rises], share[rises]
 
     def pace(at: Array) -> Array:
         change = weight * law.known_slopes(covariance, at)

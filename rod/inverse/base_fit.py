@@ -47,6 +47,7 @@ def base_fit(
     begin: tuple[float, float] | None = None,
     elements: int = ELEMENTS,
     functions: int = SHAPE_FUNCTIONS,
+    calibrated: bool = True,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
 ) -> BaseFit:
@@ -65,6 +66,8 @@ def base_fit(
         Of the simulated cable.
     functions : int
         Of the shapes that a photo is compared by.
+    calibrated : bool
+        Whether photos are as noisy as they show, or as they say.
     without_photos, without_forces : sets of int
         Indices of steps whose photo or force is not to be trusted.
 
@@ -78,15 +81,15 @@ def base_fit(
     fitted = _first_fit(observation, base, facts)
     if fitted.run.prediction is None or not observation.photos:
         return BaseFit(observation, fitted)
-    shown = [photo for photo in observation.photos if photo.sections.s.size]
-    noise = calibrate_photo_noise(
-        [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in shown],
-        [photo.sections for photo in shown],
-        [photo.basis for photo in shown],
-    )
-    observation = observe(
-        test, photo_noise=noise, functions=functions, without_photos=without_photos, without_forces=without_forces
-    )
+    if calibrated:
+        noise = calibrate_photo_noise(
+            [normal_distance(photo.sections, fitted.run.prediction, photo.step) for photo in observation.photos],
+            [photo.sections for photo in observation.photos],
+            [photo.basis for photo in observation.photos],
+        )
+        observation = observe(
+            test, photo_noise=noise, functions=functions, without_photos=without_photos, without_forces=without_forces
+        )
     here = fitted.extension, fitted.vector
     # laid along itself the law moves a little, and a cable that was about to snap over may do so
     again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))

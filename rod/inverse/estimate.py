@@ -196,7 +196,14 @@ def estimate(
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
     observation, fitted = base_fit(
-        test, facts_of(test), near=near, begin=begin, elements=elements, functions=FUNCTIONS, without_forces=rest
+        test,
+        facts_of(test),
+        near=near,
+        begin=begin,
+        elements=elements,
+        functions=FUNCTIONS,
+        calibrated=False,
+        without_forces=rest,
     )
     if fitted.run.prediction is None:
         limit = fitted.run.failed is Outcome.LIMIT_POINT

@@ -50,23 +50,25 @@ def _log_evidence(observation: Observation, fitted: Fit) -> float:
 
 
 def _mean_over(observation: Observation, fitted: Fit, over: Abscissa) -> Fit:
-    found = fitted
+    found, weight = fitted, weights(observation, fitted)
     for _ in range(LAYINGS):
         extension, vector = laid_along(found, over)
         there = _at(observation, replace(found, extension=extension), vector)
         mean = None if there is None else _at_mean(observation, there)
         # a mean is off by a standard deviation of each unknown at most; farther off, what is linear is no guide (two
         # spots in one place)
-        if mean is None or _misfit(observation, mean) > _misfit(observation, fitted) + extension.size:
+        if mean is None or _misfit(mean, weight) > _misfit(fitted, weight) + extension.size:
             break
         found = mean
     return found
 
 
-def _misfit(observation: Observation, fitted: Fit) -> float:
-    """Chi-square of the data and of all that is known but the form of the law."""
-    known = observation.rows.count + fitted.extension.base.known
-    return float(np.sum(fitted.residual[:known] ** 2))
+def _misfit(fitted: Fit, weight: Array) -> float:
+    """Chi-square of the data, weighed (N,), and of all that is known but the form of the law."""
+    known = len(weight) + fitted.extension.base.known
+    return float(
+        np.sum((weight * fitted.residual[: len(weight)]) ** 2) + np.sum(fitted.residual[len(weight) : known] ** 2)
+    )
 
 
 def _at_mean(observation: Observation, start: Fit) -> Fit:
