@@ -58,14 +58,14 @@ def checked_all(folders: list[Path], settings: Settings) -> Iterator[dict[str, A
     if limit.in_process or (len(folders) == 1 and "timeout_s" not in limit.model_fields_set):
         return map(work, folders)
     lost = partial(without_answer, seconds=limit.timeout_s)
-    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.vision.look")
+    return apart(work, folders, seconds=limit.timeout_s, lost=lost, preload="pipeline.vision.series")
 
 
 def checked(folder: Path, settings: Settings) -> dict[str, Any]:
     """What a run would find in one folder and on its photos; whatever breaks in it is told as the run would tell it."""
     from pipeline.batch.specimen import refusal
     from pipeline.intake.folder import read_specimen
-    from pipeline.vision.look import look_at_photos
+    from pipeline.vision.series import look_at_photos
 
     try:
         specimen = read_specimen(folder, settings.intake)

@@ -25,6 +25,7 @@ from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
 from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
 from pipeline.vision.median import median, scatter
+from rod.measurement import slow_covariance
 
 
 @dataclass(frozen=True)
@@ -241,3 +242,23 @@ def _biweight(residual: Array, spread: float) -> Array:
     """Weights: 1 up to four spreads, which Gaussian errors pass once in 16,000, falling to 0 at six."""
     beyond = np.clip((np.abs(residual) / spread - 4.0) / 2.0, 0.0, 1.0)
     return np.asarray((1.0 - beyond**2) ** 2)
+
+
+def std_along(basis: Array, covariance: Array) -> Array:
+    """Standard deviation (n,) of ``basis`` (n, p) times parameters with a covariance (p, p)."""
+    return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
+
+
+def slow_errors(fit: CurveFit, std: float, length: float) -> Array:
+    """Covariance of q that a slow error of the midline makes, carried through the fit.
+
+    The light's error follows the direction of the cable against the light, a smooth function of s; that of the edges'
+    waves what lies along them: Gaussian correlation.
+    """
+    return np.asarray(fit.smooth.gain @ slow_covariance(fit.s[fit.weight > 0.0], ((std, length),)) @ fit.smooth.gain.T)
+
+
+def length_std(fit: CurveFit, s: Array, normal: Array, covariance: Array) -> float:
+    """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
+    row = np.trapezoid(fit.curve.curvature(s)[:, None] * normal, s, axis=0)
+    return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

@@ -25,8 +25,7 @@ from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
-from pipeline.vision.centerline.curve_fit import CurveFit
-from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along
+from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import SLOW_WIDTH_ORDER, HalfWidths, Waves, edge_waves
 from pipeline.vision.centerline.midline import LEAST_SECTIONS, Sections
 from pipeline.vision.centerline.path import fit_along, follow

@@ -8,20 +8,24 @@ All lengths in cells of the reduced photo.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
+from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
-from pipeline.vision.search.bands import strips_in_bands
+from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
+from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import (
     MIN_PIECE_WIDTHS,
     THICK_WIDTHS,
+    WIDTH_RATIO_RANGE,
     Mask,
     Strip,
     find_strips,
@@ -32,8 +36,6 @@ from pipeline.vision.search.strips import (
 )
 
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
-_TRACE_SHARE = 0.03  # of the area of the strips that cover most; narrower ones that cover less are specks and writing
-_ALONE_CLEAR_WIDTHS = 3.0  # widths; a strip that comes back to itself as near as that is looked at more closely
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
 _RING_GAP_WIDTHS = 2.5  # widths; a ring or writing on the sheath interrupts the skeleton so far, covers farther
 _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
@@ -44,6 +46,7 @@ _LEAST_LEVEL = 5.0  # sigmas of the ground; a strip above it is no play of noise
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
+_MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 _BAND_WIDTHS = (2.2, 3.2)  # widths; cable and hard shadow together, by a lamp 45 and 25 degrees above the table
 
 
@@ -95,28 +98,6 @@ def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ..
             yield (reading,)
     if not given:
         yield (best,)
-
-
-def narrowest(standout: Standout) -> float:
-    """Width of the narrowest strips on the likeliest picture that take up more than a trace of it; 0 without any."""
-    picture, level = next(_pictures(standout))
-    widths = ridge_widths((picture > level).astype(np.uint8))
-    most = max((width * length for width, length in widths), default=0.0)
-    return min((width for width, length in widths if width * length > _TRACE_SHARE * most), default=0.0)
-
-
-def read_alone(standout: Standout, wanted: Wanted) -> Reading | None:
-    """The likeliest reading of a cable of unknown width, if it shows one strip, long enough, and nothing else.
-
-    That is no second strip, no branch and no return of the strip to its own neighbourhood: few cells blur a crossing.
-    """
-    picture, level = next(_pictures(standout))
-    readings = list(_readings(picture, level, wanted))
-    strips = [strip for reading in readings for strip in reading.strips[:2]]
-    if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
-        return None
-    clear = _ALONE_CLEAR_WIDTHS * strips[0].width
-    return None if strips[0].branch or approaches_itself(strips[0].path, clear) else readings[0]
 
 
 def branches(strip: Strip, reading: Reading) -> bool:
@@ -202,7 +183,7 @@ def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Readin
             continue
         for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
-            strips = strips_in_bands(picture, mask, thick, width, most)
+            strips = _strips_in_bands(picture, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
                 yield Reading(tuple(strips), mask, thick, width, level)
@@ -231,3 +212,48 @@ def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     closed = ridge_widths(strip_mask(above, widths[0][0])) if widths else []
     new = [guess for guess in closed if all(abs(np.log(guess[0] / known)) > 0.2 for known, _ in widths)]
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
+
+
+def _strips_in_bands(picture: Image, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
+    """Strips of the cable's width within the bands of a mask, longest first.
+
+    Parameters
+    ----------
+    picture : (h, w) ground sigmas
+        What the mask was made of.
+    mask : (h, w)
+    thick : (h, w)
+        What is wider than any band.
+    width : cells
+        The cable's.
+    most : widths
+        Of the widest band.
+    """
+    bands = find_strips(mask, thick, width, ratios=(WIDTH_RATIO_RANGE[0], most))
+    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0)) for band in bands]
+    return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
+
+
+def _cable_within(picture: Image, band: Strip, width: float, search: float) -> Strip | None:
+    """The cable's strip in a band; None where most sections show no pair of edges."""
+    path = smooth_path(band.path, SMOOTHING_WIDTHS * width)
+    # a skeleton runs into a corner of the band over its last half width
+    corner = round(0.5 * band.width)
+    path = path[corner : len(path) - corner]
+    if len(path) < MIN_PIECE_WIDTHS * width:
+        return None
+    _, normal = path_normals(path)
+    straight, offsets = straighten(picture, path, normal, width)
+    flanks = find_flanks(straight[..., 0], offsets, width, known=True, search=search)
+    both = np.isfinite(flanks.left + flanks.right)
+    if both.mean() < _MIN_BAND_EDGES:
+        return None
+    middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
+    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width, mode="nearest")
+    across = (flanks.right - flanks.left)[both]
+    return replace(
+        band,
+        path=path + middle[:, None] * normal,
+        width=median(across),
+        width_scatter=scatter(across) / width,
+    )
