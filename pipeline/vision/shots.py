@@ -51,6 +51,8 @@ def find_cables(
     specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
+    if calibration is None and specimen.rig.bearings_px is not None and specimen.rig.marker_diameter_m is None:
+        calibration = _scale_between_given_axes(specimen, settings)
     shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
@@ -68,6 +70,18 @@ def find_cables(
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
     return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
+
+
+def _scale_between_given_axes(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
+    """The scale by the cable's length on the first photo, for which axes are given: it tells where they go from there.
+
+    None where no cable is found on it.
+    """
+    first = next(step for step in specimen.steps if step.image in specimen.images)
+    found = _find_all(replace(specimen, steps=(first,)), None, settings)[0].found
+    if isinstance(found, Rejected):
+        return None
+    return from_number(found.length_px / specimen.length_m, settings.calibration)
 
 
 def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:

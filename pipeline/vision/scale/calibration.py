@@ -114,7 +114,12 @@ def chords_px(found: list[RoughCable]) -> Array:
 
 
 def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float) -> Scale | None:
-    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one."""
+    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one.
+
+    None without travel, and of axes that a person gave: those on later photos are where log and scale put them.
+    """
+    if any(axis.kind == "given" for cable in found for axis in (cable.left, cable.right)):
+        return None
     known = np.isfinite(displacements)
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
     if known.sum() < 2 or not np.ptp(travel) > 0:
