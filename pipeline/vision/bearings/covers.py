@@ -44,11 +44,6 @@ _EXPECTED_REACH_RADII = 2.5
 """Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
 led astray by the cover's shadow two.
 """
-_SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
-_MIN_SOFT_RIM = 0.5
-"""Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
-lost left 0.6, a moved camera, whose rim is doubled, 0.45.
-"""
 _ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
 _SAME_COVER = 0.1  # radii; centres so near to each other, by rim and by cut, are those of one cover
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
@@ -82,7 +77,7 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
         found = found if found is not None and found.rim >= MIN_RIM and _apart(found, cut) <= _SAME_COVER else None
     marked = _by_marks(photo, end, radius, found)
     if marked is None or cut is None:
-        return marked or cut or _by_inner_disc(photo, end, radius, width_px)
+        return marked or _by_inner_disc(photo, end, radius, width_px) or cut
     return cut if _apart(marked, cut) > _SAME_COVER else min(marked, cut, key=lambda circle: circle.std)
 
 
@@ -103,7 +98,7 @@ def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float)
 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
-    """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
+    """As `find_cover`, by the rim alone: the one of which most is seen, of the centres with the most votes."""
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
     window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
     if window is None:
@@ -111,29 +106,19 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
-    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
-    # A dome lit from one side is brighter than the ground there and darker on the other: quarters of its rim add up.
-    # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
-    # a sharp rim, what is soft and round is the shadow.
-    partial: Circle | None = None
-    fits: list[tuple[float, Array, Circle | None]] = []
-    sharp, soft = (1.0, MIN_RIM), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
-    for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
-        if softness > 1.0 and partial is not None:
+    # If the mask ends behind the cover, cable begins before that.
+    on_cable = (along < -2.4 * radius.px) & (np.abs(aside) < 0.8 * width_px)
+    votes = _votes(window, radius.px / window.reduction, on_cable) * prior
+    best: Circle | None = None
+    for _ in range(_CANDIDATES):
+        v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
+        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius)
+        if circle is not None and (best is None or circle.rim > best.rim + 0.02):
+            best = circle
+        if best is not None and best.rim > SURE_RIM:
             break
-        for cable_from in (0.0, -2.4 * radius.px):
-            on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
-            votes = _votes(window, radius.px / window.reduction, on_cable, sectors=sectors) * prior
-            found = _best_circle(photo, radius, fits, window, votes, softness)
-            if found is not None and found.rim >= SURE_RIM:
-                return found
-            if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
-                partial = found
-    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
-    ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
-    votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool)) * ahead
-    farther = _best_circle(photo, radius, fits, window, votes, 1.0)
-    return farther if farther is not None and farther.rim >= SURE_RIM else partial
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
+    return best if best is not None and best.rim >= MIN_RIM else None
 
 
 def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius) -> Circle | None:
@@ -195,37 +180,6 @@ def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | Non
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-def _best_circle(
-    photo: Photo,
-    radius: Radius,
-    fits: list[tuple[float, Array, Circle | None]],
-    window: _Window,
-    votes: NDArray[np.float32],
-    softness: float,
-) -> Circle | None:
-    """The circle with the most of its rim seen among the centres of the window with the most votes."""
-    votes = votes.copy()
-    best: Circle | None = None
-    for _ in range(_CANDIDATES):
-        v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        center = window.to_pixels(np.array([u, v], float))
-        # votes counted in several ways lead to the same few centres: each is fitted once, within what a fit searches
-        same = [
-            known
-            for soft, place, known in fits
-            if soft == softness and np.hypot(*(place - center)) < 0.5 * SEARCH_RADII * radius.px
-        ]
-        circle = same[0] if same else fit_circle(photo, center, radius, softness=softness)
-        if not same:
-            fits.append((softness, center, circle))
-        if circle is not None and (best is None or circle.rim > best.rim + 0.02):
-            best = circle
-        if best is not None and best.rim > SURE_RIM:
-            break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
-    return best
-
-
 @dataclass(frozen=True)
 class _Window:
     """Square piece of the photo, reduced so that the circle keeps 16 to 32 cells."""
@@ -260,8 +214,8 @@ def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
     return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
 
 
-def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], *, sectors: int = 1) -> NDArray[np.float32]:
-    """Change of the mean grey value across a circle around each cell, colours together, sector by sector of it.
+def _votes(window: _Window, radius: float, blind: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Change of the mean grey value across a circle around each cell, colours together.
 
     That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all
     round where texture cancels. Strong edges are clipped, and the cable's own, which are straight and would heap up
@@ -278,12 +232,9 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], *, sectors:
     distance = np.hypot(x, y) + np.float32(1e-6)
     ring = np.exp(-0.5 * ((distance - radius) / max(0.7, _RING_WIDTH * radius)) ** 2)
     ring /= distance * ring.sum()
-    which = np.floor((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * sectors).clip(0, sectors - 1)
     votes = np.zeros(strength.shape, np.float32)
-    for sector in range(sectors):
-        part = np.where(which == sector, ring, np.float32(0.0))
-        for channel in range(gu.shape[2]):
-            across = cv2.filter2D(gu[..., channel] * gain, -1, part * x, borderType=cv2.BORDER_CONSTANT)
-            across += cv2.filter2D(gv[..., channel] * gain, -1, part * y, borderType=cv2.BORDER_CONSTANT)
-            votes += np.abs(across)
+    for channel in range(gu.shape[2]):
+        across = cv2.filter2D(gu[..., channel] * gain, -1, ring * x, borderType=cv2.BORDER_CONSTANT)
+        across += cv2.filter2D(gv[..., channel] * gain, -1, ring * y, borderType=cv2.BORDER_CONSTANT)
+        votes += np.abs(across)
     return votes
