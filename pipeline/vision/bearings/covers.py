@@ -200,9 +200,6 @@ class _Window:
         small = cv2.resize(part, size, interpolation=cv2.INTER_AREA).astype(np.float32) / np.float32(photo.full_scale)
         return cls(small if small.ndim == 3 else small[..., None], low.astype(float), reduction)
 
-    def to_cells(self, uv: Array) -> Array:
-        return np.asarray((uv - self.origin - (self.reduction - 1) / 2.0) / self.reduction)
-
     def to_pixels(self, cells: Array) -> Array:
         return np.asarray(cells * self.reduction + (self.reduction - 1) / 2.0 + self.origin)
 

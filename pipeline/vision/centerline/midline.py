@@ -105,7 +105,6 @@ class Sections:
     systematic_std : px
     share : float
         Of the sections asked for, those that were measured.
-    profiles : Profiles
     contrast, noise, blur : float
         Median step and scatter of pixels, grey; median edge blur, px.
     asymmetry : float
@@ -120,7 +119,6 @@ class Sections:
     balance: Array
     systematic_std: float
     share: float
-    profiles: Profiles
     contrast: float
     noise: float
     blur: float
@@ -188,7 +186,6 @@ def measure_sections(
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
         systematic_std=_systematic(profiles, s, median(width), doubt, diameter),
         share=float(np.mean(keep)),
-        profiles=profiles,
         contrast=median(step),
         noise=median(profiles.noise),
         blur=median(profiles.blur),

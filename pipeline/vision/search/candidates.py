@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
 from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
@@ -250,10 +250,8 @@ def _cable_within(picture: Image, band: Strip, width: float, search: float) -> S
         return None
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width, mode="nearest")
-    across = (flanks.right - flanks.left)[both]
     return replace(
         band,
         path=path + middle[:, None] * normal,
-        width=median(across),
-        width_scatter=scatter(across) / width,
+        width=median((flanks.right - flanks.left)[both]),
     )

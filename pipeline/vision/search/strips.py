@@ -8,7 +8,7 @@ All lengths in cells of the reduced photo; points are ``(u, v)``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths, step_lengths
 
 Mask = NDArray[np.uint8]
@@ -51,15 +51,12 @@ class Strip:
         Along the middle, from one end to the other.
     width : cells
         Median along the path.
-    width_scatter : relative
-        Robust standard deviation of the width along the path.
     branch : cells
         Length of the longest part of the skeleton that leaves the path.
     """
 
     path: Array
     width: float
-    width_scatter: float
     branch: float
 
     @property
@@ -133,9 +130,7 @@ def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, f
         if strip is not None:
             low, high = WIDTH_RATIO_RANGE if ratios is None else ratios
             if low * width <= strip.width <= high * width:
-                strips.append(
-                    Strip(strip.path + np.array([u - 1, v - 1]), strip.width, strip.width_scatter, strip.branch)
-                )
+                strips.append(replace(strip, path=strip.path + np.array([u - 1, v - 1])))
     return sorted(strips, key=lambda strip: -strip.length)
 
 
@@ -169,7 +164,6 @@ def join_strips(strips: list[Strip], width: float, *, gap: float, obstacle: Mask
         joined = Strip(
             np.vstack([first, _bridge(first[-1], second[0]), second]),
             float(share @ (a.width, b.width)),
-            float(share @ (a.width_scatter, b.width_scatter)),
             max(a.branch, b.branch),
         )
         strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
@@ -241,9 +235,7 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     depth = cv2.distanceTransform(piece, cv2.DIST_L2, 5)
     along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
     inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
-    middle = median(inner)
-    uneven = scatter(inner, middle) / max(middle, 1e-9)
-    return Strip(path, middle, uneven, _longest_branch(skeleton, vu[nodes], width))
+    return Strip(path, median(inner), _longest_branch(skeleton, vu[nodes], width))
 
 
 def _farthest(reach: Array) -> int:

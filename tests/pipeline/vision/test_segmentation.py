@@ -128,7 +128,7 @@ def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
 def strip_of(*corners: tuple[float, float]) -> Strip:
     """A strip ten cells wide through the corners, points a cell apart."""
     legs = [np.linspace(a, b, int(np.hypot(*np.subtract(b, a)))) for a, b in pairwise(corners)]
-    return Strip(np.vstack(legs), 10.0, 0.0, 0.0)
+    return Strip(np.vstack(legs), 10.0, 0.0)
 
 
 @pytest.mark.parametrize(
