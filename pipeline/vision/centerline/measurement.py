@@ -42,6 +42,7 @@ from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.chord import ChordFrame, chord_frame
 from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.search.ends import onto_curve
 from rod.measurement import MeasuredShape
 
 LIGHT_LENGTH_SHARE = 0.35
@@ -179,10 +180,8 @@ def follow_cable(
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
     """The cable with its visible ends (2, 2) px on its curve: the search put them into corners of a mask."""
-    left, right = (
-        replace(axis, center_px=(float(u), float(v)))
-        for axis, (u, v) in zip((rough.left, rough.right), ends_px, strict=True)
-    )
+    width = 2.0 * rough.half_width_px
+    left, right = (onto_curve(axis, end, width) for axis, end in zip((rough.left, rough.right), ends_px, strict=True))
     return replace(rough, left=left, right=right)
 
 

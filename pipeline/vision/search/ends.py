@@ -29,7 +29,7 @@ COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges
 _TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
 _STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
-_CENTRED_WIDTHS = 0.05  # widths; how far aside of the cable's middle the path ends: so much of a slant moves the end
+_CENTRED_WIDTHS = 0.04  # widths; how far aside of the cable's middle the search ends its path
 _EDGE_STD_PX = 0.25  # px; what halo, JPEG and grid move an edge, on all rows alike
 
 
@@ -139,9 +139,15 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
     slant, middle = (float(part) for part in theilslopes(known[:, 1], known[:, 0])[:2])
     # rows a quarter width apart share their blur
     uneven = scatter(known[:, 1] - middle - slant * known[:, 0], 0.0) / 2.0
-    std = float(np.linalg.norm([uneven, slant * _CENTRED_WIDTHS * width, _EDGE_STD_PX]))
+    std = float(np.linalg.norm([uneven, np.hypot(1.0, slant) * _CENTRED_WIDTHS * width, _EDGE_STD_PX]))
     path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
+
+
+def onto_curve(axis: Bearing, place: Array, width: float) -> Bearing:
+    """A visible end (u, v) px on the measured middle of the cable: how far aside the search had put it is known now."""
+    std = float(np.sqrt(max(axis.std_px**2 - (_CENTRED_WIDTHS * width) ** 2, _EDGE_STD_PX**2)))
+    return replace(axis, center_px=(float(place[0]), float(place[1])), std_px=std)
 
 
 def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:

@@ -6,8 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.vision.centerline.measurement import Followed, follow_cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
+from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
 
 
@@ -21,6 +23,8 @@ def test_a_cut_end_is_as_sure_as_its_edge(slant: float) -> None:
     grey += np.random.default_rng(2).normal(0.0, 3.0, grey.shape)
     found = find_cable(Photo("bar", np.rint(grey).clip(0, 255).astype(np.uint8), 8))
     assert isinstance(found, RoughCable)
-    for axis, place in ((found.left, first), (found.right, last)):
+    followed = follow_cable(found, plane=PlaneMap.from_scale(1.0), diameter_m=None)
+    assert isinstance(followed, Followed)
+    for axis, place in ((followed.rough.left, first), (followed.rough.right, last)):
         assert axis.std_px < 0.5
         assert np.hypot(*np.subtract(axis.center_px, (place, 100.3))) < 2.0 * axis.std_px
