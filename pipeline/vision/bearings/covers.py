@@ -98,7 +98,7 @@ def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float)
 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
-    """As `find_cover`, by the rim alone: the one of which most is seen, of the centres with the most votes."""
+    """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
     # The centre lies between one diameter back and one diameter ahead of the mask's end.
     window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
     if window is None:
@@ -106,9 +106,23 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
-    # If the mask ends behind the cover, cable begins before that.
-    on_cable = (along < -2.4 * radius.px) & (np.abs(aside) < 0.8 * width_px)
-    votes = _votes(window, radius.px / window.reduction, on_cable) * prior
+    ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
+    beside = np.abs(aside) < 0.8 * width_px
+    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
+    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
+    partial: Circle | None = None
+    for blind, where in ((along < 0.0, prior), (along < -2.4 * radius.px, prior), (along < -np.inf, ahead)):
+        votes = _votes(window, radius.px / window.reduction, blind & beside) * where
+        found = _best_circle(photo, radius, window, votes)
+        if found is not None and found.rim >= SURE_RIM:
+            return found
+        if found is not None and where is prior and (partial is None or found.rim > partial.rim + 0.02):
+            partial = found
+    return partial if partial is not None and partial.rim >= MIN_RIM else None
+
+
+def _best_circle(photo: Photo, radius: Radius, window: _Window, votes: NDArray[np.float32]) -> Circle | None:
+    """The circle with the most of its rim seen among the centres of the window with the most votes."""
     best: Circle | None = None
     for _ in range(_CANDIDATES):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
@@ -118,7 +132,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
         if best is not None and best.rim > SURE_RIM:
             break
         cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
-    return best if best is not None and best.rim >= MIN_RIM else None
+    return best
 
 
 def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius) -> Circle | None:
