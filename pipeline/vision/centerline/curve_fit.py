@@ -16,7 +16,7 @@ covariance; the reasons for a spline of the curvature are measured in the tests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -111,7 +111,8 @@ def fit_curve(
         Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
     witness : Witness, optional
-        Other data whose errors last as long along s as those of the points.
+        Other data whose errors last as long along s as those of the points. It widens the bands and leaves the curve
+        as its own points have it: held to the longer errors, it would follow its bends too little.
     """
     found = _settle(
         points,
@@ -122,9 +123,12 @@ def fit_curve(
         longest=longest,
         correlation_length=correlation_length,
         iterations=iterations,
-        witness=witness,
     )
     smooth = found.problem.smooth(found.length, bias_share=bias_share)
+    if witness is not None and correlation_length is None:
+        told = found.problem.correlation_length(longest, witness)
+        lasting = found.problem.smooth(told, bias_share=bias_share)
+        smooth = replace(smooth, root=lasting.root, sigma=lasting.sigma, correlation_length=told)
     curve = found.before.moved(smooth.estimate - found.before.parameters)
     s, residual = _step_to_foot(curve, points, curve.foot(points, found.s, steps=1))
     return CurveFit(curve, smooth, points, std, s, residual, found.weight)
@@ -166,7 +170,6 @@ def _settle(
     longest: float,
     correlation_length: float | None,
     iterations: int,
-    witness: Witness | None = None,
 ) -> _Settled:
     """Gauss-Newton with robust weights, ``iterations`` steps at most."""
     weight = np.ones(len(points))
@@ -182,7 +185,7 @@ def _settle(
             weight = _biweight(residual / std, max(spread, 0.1 * moved))
         problem = _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
-            length = problem.correlation_length(longest, witness)
+            length = problem.correlation_length(longest)
         step = problem.estimate(length) - curve.parameters
         found = _Settled(curve.moved(step), curve, problem, s, weight, length)
         curve = found.curve
