@@ -25,9 +25,8 @@ from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.backdrop import Standout, choose_reduction, stand_out
+from pipeline.vision.search.backdrop import Standout, choose_reduction, in_one_colour, stand_out
 from pipeline.vision.search.candidates import Reading, Wanted, read_photo
-from pipeline.vision.search.one_colour import in_colour_of, in_one_colour
 
 Window = tuple[int, int, int, int]
 
@@ -137,19 +136,13 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | 
     standout = stand_out(photo, reduction, window=window)
     wanted = _wanted(standout, cable)
 
-    def read_whole(alike: Photo | None) -> RoughCable | None:
-        """The cable in a photo of one colour: a piece of it may be anything that has that colour too."""
-        if alike is None:
-            return None
+    alike = in_one_colour(photo, standout)
+    if alike is not None:
         found = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-        return None if isinstance(found, Rejected) or _is_piece(found) else found
-
-    first = read_whole(in_one_colour(photo, standout))
-    its_own = None if first is None else in_colour_of(photo, standout, first)
-    if first is None or its_own is None:
-        return _read(photo, standout, wanted, cable)
-    second = read_whole(its_own)
-    return first if second is None or second.evidence.value < first.evidence.value else second
+        # a piece of the cable may be anything that has that colour too
+        if isinstance(found, RoughCable) and not _is_piece(found):
+            return found
+    return _read(photo, standout, wanted, cable)
 
 
 def _is_piece(found: RoughCable) -> bool:

@@ -48,7 +48,7 @@ from pipeline.vision.scale.calibration import (
     in_plane_of_cable,
     with_doubt_of_plane,
 )
-from pipeline.vision.scale.chord import chord_frame
+from pipeline.vision.scale.plane import chord_frame
 from pipeline.vision.shots import Shot, find_cables, of_one_size, with_fixed_cover
 from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen

@@ -40,8 +40,7 @@ from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.scale.chord import ChordFrame, chord_frame
-from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.scale.plane import ChordFrame, PlaneMap, chord_frame
 from pipeline.vision.search.ends import onto_curve
 from rod.measurement import MeasuredShape
 

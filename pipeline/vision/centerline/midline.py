@@ -24,10 +24,6 @@ and no averaging removes it. Its size is judged by what is seen on the photo its
 
 That the measured width changes slowly along s tells nothing of it: a sheath grows thicker and a camera comes nearer,
 and the edges of real ones move by a fiftieth of the width, both alike.
-
-On 24 fresh scenes each of both renderers and of real sheath, 8 to 28 px wide, the slow error was 0.9 to 1.4 of what is
-stated, by kind of photo; at 12 px/mm in side light 1.8 of 0.012 px. Where the lamp leaves a bright cable's flank nearly
-as dark as the ground, its faint edge is found mostly, and the midline is off by 0.1 to 0.5 px.
 """
 
 from __future__ import annotations

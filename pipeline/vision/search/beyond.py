@@ -55,8 +55,8 @@ Axes = tuple[Bearing, Bearing]
 Place = tuple[float, float]
 
 
-def goes_on(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
-    """True if beyond the first or the last point of a strip, led on as it ends, there is more of the same.
+def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
+    """True if a strip goes on beyond its end hardly fainter than before: glare takes its contrast, it does not end.
 
     Parameters
     ----------
@@ -67,15 +67,6 @@ def goes_on(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) 
         Of the strip.
     at_start : bool
         The first point, else the last.
-    """
-    path = cut.path[::-1] if at_start else cut.path
-    return _ahead(standout, cut, path, width)[0] is not None
-
-
-def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
-    """True if a strip goes on beyond its end hardly fainter than before: glare takes its contrast, it does not end.
-
-    Parameters as in `goes_on`.
     """
     path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
     near = slice(round(0.75 * width), round(LEAST_MORE_WIDTHS * width))
@@ -92,7 +83,7 @@ def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) ->
 def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_start: bool) -> float | None:
     """Gap in cells to another strip of the same look where an arc that leaves this one's end would go on, if any.
 
-    A sheet of paper hides more than `goes_on` looks across, and is no larger thing where it has the ground's colour.
+    A sheet of paper hides more than is looked across, and is no larger thing where it has the ground's colour.
 
     Parameters
     ----------
@@ -132,7 +123,7 @@ def _arc_joins(end: Array, leaving: Array, rest: Array, width: float) -> bool:
 
 
 def follow(standout: Standout, cut: CrossCut, width: float) -> Array | None:
-    """The path of a strip, led on beyond both ends for as long as there is more of the same; as `goes_on`.
+    """The path of a strip, led on beyond both ends for as long as there is more of the same.
 
     None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
     """
@@ -240,7 +231,8 @@ def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
     """A visible end beyond which there is more of the same close by, or at which the cable only fades."""
     width = cut.usual_width
     for axis, at_start in zip(axes, (True, False), strict=True):
-        if axis.kind in ("end", "clamp") and goes_on(standout, cut, width, at_start=at_start):
+        path = cut.path[::-1] if at_start else cut.path
+        if axis.kind in ("end", "clamp") and _ahead(standout, cut, path, width)[0] is not None:
             return axis.center_px
         if axis.kind == "end" and fades(standout, cut, width, at_start=at_start):
             return axis.center_px
@@ -280,7 +272,8 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None
         ahead = abs(int(np.argmin(distance)) - end) * standout.reduction < 0.5 * distance[end]
         if axis.kind != "given" or not ahead or distance[end] < near:
             continue
-        if distance[end] > far or goes_on(standout, cut, width, at_start=at_start):
+        outward = cut.path[::-1] if at_start else cut.path
+        if distance[end] > far or _ahead(standout, cut, outward, width)[0] is not None:
             return float(path[end, 0]), float(path[end, 1])
     return None
 

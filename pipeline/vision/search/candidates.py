@@ -1,7 +1,7 @@
-"""Which strip is the cable: levels, polarities and widths tried until one reading of the photo makes sense.
+"""Which strip is the cable: levels and widths tried until one reading of the photo makes sense.
 
-The first reading, everything that differs from the ground at Otsu's level, serves most photos. Others are tried only
-where it finds nothing long enough: other levels, one polarity (a shadow of the other one melts into the cable).
+The first reading, everything that differs from the ground at Otsu's level, serves most photos. Other levels are tried
+only where it finds nothing long enough.
 All lengths in cells of the reduced photo.
 """
 
@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
+from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
 from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import (
@@ -42,7 +42,6 @@ _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the 
 _JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
 _TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
 _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
-_LEAST_LEVEL = 5.0  # sigmas of the ground; a strip above it is no play of noise and texture
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
@@ -77,14 +76,14 @@ class Wanted:
 
 
 def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ...]]:
-    """Readings with a strip that is long enough, one tuple for each picture and level, the likeliest first.
+    """Readings with a strip that is long enough, one tuple for each level, the likeliest first.
 
     Then those with the cable in a wider band. Where none has one, the reading with the longest strip comes alone.
     """
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
-    for picture, level in _pictures(standout):
-        readings = list(_readings(picture, level, wanted))
+    for level in _levels(standout):
+        readings = list(_readings(standout.distance, level, wanted))
         long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
         if long:
             given += 1
@@ -142,22 +141,11 @@ def approaches_itself(path: Array, width: float) -> bool:
     return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
 
 
-def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
-    """Pictures in ground sigmas and levels, the likeliest first."""
-    distance, (otsu, *higher) = standout.distance, standout.levels
-    yield distance, otsu
-    for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
-        if level > _LOWEST_LEVEL:
-            yield distance, level
-    brightness = standout.brightness()
-    for sign in (-1.0, 1.0):
-        picture = np.maximum(np.float32(sign) * brightness, 0.0)
-        level, *higher = otsu_levels(picture)
-        if level > _LEAST_LEVEL:
-            for tried in (level, *higher, 0.5 * level):
-                yield picture, tried
-    for level in (_LEAST_LEVEL, _LOWEST_LEVEL):
-        yield distance, level
+def _levels(standout: Standout) -> list[float]:
+    """Levels in ground sigmas, the likeliest first."""
+    otsu, *higher = standout.levels
+    others = (*higher, *(factor * otsu for factor in _LEVEL_FACTORS))
+    return [otsu, *(level for level in others if level > _LOWEST_LEVEL)]
 
 
 def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]:
@@ -177,13 +165,13 @@ def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]
 
 def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Reading]:
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
-    for picture, level in _pictures(standout):
-        mask = strip_mask(picture > level, width)
+    for level in _levels(standout):
+        mask = strip_mask(standout.distance > level, width)
         if mask.mean() > _MAX_COVERED_SHARE:
             continue
         for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
-            strips = _strips_in_bands(picture, mask, thick, width, most)
+            strips = _strips_in_bands(standout.distance, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
                 yield Reading(tuple(strips), mask, thick, width, level)
