@@ -54,8 +54,10 @@ def cover_by_cut(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -
     for start, stop in runs_of(usual > 0.5 * usual.max()):
         if (stop - start) * _STEP_PX < _LEAST_RUN_RADII * radius.px:
             continue
-        change = off[:, start:stop].mean(axis=(0, 1))
-        relief = off @ change / (change @ change + 1e-12)
+        # each row in units of its own change: blur takes part of it from the outer ones
+        each = off[:, start:stop].mean(axis=1)
+        change = each.mean(axis=0)
+        relief = off @ change / np.maximum(each @ change, 0.3 * (change @ change) + 1e-12)[:, None]
         found = _arc(relief, along, rows, float(along[start]), radius)
         if found is not None:
             (ahead, aside), std = found
