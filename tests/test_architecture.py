@@ -110,7 +110,7 @@ INSIDE = {
         ("ends",),
         ("beyond",),
     ],
-    "pipeline.vision.bearings": [("rim",), ("rings", "cut"), ("covers",), ("cover_size", "axes", "steady")],
+    "pipeline.vision.bearings": [("rim",), ("rings", "cut"), ("covers",), ("cover_size", "steady")],
     "pipeline.vision.centerline": [
         ("curvature", "smoothing", "slow_light", "ground_waves"),
         ("edge_profile",),

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
-from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
+from pipeline.vision.bearings.covers import BearingHints, find_bearings, left_first
 from pipeline.vision.evidence import Course, weigh
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths

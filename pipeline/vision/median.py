@@ -13,7 +13,7 @@ MAD_TO_STD = 1.4826
 
 def median(values: ArrayLike) -> float:
     """Median of all values; NaN if one is NaN, or there are none."""
-    return float(np.median(values)) if np.size(values) else float("nan")
+    return float(np.median(np.asarray(values))) if np.size(values) else float("nan")
 
 
 def medians(values: NDArray[Any], axis: int) -> NDArray[Any]:

@@ -30,7 +30,7 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
     """The photo at the size of a report's column, as JPEG; levels stretched to the range it uses."""
     factor = max(1.0, max(photo.size) / settings.long_side_px)
     size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
-    small = reduce_area(photo.pixels, size, measured=False)
+    small = reduce_area(photo.pixels, size)
     if small.dtype == np.uint8:
         shown = np.asarray(small, np.uint8)
     else:

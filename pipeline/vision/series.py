@@ -30,7 +30,7 @@ from pipeline.records import (
 )
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
-from pipeline.vision.bearings.axes import VERTICAL_DEG
+from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
 from pipeline.vision.centerline.lay import without_lay

@@ -16,8 +16,8 @@ import numpy as np
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, inferred
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     Fixed,

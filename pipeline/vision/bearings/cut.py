@@ -80,7 +80,7 @@ def _arc(relief: Array, along: Array, rows: Array, about: float, radius: Radius)
     start = np.array([float(np.median(place + np.sqrt(radius.px**2 - row**2))), 0.0])
 
     def misses(center: Array) -> Array:
-        return (np.hypot(place - center[0], row - center[1]) - radius.px) / _LOOSE_PX
+        return np.asarray((np.hypot(place - center[0], row - center[1]) - radius.px) / _LOOSE_PX)
 
     fit = least_squares(misses, start, loss="soft_l1")
     straight = place - np.polynomial.polynomial.polyval(row, np.polynomial.polynomial.polyfit(row, place, 1))
@@ -90,6 +90,8 @@ def _arc(relief: Array, along: Array, rows: Array, about: float, radius: Radius)
         return None
     # neighbouring rows share pixels: those of one pixel count once
     shared = max(1.0, _ROWS / float(np.ptp(rows)))
-    variance = np.linalg.inv(fit.jac.T @ fit.jac) * shared * (spread / _LOOSE_PX) ** 2
+    away = np.column_stack([place, row]) - fit.x
+    slopes = away / np.hypot(*away.T)[:, None]
+    variance = np.linalg.inv(slopes.T @ slopes) * shared * spread**2
     std = float(np.sqrt(0.5 * np.trace(variance) + (radius.std * radius.px) ** 2 + CENTER_STD_FLOOR_PX**2))
     return np.asarray(fit.x), std

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter, gaussian_filter1d
 from scipy.special import ndtr
 
 from pipeline.records import Array
@@ -149,7 +148,11 @@ def _radial_slopes(photo: Photo, parameters: Array, ray: Array, span: float, *, 
     part *= np.float32(1.0 / photo.full_scale)
     places = distance[:, None] * ray[:, None] + (parameters[:2] - low)
     profile = sampled(part, places).reshape(*places.shape[:2], -1)
-    slope = _smoothed_slope(profile, _POOLED_RAYS, 2.0)
+    # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
+    pooled = gaussian_filter(
+        np.gradient(profile, 0.5, axis=1), (_POOLED_RAYS, 2.0, 0.0), mode=("wrap", "reflect", "wrap")
+    )
+    slope: NDArray[np.float32] = np.asarray(pooled)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
     outside = ((places < 1) | (places > np.array(part.shape[1::-1]) - 2)).any(axis=2)
@@ -166,22 +169,6 @@ def _radial_slopes(photo: Photo, parameters: Array, ray: Array, span: float, *, 
         texture=median(norm[:, np.abs(offsets) > 0.5 * float(offsets[-1] - offsets[0]) - span]),
         seen=~(outside & inner).any(axis=1),
     )
-
-
-def _smoothed_slope(profile: NDArray[np.float32], across: float, along: float) -> NDArray[np.float32]:
-    """Slope per px along rays ``(rays, places, colours)`` half a px apart, smoothed over rays and places.
-
-    Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is. ``across`` and
-    ``along`` are standard deviations in rays and places.
-    """
-    slope = np.empty_like(profile)
-    slope[:, 1:-1] = profile[:, 2:] - profile[:, :-2]
-    slope[:, 0], slope[:, -1] = 2.0 * (profile[:, 1] - profile[:, 0]), 2.0 * (profile[:, -1] - profile[:, -2])
-    over, beside = (cv2.getGaussianKernel(2 * int(4.0 * std + 0.5) + 1, std, cv2.CV_32F) for std in (across, along))
-    wrap = len(over) // 2
-    around = np.concatenate([slope[-wrap:], slope, slope[:wrap]])
-    pooled = np.asarray(cv2.sepFilter2D(around, -1, beside, over, borderType=cv2.BORDER_REFLECT), np.float32)
-    return pooled[wrap:-wrap].reshape(profile.shape)
 
 
 def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, expected: Radius) -> Array:

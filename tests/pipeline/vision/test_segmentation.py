@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fixtures.photographed.renderer import photograph, random_look
 from pipeline.records import Rejected
-from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing
