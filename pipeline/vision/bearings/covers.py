@@ -50,6 +50,11 @@ _EXPECTED_REACH_RADII = 2.5
 """Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
 led astray by the cover's shadow two.
 """
+_SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
+_MIN_SOFT_RIM = 0.5
+"""Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
+lost left 0.6, a moved camera, whose rim is doubled, 0.45.
+"""
 _ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
 _SAME_COVER = 0.1  # radii; centres so near to each other, by rim and by cut, are those of one cover
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
@@ -125,22 +130,32 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     partial: Circle | None = None
-    for blind, where in ((along < 0.0, prior), (along < -2.4 * radius.px, prior), (along < -np.inf, ahead)):
+    tries = (
+        (along < 0.0, prior, 1.0, MIN_RIM),
+        (along < -2.4 * radius.px, prior, 1.0, MIN_RIM),
+        (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
+        (along < -np.inf, ahead, 1.0, SURE_RIM),
+    )
+    for blind, where, softness, least in tries:
+        if softness > 1.0 and partial is not None:
+            continue  # beside a sharp rim, what is soft and round is the shadow
         votes = _votes(window, radius.px / window.reduction, blind & beside) * where
-        found = _best_circle(photo, radius, window, votes)
+        found = _best_circle(photo, radius, window, votes, softness)
         if found is not None and found.rim >= SURE_RIM:
             return found
-        if found is not None and where is prior and (partial is None or found.rim > partial.rim + 0.02):
+        if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
             partial = found
-    return partial if partial is not None and partial.rim >= MIN_RIM else None
+    return partial
 
 
-def _best_circle(photo: Photo, radius: Radius, window: _Window, votes: NDArray[np.float32]) -> Circle | None:
+def _best_circle(
+    photo: Photo, radius: Radius, window: _Window, votes: NDArray[np.float32], softness: float
+) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     best: Circle | None = None
     for _ in range(_CANDIDATES):
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius)
+        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, softness=softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
             best = circle
         if best is not None and best.rim > SURE_RIM:

@@ -21,7 +21,7 @@ from pipeline.vision.search.ends import CableEnd, runs_of
 _ROWS, _HALF_WIDTHS = 21, 0.4  # rows along the cable, within so many widths of its middle: beyond is its shaded flank
 _STEP_PX = 0.5
 _BACK_RADII = 4.0  # radii; a stub beyond a pin is no longer, and more of it is the cable that comes again
-_LEAST_RUN_RADII = 0.4  # radii; a shorter change along the cable is print
+_LEAST_RUN_RADII = 1.0  # radii; a cover hides the sheath for two, bands and print for less
 _HOLLOW = 2.0  # ratio of the variances about the straight line and about the arc from which it is an arc
 _LOOSE_PX = 0.3  # px; usual error of an edge along one row
 

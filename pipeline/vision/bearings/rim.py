@@ -67,13 +67,16 @@ class Radius:
     std: float
 
 
-def fit_circle(photo: Photo, center: Array, expected: Radius, *, on_cover: bool = False) -> Circle | None:
+def fit_circle(
+    photo: Photo, center: Array, expected: Radius, *, softness: float = 1.0, on_cover: bool = False
+) -> Circle | None:
     """Fit a circle to the edges around a first guess; None if there are too few.
 
     Strategy: the shift with most of one circle on edges; then radial profiles from there, twice; the edge is the
     centroid of the slope about its steepest place, at last with the slopes of light beside it; Gauss-Newton on the
-    radial residuals with Tukey's biweight. A ring ``on_cover`` is not sought, for its place is known to a pixel; no
-    shadow lies beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
+    radial residuals with Tukey's biweight. The slope is taken over ``softness`` px: sought over its own blur, an edge
+    stands out of noise the most. A ring ``on_cover`` is not sought, for its place is known to a pixel; no shadow lies
+    beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
     """
     radius = expected.px
     count = int(np.clip(2.0 * np.pi * radius, 90, _DIRECTIONS))
@@ -82,11 +85,11 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, *, on_cover: bool 
     span = max(4.0, SEARCH_RADII * radius)
     parameters = np.array([*center, radius])
     if not on_cover:
-        parameters = _best_shift(photo, parameters, ray, span, expected)
+        parameters = _best_shift(photo, parameters, ray, span, softness, expected)
     reach = max(3.0, NEAR_RADII * radius)
     for beside in (False, True):
-        slopes = _radial_slopes(photo, parameters, ray, reach, one_sign=on_cover)
-        edge, trust = _radial_edges(slopes, reach)
+        slopes = _radial_slopes(photo, parameters, ray, reach, softness, one_sign=on_cover)
+        edge, trust = _radial_edges(slopes, reach, softness)
         if beside and not on_cover:
             edge = _without_light(slopes, edge)
         fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
@@ -109,7 +112,7 @@ def fit_circle(photo: Photo, center: Array, expected: Radius, *, on_cover: bool 
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
     doubt = 0.0 if rim >= SURE_RIM else excess
     # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
-    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - 1.0, 0.0)))
+    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - softness**2, 0.0)))
     parts = [np.sqrt(covariance[2, 2]), CENTER_STD_FLOOR_PX, doubt, bevel]
     radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
@@ -130,13 +133,16 @@ class _Slopes:
     seen: NDArray[np.bool_]
 
 
-def _radial_slopes(photo: Photo, parameters: Array, ray: Array, span: float, *, one_sign: bool = False) -> _Slopes:
+def _radial_slopes(
+    photo: Photo, parameters: Array, ray: Array, span: float, softness: float, *, one_sign: bool = False
+) -> _Slopes:
     """Slopes about a circle; with ``one_sign`` only edges of the sign that prevails on the circle are sought.
 
     A thin line turned on a cover has two edges, of opposite signs: without the sign each ray would take either.
     """
     # The outer halves of the rays tell what is no edge: sheen, texture and noise.
-    offsets = np.arange(-2.0 * span, 2.0 * span + 0.25, 0.5)
+    calm = span + 4.0 * (softness - 1.0)  # a soft edge reaches beyond the range in which it is sought
+    offsets = np.arange(-calm - span, calm + span + 0.25, 0.5)
     distance = parameters[2] + offsets
     reach = float(np.abs(distance[[0, -1]]).max())
     low = np.maximum(np.floor(parameters[:2] - reach).astype(int) - 2, 0)
@@ -150,7 +156,9 @@ def _radial_slopes(photo: Photo, parameters: Array, ray: Array, span: float, *, 
     profile = sampled(part, places).reshape(*places.shape[:2], -1)
     # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
     pooled = gaussian_filter(
-        np.gradient(profile, 0.5, axis=1), (_POOLED_RAYS, 2.0, 0.0), mode=("wrap", "reflect", "wrap")
+        np.gradient(profile, 0.5, axis=1),
+        (_POOLED_RAYS * softness, 2.0 * softness, 0.0),
+        mode=("wrap", "reflect", "wrap"),
     )
     slope: NDArray[np.float32] = np.asarray(pooled)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
@@ -171,9 +179,9 @@ def _radial_slopes(photo: Photo, parameters: Array, ray: Array, span: float, *, 
     )
 
 
-def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, expected: Radius) -> Array:
+def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softness: float, expected: Radius) -> Array:
     """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
-    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span)
+    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness)
     step = span / 12.0
     peak = np.sort(np.where(slopes.seen[:, None], slopes.strength, 0.0).max(axis=1))
     usual = float(peak[len(peak) // 2]) + 1e-12
@@ -196,7 +204,7 @@ def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, expect
     return found
 
 
-def _radial_edges(slopes: _Slopes, span: float) -> tuple[Array, Array]:
+def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array, Array]:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
 
     The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
@@ -205,7 +213,7 @@ def _radial_edges(slopes: _Slopes, span: float) -> tuple[Array, Array]:
     offsets, strength = slopes.offsets, slopes.strength
     inner = np.abs(offsets) <= span
     place = np.argmax(np.where(inner, strength, 0.0), axis=1)
-    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5
+    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5 * softness
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(strength)), place]
