@@ -72,7 +72,7 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
     """What a run would find in one folder and on its photos; whatever breaks in it is told as the run would tell it."""
     from pipeline.batch.specimen import refusals
     from pipeline.intake.folder import read_specimen
-    from pipeline.vision.look import look_at_photos
+    from pipeline.vision.series import look_at_photos
 
     try:
         specimen = read_specimen(folder, settings.intake)
@@ -90,7 +90,7 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
 
 def checked_in_time(folder: Path, tell: object, *, settings: Settings) -> dict[str, Any]:
     """The same in a process that ends when the time of a specimen is over."""
-    import pipeline.vision.look  # noqa: F401  # loaded before the time begins
+    import pipeline.vision.series  # noqa: F401  # loaded before the time begins
     from pipeline.batch.processes import deadline
 
     with deadline(settings.batch.timeout_s):

@@ -14,13 +14,20 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
-from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
+from pipeline.vision.bearings.covers import BearingHints, find_bearings, left_first
 from pipeline.vision.evidence import Course, weigh
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
-from pipeline.vision.search.beyond import follow, followed_in
+from pipeline.vision.search.beyond import (
+    follow,
+    followed_in,
+    goes_on_at,
+    rest_faced_at,
+    short_of_axis,
+    unlike_from,
+)
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
 from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
@@ -34,7 +41,6 @@ from pipeline.vision.search.ends import (
     without_specks,
 )
 from pipeline.vision.search.strips import Strip
-from pipeline.vision.wholeness import goes_on_at, rest_faced_at, short_of_axis, unlike_from
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands

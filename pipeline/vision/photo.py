@@ -125,11 +125,10 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
     return Photo(name=name, pixels=pixels, bit_depth=_bit_depth(pixels))
 
 
-def reduce_area(pixels: Pixels, size: tuple[int, int], *, measured: bool = True) -> Pixels:
+def reduce_area(pixels: Pixels, size: tuple[int, int]) -> Pixels:
     """Reduce a picture to ``size`` (width, height) by averaging.
 
-    Halving by whole pixels is five times faster than one reduction by any factor, and the same mean. Where nothing is
-    ``measured`` on it, what is left below a factor of two is interpolated, which passes no pixel over.
+    Halving by whole pixels is five times faster than one reduction by any factor, and the same mean.
     """
     while (
         pixels.shape[1] >= 2 * size[0]
@@ -137,11 +136,7 @@ def reduce_area(pixels: Pixels, size: tuple[int, int], *, measured: bool = True)
         and not (pixels.shape[0] % 2 or pixels.shape[1] % 2)
     ):
         pixels = _mean_over(pixels, (pixels.shape[1] // 2, pixels.shape[0] // 2))
-    if pixels.shape[1::-1] == size:
-        return pixels
-    if not measured and pixels.shape[1] < 2 * size[0] and pixels.shape[0] < 2 * size[1]:
-        return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_LINEAR), pixels.dtype)
-    return _mean_over(pixels, size)
+    return pixels if pixels.shape[1::-1] == size else _mean_over(pixels, size)
 
 
 def sampled(picture: NDArray[Any], points: NDArray[np.floating]) -> NDArray[np.float32]:

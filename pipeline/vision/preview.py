@@ -30,7 +30,7 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
     """The photo at the size of a report's column, as JPEG; levels stretched to the range it uses."""
     factor = max(1.0, max(photo.size) / settings.long_side_px)
     size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
-    small = reduce_area(photo.pixels, size, measured=False)
+    small = reduce_area(photo.pixels, size)
     if small.dtype == np.uint8:
         shown = np.asarray(small, np.uint8)
     else:
@@ -39,12 +39,7 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
 
 
 def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: PreviewSettings) -> Preview:
-    """Add the straightened strip of a traced cable."""
-    return replace(preview, strip=straightened_strip(line, rough, settings))
-
-
-def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSettings) -> bytes:
-    """JPEG: arc length to the right from the left bearing axis, the side of the bow downward, magnified across."""
+    """Add the cable straightened: arc length to the right from the left bearing axis, the bow's side downward."""
     path = np.column_stack([line.u_px, line.v_px])
     s = arc_lengths(path)
     along = np.linspace(0.0, s[-1], settings.long_side_px)
@@ -60,7 +55,7 @@ def straightened_strip(line: Centerline, rough: RoughCable, settings: PreviewSet
     picture[round(middle), ::2] = _MIDDLE
     for side in (-1.0, 1.0):
         picture[round(middle + side * rough.half_width_px * zoom), ::4] = _EDGE
-    return _jpeg(picture, settings)
+    return replace(preview, strip=_jpeg(picture, settings))
 
 
 def _stretched(strip: NDArray[np.float32], line: Centerline, s: Array, along: Array) -> NDArray[np.uint8]:

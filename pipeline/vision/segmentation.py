@@ -25,18 +25,13 @@ from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.backdrop import CELLS_ACROSS, Standout, choose_reduction, stand_out
-from pipeline.vision.search.candidates import Reading, Wanted, narrowest, read_alone, read_photo
-from pipeline.vision.search.one_colour import in_colour_of, in_one_colour
+from pipeline.vision.search.backdrop import Standout, choose_reduction, in_one_colour, stand_out
+from pipeline.vision.search.candidates import Reading, Wanted, read_photo
 
 Window = tuple[int, int, int, int]
 
 _WIDER = 1.08  # of the width; a course's strip that is wider by more has other edges
 _RIVAL = 0.35  # of the best strip's evidence; on wire piles another cable has more, pieces of one cable less
-_FIRST_COARSER = 3
-"""Cells; so many times fewer along a side are tried first where the diameter is unknown: they are enough for the cable
-of most photos, and take a third of the time.
-"""
 _MIN_LENGTH_SHARE = 0.2  # share of the photo's long side; a shorter strip is not the subject of the photo
 _VISIBLE_SHARE = 0.55  # share of the known length that must be seen; covers hide up to a quarter
 _MAX_LENGTH_RATIO = 1.25  # ratio to the known length; longer strips are rails and edges of the table
@@ -138,26 +133,16 @@ def _widths(photo: Photo, slenderness: float) -> list[float]:
 
 def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | Rejected:
     reduction = choose_reduction(photo.size, cable.diameter_px)
-    if cable.diameter_px is None:
-        alone = _find_alone(photo, cable, reduction, window)
-        if alone is not None:
-            return alone
     standout = stand_out(photo, reduction, window=window)
     wanted = _wanted(standout, cable)
 
-    def read_whole(alike: Photo | None) -> RoughCable | None:
-        """The cable in a photo of one colour: a piece of it may be anything that has that colour too."""
-        if alike is None:
-            return None
+    alike = in_one_colour(photo, standout)
+    if alike is not None:
         found = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-        return None if isinstance(found, Rejected) or _is_piece(found) else found
-
-    first = read_whole(in_one_colour(photo, standout))
-    its_own = None if first is None else in_colour_of(photo, standout, first)
-    if first is None or its_own is None:
-        return _read(photo, standout, wanted, cable)
-    second = read_whole(its_own)
-    return first if second is None or second.evidence.value < first.evidence.value else second
+        # a piece of the cable may be anything that has that colour too
+        if isinstance(found, RoughCable) and not _is_piece(found):
+            return found
+    return _read(photo, standout, wanted, cable)
 
 
 def _is_piece(found: RoughCable) -> bool:
@@ -178,25 +163,6 @@ def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> Rou
         if isinstance(outcome, RoughCable) and _is_settled(outcome):
             return outcome
     return _chosen(photo, judged)
-
-
-def _find_alone(photo: Photo, cable: Cable, reduction: int, window: Window | None) -> RoughCable | None:
-    """A cable of unknown width on fewer cells, if it is all there is to see; what is refused needs a closer look."""
-    coarser = _FIRST_COARSER
-    standout = stand_out(photo, coarser * reduction, window=window)
-    enough = int(coarser * narrowest(standout) / CELLS_ACROSS)
-    if enough < 2:
-        return None
-    if enough < coarser:
-        standout = stand_out(photo, enough * reduction, window=window)
-    if in_one_colour(photo, standout) is not None:
-        return None
-    wanted = _wanted(standout, cable)
-    reading = read_alone(standout, wanted)
-    if reading is None:
-        return None
-    found = _chosen(photo, [_judged(photo, standout, reading, wanted, cable)])
-    return found if isinstance(found, RoughCable) and _is_settled(found) else None
 
 
 class _Judged(NamedTuple):

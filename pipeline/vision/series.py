@@ -16,17 +16,27 @@ from typing import TypeVar
 import numpy as np
 
 from pipeline.messages import Message
-from pipeline.records import Array, Centerline, Finding, Rejected, Scale, Specimen, Traces, doubtful
+from pipeline.records import (
+    Array,
+    Centerline,
+    Finding,
+    Level,
+    Rejected,
+    Scale,
+    Specimen,
+    Traces,
+    doubtful,
+    said_once,
+)
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
-from pipeline.vision.bearings.axes import VERTICAL_DEG
+from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import at_least, wandering_px
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.guard import guarded, jointly
-from pipeline.vision.picture_size import of_one_size
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.board import calibrate_by_board
 from pipeline.vision.scale.calibration import (
@@ -36,10 +46,10 @@ from pipeline.vision.scale.calibration import (
     from_found,
     from_number,
     in_plane_of_cable,
+    with_doubt_of_plane,
 )
-from pipeline.vision.scale.chord import chord_frame
-from pipeline.vision.scale.doubt import with_doubt_of_plane
-from pipeline.vision.shots import Shot, find_cables, with_fixed_cover
+from pipeline.vision.scale.plane import chord_frame
+from pipeline.vision.shots import Shot, find_cables, of_one_size, with_fixed_cover
 from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
 
@@ -332,3 +342,18 @@ def _check_lengths(
     if abs(length / stated - 1.0) > settings.max_length_deviation:
         findings.append(doubtful("scale/length", length_m=length, change=length / stated - 1.0, stated_mm=1e3 * stated))
     return tuple(findings)
+
+
+def look_at_photos(specimen: Specimen, settings: VisionSettings) -> tuple[Finding, ...]:
+    """What is wrong with the photos of a specimen; a photo that a run would refuse is a warning, all of them an error.
+
+    Raises
+    ------
+    InputError
+        The calibration photos cannot be used.
+    """
+    shots, covers = find_cables(specimen, next(iter(given_calibration(specimen, settings)), None), settings)
+    shots, sizes = of_one_size(shots)
+    refused = [shot.found for shot in shots if isinstance(shot.found, Rejected)]
+    level: Level = "error" if len(refused) == len(shots) else "warning"
+    return (*covers, *sizes, *said_once((one.image, replace(one.finding, level=level)) for one in refused))

@@ -6,6 +6,7 @@ stands still, those in the minority are searched again.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,10 +14,10 @@ from functools import partial
 import numpy as np
 
 from pipeline.messages import Message
-from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, inferred
+from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings.axes import BearingHints
 from pipeline.vision.bearings.cover_size import cover_radius
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     Fixed,
@@ -50,6 +51,8 @@ def find_cables(
     specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
+    if calibration is None and specimen.rig.bearings_px is not None and specimen.rig.marker_diameter_m is None:
+        calibration = _scale_between_given_axes(specimen, settings)
     shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
@@ -67,6 +70,18 @@ def find_cables(
     if radius is None or _count_alike(again, most) < _count_alike(shots, most):
         return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
     return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
+
+
+def _scale_between_given_axes(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
+    """The scale by the cable's length on the first photo, for which axes are given: it tells where they go from there.
+
+    None where no cable is found on it.
+    """
+    first = next(step for step in specimen.steps if step.image in specimen.images)
+    found = _find_all(replace(specimen, steps=(first,)), None, settings)[0].found
+    if isinstance(found, Rejected):
+        return None
+    return from_number(found.length_px / specimen.length_m, settings.calibration)
 
 
 def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:
@@ -270,3 +285,75 @@ def _chord_speaks_against(
     other = cable.right if fixed.side == "left" else cable.left
     there = float(np.hypot(*np.subtract(other.center_px, fixed.cover.center_px)))
     return bool(abs(there - known) < _NEARER * abs(float(chords_px([cable])[0]) - known))
+
+
+_CROPPED_LENGTH = 0.03
+"""Relative; of the cable's length in px on a photo of another size: it is found within a third of that, and nobody
+scales a photo by less.
+"""
+
+
+def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
+    """Refuse photos of another size than most that were not merely cropped, and those turned by a quarter.
+
+    A photo that was cropped shows the cable as long, in px, as the others do. One that was scaled has a scale of its
+    own. On one that was turned by a quarter left and right are told by what was up and down: its bearings may change
+    places, and everything along the cable with them.
+
+    Parameters
+    ----------
+    shots : list of Shot
+
+    Returns
+    -------
+    list of Shot
+        Where no size is that of more than half of the photos, or none of those shows the cable, none is refused for
+        its size.
+    tuple of Finding
+        ``photo/size`` of each photo that was cropped; of all, where they have no usual size.
+    """
+    shots = _without_turned(shots)
+    sizes = [tuple(sorted(shot.size)) for shot in shots if shot.size is not None]
+    usual, count = Counter(sizes).most_common(1)[0] if sizes else ((), 0)
+    lengths = [
+        shot.found.length_px
+        for shot in shots
+        if shot.size is not None and tuple(sorted(shot.size)) == usual and isinstance(shot.found, RoughCable)
+    ]
+    if sizes and 2 * count <= len(sizes):
+        each = [f"{shot.found.image} {shot.size[0]} x {shot.size[1]} px" for shot in shots if shot.size is not None]
+        return shots, (doubtful("photo/size.several", sizes=each),)
+    if not lengths:
+        return shots, ()
+    settled, findings = [], []
+    for shot in shots:
+        if shot.size is None or tuple(sorted(shot.size)) == usual:
+            settled.append(shot)
+            continue
+        name = shot.found.image
+        both = {"size": f"{shot.size[0]} x {shot.size[1]} px", "most": f"{usual[1]} x {usual[0]} px"}
+        ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
+        if abs(ratio - 1.0) <= _CROPPED_LENGTH:
+            findings.append(inferred("photo/size.cropped", image=name, **both))
+            settled.append(shot)
+            continue
+        settled.append(replace(shot, found=Rejected(name, Message("photo/size", **both))))
+    return settled, tuple(findings)
+
+
+def _without_turned(shots: list[Shot]) -> list[Shot]:
+    """Refuse photos on which the line between the bearings runs across that of most others."""
+    steep = [_is_steep(shot.found) if isinstance(shot.found, RoughCable) else None for shot in shots]
+    counted = Counter(way for way in steep if way is not None)
+    usual, count = counted.most_common(1)[0] if counted else (None, 0)
+    if 2 * count <= counted.total():
+        return shots
+    return [
+        shot if way in (usual, None) else replace(shot, found=Rejected(shot.found.image, Message("photo/turned")))
+        for shot, way in zip(shots, steep, strict=True)
+    ]
+
+
+def _is_steep(cable: RoughCable) -> bool:
+    (u0, v0), (u1, v1) = cable.left.center_px, cable.right.center_px
+    return abs(v1 - v0) > abs(u1 - u0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, decode_photo
 from pipeline.vision.render import Camera, Curve, Ground, Scene, Sensor, Strand, render

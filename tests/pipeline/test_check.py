@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from pipeline.cli import main
 from pipeline.intake.folder import read_specimen
 from pipeline.settings import Settings
-from pipeline.vision.look import look_at_photos
+from pipeline.vision.series import look_at_photos
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRST, OTHER = "step_00.jpg", "step_01.jpg"

@@ -17,7 +17,8 @@ Units: px.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -130,21 +131,17 @@ def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
 
 @dataclass
 class _LostEnd:
-    """Where a cable of some width is lost on a photo, and what is round there, sought once and as far as asked."""
+    """Where a cable of some width is lost on a photo, and what is round there."""
 
     photo: Photo
     end: CableEnd
     width_px: float
-    _known: list[Circle] = field(default_factory=list)
-    _rest: Iterator[Circle] | None = None
 
-    def circles(self) -> Iterator[Circle]:
+    @cached_property
+    def circles(self) -> list[Circle]:
         """Circles seen nearly all round, by size."""
-        self._rest = self._search() if self._rest is None else self._rest
-        yield from self._known
-        for circle in self._rest:
-            self._known.append(circle)
-            yield circle
+        tried = [self.near(float(radius)) for radius in self.sizes()]
+        return [circle for circle in tried if circle is not None]
 
     def ahead(self, circle: Circle) -> float:
         """Distance of a circle's centre from the end of the cable, in radii."""
@@ -169,20 +166,14 @@ class _LostEnd:
         steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
         return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
 
-    def _search(self) -> Iterator[Circle]:
-        for radius in self.sizes():
-            circle = self.near(float(radius))
-            if circle is not None:
-                yield circle
-
 
 def _at_end(lost: _LostEnd) -> float | None:
     """Radius of the smallest circle with the cable's end on its rim, or of a larger one about it that hides it too."""
-    at_end = (circle for circle in lost.circles() if lost.on_rim(circle))
-    rim = next(at_end, None)
-    if rim is None:
+    at_end = [circle for circle in lost.circles if lost.on_rim(circle)]
+    if not at_end:
         return None
-    for circle in at_end:
+    rim = at_end[0]
+    for circle in at_end[1:]:
         apart = np.hypot(*np.subtract(circle.center, rim.center))
         wider = circle.radius > (1.0 + SAME_RADIUS) * rim.radius
         if wider and apart <= SAME_AXIS_RADII * circle.radius and _hides(lost, rim, circle):
@@ -223,7 +214,7 @@ def _common(ends: list[_LostEnd]) -> float | None:
     White bands, letters and shadows hide the last of a cable. At one end it must be lost so near that the circle is no
     dot, which lies farther ahead; the largest, for a bevel lies on the same axis.
     """
-    for radius in sorted((circle.radius for circle in ends[0].circles()), reverse=True):
+    for radius in sorted((circle.radius for circle in ends[0].circles), reverse=True):
         alike = [_nearest(end, radius) for end in ends]
         ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
         radii = _alike(None if circle is None else circle.radius for circle in alike)
@@ -233,4 +224,4 @@ def _common(ends: list[_LostEnd]) -> float | None:
 
 
 def _nearest(lost: _LostEnd, radius: float) -> Circle | None:
-    return min(lost.circles(), key=lambda circle: abs(circle.radius - radius), default=None)
+    return min(lost.circles, key=lambda circle: abs(circle.radius - radius), default=None)

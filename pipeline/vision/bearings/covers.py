@@ -1,22 +1,29 @@
-"""Round bearing covers: a circle of about known radius near the end of the cable, to a few hundredths of a pixel.
+"""The two bearing axes on a photo: round covers, pixels given by the user, or the visible ends of the cable.
+
+Covers are circles of about known radius near the ends of the cable, found to a few hundredths of a pixel:
 
 ``window -> colour gradient -> best centres for one radius (ring operator) -> circle (rim)``
 
 Any look serves, brighter or darker than ground and cable, with or without a dot, as long as part of the rim shows:
 the centre is sought by the mean step around the rim and the circle is fitted with a robust loss, so the sector where
 the cable leaves and sectors without contrast do not count. A cover of exactly the ground's look is found by its dot.
+
+Left and right are those of the photo as displayed: the left axis has the smaller ``u``. Where the chord stands within
+``VERTICAL_DEG`` of the vertical (camera turned by 90 degrees), the upper axis is called left on a single photo; over a
+series the bearing that moves decides (`pipeline.vision.series`).
 Units: px of the photo as displayed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
+from pipeline.vision.bearings.cut import cover_by_cut
 from pipeline.vision.bearings.rim import (
     MIN_RIM,
     RADIUS_STD,
@@ -30,7 +37,7 @@ from pipeline.vision.bearings.rim import (
 from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, with_rings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
-from pipeline.vision.rough import Bearing
+from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
 
 _INNER_DISC = 0.82
@@ -49,8 +56,17 @@ _MIN_SOFT_RIM = 0.5
 lost left 0.6, a moved camera, whose rim is doubled, 0.45.
 """
 _ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
+_SAME_COVER = 0.1  # radii; centres so near to each other, by rim and by cut, are those of one cover
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
 _CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
+
+PixelPair = tuple[tuple[float, float], tuple[float, float]]
+
+VERTICAL_DEG = 10.0  # degrees; a chord nearer to the vertical has no left end that a person would agree on
+_GIVEN_STD_PX = 1.0  # px; how well a person reads an axis off a screen
+_RADIUS_STD_BY_CABLE = 0.05  # relative; where only the cable's width on the photo tells the scale
+_SAME_END = 0.1  # radii of a cover, rad and relative; strips that end so near and alike show one cover or none
+_END_STD_WIDTHS = 0.1  # widths; a cut or clamped end is found to about a tenth of the cable's width
 
 
 def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
@@ -74,8 +90,19 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
     found = find_rim(photo, end, radius, width_px)
     if found is not None and found.rim >= SURE_RIM:
         return with_rings(photo, found, radius)
+    cut = cover_by_cut(photo, end, radius, width_px)
+    if cut is not None and (found is None or _apart(found, cut) > _SAME_COVER):
+        found = fit_circle(photo, np.array(cut.center), radius)
+        found = found if found is not None and found.rim >= MIN_RIM and _apart(found, cut) <= _SAME_COVER else None
     marked = _by_marks(photo, end, radius, found)
-    return marked if marked is not None else _by_inner_disc(photo, end, radius, width_px)
+    if marked is None or cut is None:
+        return marked or _by_inner_disc(photo, end, radius, width_px) or cut
+    return cut if _apart(marked, cut) > _SAME_COVER else min(marked, cut, key=lambda circle: circle.std)
+
+
+def _apart(one: Circle, other: Circle) -> float:
+    """Distance of two circles' centres in radii."""
+    return float(np.hypot(*np.subtract(one.center, other.center)) / other.radius)
 
 
 def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
@@ -98,29 +125,43 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
-    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
-    # A dome lit from one side is brighter than the ground there and darker on the other: quarters of its rim add up.
-    # A rim that is not seen as a sharp edge is sought as a soft one at last, out of focus or faint in the noise: beside
-    # a sharp rim, what is soft and round is the shadow.
-    partial: Circle | None = None
-    fits: list[tuple[float, Array, Circle | None]] = []
-    sharp, soft = (1.0, MIN_RIM), (_SOFT_RIM_PX, _MIN_SOFT_RIM)
-    for sectors, (softness, least) in ((1, sharp), (4, sharp), (1, soft)):
-        if softness > 1.0 and partial is not None:
-            break
-        for cable_from in (0.0, -2.4 * radius.px):
-            on_cable = (along < cable_from) & (np.abs(aside) < 0.8 * width_px)
-            votes = _votes(window, radius.px / window.reduction, on_cable, sectors=sectors) * prior
-            found = _best_circle(photo, radius, fits, window, votes, softness)
-            if found is not None and found.rim >= SURE_RIM:
-                return found
-            if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
-                partial = found
-    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
-    votes = _votes(window, radius.px / window.reduction, np.zeros(along.shape, bool)) * ahead
-    farther = _best_circle(photo, radius, fits, window, votes, 1.0)
-    return farther if farther is not None and farther.rim >= SURE_RIM else partial
+    beside = np.abs(aside) < 0.8 * width_px
+    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
+    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
+    partial: Circle | None = None
+    tries = (
+        (along < 0.0, prior, 1.0, MIN_RIM),
+        (along < -2.4 * radius.px, prior, 1.0, MIN_RIM),
+        (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
+        (along < -np.inf, ahead, 1.0, SURE_RIM),
+    )
+    for blind, where, softness, least in tries:
+        if softness > 1.0 and partial is not None:
+            continue  # beside a sharp rim, what is soft and round is the shadow
+        votes = _votes(window, radius.px / window.reduction, blind & beside) * where
+        found = _best_circle(photo, radius, window, votes, softness)
+        if found is not None and found.rim >= SURE_RIM:
+            return found
+        if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
+            partial = found
+    return partial
+
+
+def _best_circle(
+    photo: Photo, radius: Radius, window: _Window, votes: NDArray[np.float32], softness: float
+) -> Circle | None:
+    """The circle with the most of its rim seen among the centres of the window with the most votes."""
+    best: Circle | None = None
+    for _ in range(_CANDIDATES):
+        v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
+        circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, softness=softness)
+        if circle is not None and (best is None or circle.rim > best.rim + 0.02):
+            best = circle
+        if best is not None and best.rim > SURE_RIM:
+            break
+        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
+    return best
 
 
 def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius) -> Circle | None:
@@ -182,37 +223,6 @@ def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | Non
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-def _best_circle(
-    photo: Photo,
-    radius: Radius,
-    fits: list[tuple[float, Array, Circle | None]],
-    window: _Window,
-    votes: NDArray[np.float32],
-    softness: float,
-) -> Circle | None:
-    """The circle with the most of its rim seen among the centres of the window with the most votes."""
-    votes = votes.copy()
-    best: Circle | None = None
-    for _ in range(_CANDIDATES):
-        v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
-        center = window.to_pixels(np.array([u, v], float))
-        # votes counted in several ways lead to the same few centres: each is fitted once, within what a fit searches
-        same = [
-            known
-            for soft, place, known in fits
-            if soft == softness and np.hypot(*(place - center)) < 0.5 * SEARCH_RADII * radius.px
-        ]
-        circle = same[0] if same else fit_circle(photo, center, radius, softness=softness)
-        if not same:
-            fits.append((softness, center, circle))
-        if circle is not None and (best is None or circle.rim > best.rim + 0.02):
-            best = circle
-        if best is not None and best.rim > SURE_RIM:
-            break
-        cv2.circle(votes, (int(u), int(v)), max(2, round(0.3 * radius.px / window.reduction)), 0.0, cv2.FILLED)
-    return best
-
-
 @dataclass(frozen=True)
 class _Window:
     """Square piece of the photo, reduced so that the circle keeps 16 to 32 cells."""
@@ -233,9 +243,6 @@ class _Window:
         small = cv2.resize(part, size, interpolation=cv2.INTER_AREA).astype(np.float32) / np.float32(photo.full_scale)
         return cls(small if small.ndim == 3 else small[..., None], low.astype(float), reduction)
 
-    def to_cells(self, uv: Array) -> Array:
-        return np.asarray((uv - self.origin - (self.reduction - 1) / 2.0) / self.reduction)
-
     def to_pixels(self, cells: Array) -> Array:
         return np.asarray(cells * self.reduction + (self.reduction - 1) / 2.0 + self.origin)
 
@@ -247,8 +254,8 @@ def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
     return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
 
 
-def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], *, sectors: int = 1) -> NDArray[np.float32]:
-    """Change of the mean grey value across a circle around each cell, colours together, sector by sector of it.
+def _votes(window: _Window, radius: float, blind: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Change of the mean grey value across a circle around each cell, colours together.
 
     That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all
     round where texture cancels. Strong edges are clipped, and the cable's own, which are straight and would heap up
@@ -265,12 +272,90 @@ def _votes(window: _Window, radius: float, blind: NDArray[np.bool_], *, sectors:
     distance = np.hypot(x, y) + np.float32(1e-6)
     ring = np.exp(-0.5 * ((distance - radius) / max(0.7, _RING_WIDTH * radius)) ** 2)
     ring /= distance * ring.sum()
-    which = np.floor((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * sectors).clip(0, sectors - 1)
     votes = np.zeros(strength.shape, np.float32)
-    for sector in range(sectors):
-        part = np.where(which == sector, ring, np.float32(0.0))
-        for channel in range(gu.shape[2]):
-            across = cv2.filter2D(gu[..., channel] * gain, -1, part * x, borderType=cv2.BORDER_CONSTANT)
-            across += cv2.filter2D(gv[..., channel] * gain, -1, part * y, borderType=cv2.BORDER_CONSTANT)
-            votes += np.abs(across)
+    for channel in range(gu.shape[2]):
+        across = cv2.filter2D(gu[..., channel] * gain, -1, ring * x, borderType=cv2.BORDER_CONSTANT)
+        across += cv2.filter2D(gv[..., channel] * gain, -1, ring * y, borderType=cv2.BORDER_CONSTANT)
+        votes += np.abs(across)
     return votes
+
+
+@dataclass(frozen=True)
+class BearingHints:
+    """What is known about the bearings before the photo is looked at.
+
+    Attributes
+    ----------
+    cover_px : px or None
+        Diameter of the round covers, from their size and the scale.
+    cover_widths : float or None
+        Their diameter in diameters of the cable, where the scale is not known.
+    given_px : pair of (u, v) or None
+        Axes by the user.
+    seen : tuple of Bearing
+        Covers of a neighbouring photo, where they are to be expected on this one.
+    sought : list
+        Where strips end on this photo, and the cover found there or not.
+    """
+
+    cover_px: float | None = None
+    cover_widths: float | None = None
+    given_px: PixelPair | None = None
+    seen: tuple[Bearing, ...] = ()
+    sought: list[tuple[Array, Circle | None]] = field(default_factory=list, compare=False)
+
+    def cover_radius(self, width_px: float) -> float | None:
+        """Expected radius of a cover in px; None if there are no covers."""
+        if self.cover_px is not None:
+            return 0.5 * self.cover_px
+        return None if self.cover_widths is None else 0.5 * self.cover_widths * width_px
+
+
+def find_bearings(
+    photo: Photo, ends: tuple[CableEnd, CableEnd], width_px: float, hints: BearingHints
+) -> tuple[Bearing | None, Bearing | None]:
+    """Axes at the two ends of the cable, in the order of ``ends``; None from the first cover on that is not found."""
+    if hints.given_px is not None:
+        return _assign_given(ends, hints.given_px)
+    radius = hints.cover_radius(width_px)
+    if radius is None:
+        return _visible_end(ends[0], width_px), _visible_end(ends[1], width_px)
+    std = RADIUS_STD if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
+    expected = Radius(radius, std)
+    axes: list[Bearing | None] = [None, None]
+    for k, end in enumerate(ends):
+        circle = find_again(photo, end, hints.seen, expected)
+        # strips of all readings of a photo end at a few places: each is searched once
+        known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
+        alike = [found for other, found in hints.sought if np.abs(known - other).max() < _SAME_END]
+        if circle is None and not alike:
+            alike = [find_cover(photo, end, expected, width_px)]
+            hints.sought.append((known, alike[0]))
+        circle = circle or alike[0]
+        if circle is None:
+            break  # one is not enough, whatever the other would be
+        axes[k] = circle.as_bearing()
+    return axes[0], axes[1]
+
+
+def _assign_given(ends: tuple[CableEnd, CableEnd], given: PixelPair) -> tuple[Bearing, Bearing]:
+    a, b = np.array(given[0], float), np.array(given[1], float)
+    straight = np.hypot(*(a - ends[0].place)) + np.hypot(*(b - ends[1].place))
+    crossed = np.hypot(*(b - ends[0].place)) + np.hypot(*(a - ends[1].place))
+    first, second = (a, b) if straight <= crossed else (b, a)
+    bearings = [Bearing((float(p[0]), float(p[1])), _GIVEN_STD_PX, kind="given") for p in (first, second)]
+    return bearings[0], bearings[1]
+
+
+def _visible_end(end: CableEnd, width_px: float) -> Bearing:
+    kind: AxisKind = "clamp" if end.at_object else "end"
+    std = _END_STD_WIDTHS * width_px
+    return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)
+
+
+def left_first(first: Array, second: Array) -> bool:
+    """True if ``first`` (u, v) is the left axis by the convention of this module."""
+    du, dv = np.asarray(second, float) - np.asarray(first, float)
+    if abs(du) <= np.tan(np.radians(VERTICAL_DEG)) * abs(dv):
+        return bool(dv > 0)
+    return bool(du > 0)

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter, gaussian_filter1d
 from scipy.special import ndtr
 
 from pipeline.records import Array
@@ -89,7 +88,7 @@ def fit_circle(
         parameters = _best_shift(photo, parameters, ray, span, softness, expected)
     reach = max(3.0, NEAR_RADII * radius)
     for beside in (False, True):
-        slopes = _radial_slopes(photo, parameters, ray, reach, softness, _POOLED_RAYS, one_sign=on_cover)
+        slopes = _radial_slopes(photo, parameters, ray, reach, softness, one_sign=on_cover)
         edge, trust = _radial_edges(slopes, reach, softness)
         if beside and not on_cover:
             edge = _without_light(slopes, edge)
@@ -135,14 +134,7 @@ class _Slopes:
 
 
 def _radial_slopes(
-    photo: Photo,
-    parameters: Array,
-    ray: Array,
-    span: float,
-    softness: float,
-    pooled_rays: float,
-    *,
-    one_sign: bool = False,
+    photo: Photo, parameters: Array, ray: Array, span: float, softness: float, *, one_sign: bool = False
 ) -> _Slopes:
     """Slopes about a circle; with ``one_sign`` only edges of the sign that prevails on the circle are sought.
 
@@ -162,7 +154,13 @@ def _radial_slopes(
     part *= np.float32(1.0 / photo.full_scale)
     places = distance[:, None] * ray[:, None] + (parameters[:2] - low)
     profile = sampled(part, places).reshape(*places.shape[:2], -1)
-    slope = _smoothed_slope(profile, pooled_rays * softness, 2.0 * softness)
+    # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
+    pooled = gaussian_filter(
+        np.gradient(profile, 0.5, axis=1),
+        (_POOLED_RAYS * softness, 2.0 * softness, 0.0),
+        mode=("wrap", "reflect", "wrap"),
+    )
+    slope: NDArray[np.float32] = np.asarray(pooled)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
     outside = ((places < 1) | (places > np.array(part.shape[1::-1]) - 2)).any(axis=2)
@@ -181,25 +179,9 @@ def _radial_slopes(
     )
 
 
-def _smoothed_slope(profile: NDArray[np.float32], across: float, along: float) -> NDArray[np.float32]:
-    """Slope per px along rays ``(rays, places, colours)`` half a px apart, smoothed over rays and places.
-
-    Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is. ``across`` and
-    ``along`` are standard deviations in rays and places.
-    """
-    slope = np.empty_like(profile)
-    slope[:, 1:-1] = profile[:, 2:] - profile[:, :-2]
-    slope[:, 0], slope[:, -1] = 2.0 * (profile[:, 1] - profile[:, 0]), 2.0 * (profile[:, -1] - profile[:, -2])
-    over, beside = (cv2.getGaussianKernel(2 * int(4.0 * std + 0.5) + 1, std, cv2.CV_32F) for std in (across, along))
-    wrap = len(over) // 2
-    around = np.concatenate([slope[-wrap:], slope, slope[:wrap]])
-    pooled = np.asarray(cv2.sepFilter2D(around, -1, beside, over, borderType=cv2.BORDER_REFLECT), np.float32)
-    return pooled[wrap:-wrap].reshape(profile.shape)
-
-
 def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softness: float, expected: Radius) -> Array:
     """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
-    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness, _POOLED_RAYS)
+    slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness)
     step = span / 12.0
     peak = np.sort(np.where(slopes.seen[:, None], slopes.strength, 0.0).max(axis=1))
     usual = float(peak[len(peak) // 2]) + 1e-12

@@ -15,12 +15,6 @@ things more are known, and both go in as measurements with their own uncertainty
   same share at both ends. What of that is common to the photos of a series they tell together
   (`pipeline.vision.centerline.axes_of_series`).
 
-On path-traced photos at 5 to 16 px/mm the first takes a third off the errors of the last 10 mm, the second a twentieth;
-axes known without error would take off half or more: on 101 photos of another renderer with covers above the cable, a
-camera askew and 4 to 6 px/mm, the series took off a quarter (2.1 to 1.6 % of the largest curvature, rms). As the
-penalty of the whole fit the bow would take off another twentieth and pull the seen part toward a straight law:
-characteristics of bent laws by the balance came out up to 1.8 times as far off.
-
 Lengths in m, chord frame, ``kappa = d theta / ds`` in its axes. Source: the update is that of Kalman (1960); the
 elastica Love (1927), Treatise on the Mathematical Theory of Elasticity, art. 262.
 """
@@ -37,7 +31,7 @@ from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_
 from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve
 from pipeline.vision.centerline.curve_fit import CurveFit, rms_of_bow
 from pipeline.vision.median import quantile
-from pipeline.vision.scale.chord import ChordFrame
+from pipeline.vision.scale.plane import ChordFrame
 
 _END_WIDTHS = 0.25  # widths; how far aside of the cable's middle the search puts a visible end: a corner of its mask
 _PLACES = 60  # along the seen part: the curvature has about ten degrees of freedom there

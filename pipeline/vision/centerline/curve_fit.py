@@ -16,7 +16,7 @@ covariance; the reasons for a spline of the curvature are measured in the tests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
 from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
 from pipeline.vision.median import median, scatter
+from rod.measurement import slow_covariance
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,8 @@ def fit_curve(
         Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
     witness : Witness, optional
-        Other data whose errors last as long along s as those of the points.
+        Other data whose errors last as long along s as those of the points. It widens the bands and leaves the curve
+        as its own points have it: held to the longer errors, it would follow its bends too little.
     """
     found = _settle(
         points,
@@ -121,9 +123,12 @@ def fit_curve(
         longest=longest,
         correlation_length=correlation_length,
         iterations=iterations,
-        witness=witness,
     )
     smooth = found.problem.smooth(found.length, bias_share=bias_share)
+    if witness is not None and correlation_length is None:
+        told = found.problem.correlation_length(longest, witness)
+        lasting = found.problem.smooth(told, bias_share=bias_share)
+        smooth = replace(smooth, root=lasting.root, sigma=lasting.sigma, correlation_length=told)
     curve = found.before.moved(smooth.estimate - found.before.parameters)
     s, residual = _step_to_foot(curve, points, curve.foot(points, found.s, steps=1))
     return CurveFit(curve, smooth, points, std, s, residual, found.weight)
@@ -165,7 +170,6 @@ def _settle(
     longest: float,
     correlation_length: float | None,
     iterations: int,
-    witness: Witness | None = None,
 ) -> _Settled:
     """Gauss-Newton with robust weights, ``iterations`` steps at most."""
     weight = np.ones(len(points))
@@ -181,7 +185,7 @@ def _settle(
             weight = _biweight(residual / std, max(spread, 0.1 * moved))
         problem = _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
-            length = problem.correlation_length(longest, witness)
+            length = problem.correlation_length(longest)
         step = problem.estimate(length) - curve.parameters
         found = _Settled(curve.moved(step), curve, problem, s, weight, length)
         curve = found.curve
@@ -241,3 +245,23 @@ def _biweight(residual: Array, spread: float) -> Array:
     """Weights: 1 up to four spreads, which Gaussian errors pass once in 16,000, falling to 0 at six."""
     beyond = np.clip((np.abs(residual) / spread - 4.0) / 2.0, 0.0, 1.0)
     return np.asarray((1.0 - beyond**2) ** 2)
+
+
+def std_along(basis: Array, covariance: Array) -> Array:
+    """Standard deviation (n,) of ``basis`` (n, p) times parameters with a covariance (p, p)."""
+    return np.asarray(np.sqrt(np.maximum(((basis @ covariance) * basis).sum(axis=1), 0.0)))
+
+
+def slow_errors(fit: CurveFit, std: float, length: float) -> Array:
+    """Covariance of q that a slow error of the midline makes, carried through the fit.
+
+    The light's error follows the direction of the cable against the light, a smooth function of s; that of the edges'
+    waves what lies along them: Gaussian correlation.
+    """
+    return np.asarray(fit.smooth.gain @ slow_covariance(fit.s[fit.weight > 0.0], ((std, length),)) @ fit.smooth.gain.T)
+
+
+def length_std(fit: CurveFit, s: Array, normal: Array, covariance: Array) -> float:
+    """Standard deviation of the arc length between two fixed points: its change is ``-int kappa dn ds``."""
+    row = np.trapezoid(fit.curve.curvature(s)[:, None] * normal, s, axis=0)
+    return float(np.sqrt(np.maximum(row @ covariance @ row, 0.0)))

@@ -18,10 +18,6 @@ Some waves every photo has: grid of the pixels, demosaicing, tone curve. They ar
 (`_LEAST_WAVE_PX`), and on sharp photos no scatter hides them: midlines traced to 0.01 px, with 0.015 px of scatter in a
 section, were told to misfit a true simulation in two of 23 specimens. Half as much is common.
 
-On a wooden table (grain of 3 % of white, 5 to 7 px/mm) both midline and half width have two to three times the variance
-of their scatter in waves of a twentieth to a fifth of the length. Without them, simulations of cables that nothing was
-wrong with were told to misfit.
-
 ``half widths of the sections on every photo -> std of own and common waves, and their length``
 """
 

@@ -25,8 +25,7 @@ from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
-from pipeline.vision.centerline.curve_fit import CurveFit
-from pipeline.vision.centerline.fit_errors import length_std, slow_errors, std_along
+from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import SLOW_WIDTH_ORDER, HalfWidths, Waves, edge_waves
 from pipeline.vision.centerline.midline import LEAST_SECTIONS, Sections
 from pipeline.vision.centerline.path import fit_along, follow
@@ -41,8 +40,8 @@ from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.scale.chord import ChordFrame, chord_frame
-from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.scale.plane import ChordFrame, PlaneMap, chord_frame
+from pipeline.vision.search.ends import onto_curve
 from rod.measurement import MeasuredShape
 
 LIGHT_LENGTH_SHARE = 0.35
@@ -180,10 +179,8 @@ def follow_cable(
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
     """The cable with its visible ends (2, 2) px on its curve: the search put them into corners of a mask."""
-    left, right = (
-        replace(axis, center_px=(float(u), float(v)))
-        for axis, (u, v) in zip((rough.left, rough.right), ends_px, strict=True)
-    )
+    width = 2.0 * rough.half_width_px
+    left, right = (onto_curve(axis, end, width) for axis, end in zip((rough.left, rough.right), ends_px, strict=True))
     return replace(rough, left=left, right=right)
 
 

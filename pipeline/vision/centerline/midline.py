@@ -24,10 +24,6 @@ and no averaging removes it. Its size is judged by what is seen on the photo its
 
 That the measured width changes slowly along s tells nothing of it: a sheath grows thicker and a camera comes nearer,
 and the edges of real ones move by a fiftieth of the width, both alike.
-
-On 24 fresh scenes each of both renderers and of real sheath, 8 to 28 px wide, the slow error was 0.9 to 1.4 of what is
-stated, by kind of photo; at 12 px/mm in side light 1.8 of 0.012 px. Where the lamp leaves a bright cable's flank nearly
-as dark as the ground, its faint edge is found mostly, and the midline is off by 0.1 to 0.5 px.
 """
 
 from __future__ import annotations
@@ -105,7 +101,6 @@ class Sections:
     systematic_std : px
     share : float
         Of the sections asked for, those that were measured.
-    profiles : Profiles
     contrast, noise, blur : float
         Median step and scatter of pixels, grey; median edge blur, px.
     asymmetry : float
@@ -120,7 +115,6 @@ class Sections:
     balance: Array
     systematic_std: float
     share: float
-    profiles: Profiles
     contrast: float
     noise: float
     blur: float
@@ -188,7 +182,6 @@ def measure_sections(
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
         systematic_std=_systematic(profiles, s, median(width), doubt, diameter),
         share=float(np.mean(keep)),
-        profiles=profiles,
         contrast=median(step),
         noise=median(profiles.noise),
         blur=median(profiles.blur),

@@ -18,7 +18,7 @@ from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.evidence import Course, Evidence, unlike_a_cable, weigh
 from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.scale.chord import ChordFrame
+from pipeline.vision.scale.plane import ChordFrame
 
 _WIDTH_OFF = 0.15  # relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth

@@ -14,9 +14,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
-from pipeline.records import Array, Finding, Scale, Specimen, inferred
+from pipeline.records import Array, Centerline, Finding, Scale, Specimen, inferred
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
@@ -113,7 +114,12 @@ def chords_px(found: list[RoughCable]) -> Array:
 
 
 def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float) -> Scale | None:
-    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one."""
+    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one.
+
+    None without travel, and of axes that a person gave: those on later photos are where log and scale put them.
+    """
+    if any(axis.kind == "given" for cable in found for axis in (cable.left, cable.right)):
+        return None
     known = np.isfinite(displacements)
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
     if known.sum() < 2 or not np.ptp(travel) > 0:
@@ -258,3 +264,31 @@ def _by_travel_on_plane(
     travel = displacements[known] - displacements[known].mean()
     slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
     return Scale(slope, estimate.std_relative, estimate.source)
+
+
+def with_doubt_of_plane(line: Centerline, calibration: Calibration) -> Centerline:
+    """The line with the errors of its scale and plane, the same on all photos, in the band of its curvature.
+
+    A scale too large by a share d makes every curvature too large by d. Maps one standard deviation aside bend the path
+    by an amount of their own: ``var += (std_uniform kappa)^2 + sum_i (kappa(map_i) - kappa(map))^2``.
+
+    Parameters
+    ----------
+    line : Centerline
+        ``kappa_std`` by what its own photo tells.
+    calibration : Calibration
+        With which it was measured.
+    """
+    uv = np.column_stack([line.u_px, line.v_px])
+    kappa = _curvature(uv, line.shape.s, calibration.plane)
+    variance = (calibration.uniform_std * line.shape.kappa) ** 2
+    for aside in calibration.aside:
+        variance += (_curvature(uv, line.shape.s, aside) - kappa) ** 2
+    return replace(line, kappa_std=np.sqrt(line.kappa_std**2 + variance))
+
+
+def _curvature(uv: Array, s: Array, plane: PlaneMap) -> Array:
+    """Curvature ``(n,)`` on the plane of a smooth path of pixels ``(n, 2)`` given at ``s``."""
+    path = CubicSpline(s, plane.to_plane(uv))
+    (dx, dy), (ddx, ddy) = path(s, 1).T, path(s, 2).T
+    return np.asarray((dx * ddy - dy * ddx) / np.hypot(dx, dy) ** 3)

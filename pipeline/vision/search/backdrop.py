@@ -4,6 +4,10 @@ The photo is reduced by averaging, the slowly varying ground (light fall-off, vi
 order per channel, and what is left is measured in standard deviations of the ground's own texture and noise, colours
 together: a grey cable on grey metal and a red cable on green cloth give the same kind of picture.
 
+A striped wire is two strips, and the one that stands out more passes for a cable. Fisher's discriminant between ground
+and cable, with the scatter of the cable's own colours in it, is the direction of colour along which its stripes are
+alike; a shadow beside it, which is the ground's colour but darker, mostly fades in it.
+
 Units: grey values are fractions of full range; pixels of the reduced photo are called cells. The centre of cell
 (i, j) is the photo pixel ``reduction * (i, j) + (reduction - 1) / 2``.
 """
@@ -27,6 +31,14 @@ MIN_GROUND_STD = 0.002  # of full range; half a level of 8 bits: no ground is ca
 _HIGHER_LEVELS = 2  # levels above Otsu's, each splits what stands above the last: shadow, then cable
 _REDUCED_SIDE_CELLS = 1000
 """Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
+_UNEVEN = 0.3  # of the step to the ground; cables of one colour with gloss, print and shade scatter by less
+_STIFF = 0.01  # of the squared step, added to every colour's variance: colours that hardly differ are not chased
+_CORE = 0.45  # of the depth around; cells of a mask nearer to its rim than that are mixed with the ground
+_AROUND = np.ones((9, 9), np.uint8)  # cells
+_SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
+_ROWS = 256  # px; worked on at a time: large photos shall not be held as single precision
+_LEAST_CABLE = 0.25  # of what stands out; with less, its colours are those of shadow or of other things
+_COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
 
 
 @dataclass(frozen=True)
@@ -66,11 +78,6 @@ class Standout:
     def levels(self) -> list[float]:
         """Levels of that distance above which something stands out, the likeliest first; see `otsu_levels`."""
         return otsu_levels(self.distance)
-
-    def brightness(self) -> Image:
-        """Picture ``(h, w)``: mean residual of the channels, in standard deviations of the ground."""
-        std = float(np.sqrt(self.covariance.mean()))
-        return np.asarray(self.residual.mean(axis=2) / np.float32(std))
 
     def to_cells(self, uv: Array) -> Array:
         """Cells (n, 2) of photo pixels (n, 2), ``(u, v)``."""
@@ -166,3 +173,42 @@ def otsu_levels(picture: Image) -> list[float]:
         if coded.size < 2:
             break
     return levels
+
+
+def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
+    """The photo as grey values along that direction; None where what stands out is of one brightness as it is."""
+    cable, shadow = (standout.residual[part].astype(np.float64) for part in _cable_and_shadow(standout))
+    channels, count = cable.shape[1], len(cable) + len(shadow)
+    if channels == 1 or len(cable) < max(4 * channels, _LEAST_CABLE * count):
+        return None
+    core = np.concatenate([cable, shadow])
+    seen = core @ np.linalg.solve(standout.covariance, np.median(core, axis=0))
+    if np.std(seen) < _UNEVEN * np.median(seen):
+        return None
+    return _along(photo, cable, standout.covariance + shadow.T @ shadow / (len(shadow) + 1.0))
+
+
+def _cable_and_shadow(standout: Standout) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Cells ``(h, w)`` in the middle of what stands out, and those of them whose colour is the ground's, dimmed."""
+    mask = (standout.distance > standout.levels[0]).astype(np.uint8)
+    depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
+    middle = (depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)
+    ground = standout.picture - standout.residual
+    less, light = -(standout.residual * ground).sum(axis=2), np.linalg.norm(ground, axis=2)
+    sizes = np.linalg.norm(standout.residual, axis=2)
+    shadow = (less > _SHADE_COSINE * sizes * light) & (sizes < _DARKEST_SHADE * light)
+    return middle & ~shadow, middle & shadow
+
+
+def _along(photo: Photo, core: Array, ground: Array) -> Photo:
+    """Grey values by the discriminant of colours ``(n, c)`` less the ground's, of a covariance ``(c, c)``."""
+    step = np.median(core, axis=0)
+    scatter = ground + np.cov(core.T) + _STIFF * (step @ step) * np.eye(len(step))
+    weights = np.linalg.solve(scatter, step)
+    weights *= np.sign(weights.sum()) / np.abs(weights).sum()
+    darkest = float(np.minimum(weights, 0.0).sum())
+    scaled = (65535.0 / photo.full_scale * weights).astype(np.float32)[None]
+    grey = np.empty(photo.pixels.shape[:2], np.uint16)
+    for rows in (slice(first, first + _ROWS) for first in range(0, len(grey), _ROWS)):
+        grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
+    return Photo(photo.name, grey, 16, _COLOUR_GRID_PX)

@@ -1,27 +1,31 @@
-"""Which strip is the cable: levels, polarities and widths tried until one reading of the photo makes sense.
+"""Which strip is the cable: levels and widths tried until one reading of the photo makes sense.
 
-The first reading, everything that differs from the ground at Otsu's level, serves most photos. Others are tried only
-where it finds nothing long enough: other levels, one polarity (a shadow of the other one melts into the cable).
+The first reading, everything that differs from the ground at Otsu's level, serves most photos. Other levels are tried
+only where it finds nothing long enough.
 All lengths in cells of the reduced photo.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
+from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import Image, Standout, otsu_levels
-from pipeline.vision.search.bands import strips_in_bands
+from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
+from pipeline.vision.search.flanks import find_flanks
 from pipeline.vision.search.strips import (
     MIN_PIECE_WIDTHS,
     THICK_WIDTHS,
+    WIDTH_RATIO_RANGE,
     Mask,
     Strip,
     find_strips,
@@ -32,18 +36,16 @@ from pipeline.vision.search.strips import (
 )
 
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
-_TRACE_SHARE = 0.03  # of the area of the strips that cover most; narrower ones that cover less are specks and writing
-_ALONE_CLEAR_WIDTHS = 3.0  # widths; a strip that comes back to itself as near as that is looked at more closely
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
 _RING_GAP_WIDTHS = 2.5  # widths; a ring or writing on the sheath interrupts the skeleton so far, covers farther
 _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
 _JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
 _TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
 _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
-_LEAST_LEVEL = 5.0  # sigmas of the ground; a strip above it is no play of noise and texture
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
+_MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 _BAND_WIDTHS = (2.2, 3.2)  # widths; cable and hard shadow together, by a lamp 45 and 25 degrees above the table
 
 
@@ -74,14 +76,14 @@ class Wanted:
 
 
 def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ...]]:
-    """Readings with a strip that is long enough, one tuple for each picture and level, the likeliest first.
+    """Readings with a strip that is long enough, one tuple for each level, the likeliest first.
 
     Then those with the cable in a wider band. Where none has one, the reading with the longest strip comes alone.
     """
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
-    for picture, level in _pictures(standout):
-        readings = list(_readings(picture, level, wanted))
+    for level in _levels(standout):
+        readings = list(_readings(standout.distance, level, wanted))
         long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
         if long:
             given += 1
@@ -95,28 +97,6 @@ def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ..
             yield (reading,)
     if not given:
         yield (best,)
-
-
-def narrowest(standout: Standout) -> float:
-    """Width of the narrowest strips on the likeliest picture that take up more than a trace of it; 0 without any."""
-    picture, level = next(_pictures(standout))
-    widths = ridge_widths((picture > level).astype(np.uint8))
-    most = max((width * length for width, length in widths), default=0.0)
-    return min((width for width, length in widths if width * length > _TRACE_SHARE * most), default=0.0)
-
-
-def read_alone(standout: Standout, wanted: Wanted) -> Reading | None:
-    """The likeliest reading of a cable of unknown width, if it shows one strip, long enough, and nothing else.
-
-    That is no second strip, no branch and no return of the strip to its own neighbourhood: few cells blur a crossing.
-    """
-    picture, level = next(_pictures(standout))
-    readings = list(_readings(picture, level, wanted))
-    strips = [strip for reading in readings for strip in reading.strips[:2]]
-    if len(readings) != 1 or len(strips) != 1 or strips[0].length < wanted.least_length:
-        return None
-    clear = _ALONE_CLEAR_WIDTHS * strips[0].width
-    return None if strips[0].branch or approaches_itself(strips[0].path, clear) else readings[0]
 
 
 def branches(strip: Strip, reading: Reading) -> bool:
@@ -161,22 +141,11 @@ def approaches_itself(path: Array, width: float) -> bool:
     return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
 
 
-def _pictures(standout: Standout) -> Iterator[tuple[Image, float]]:
-    """Pictures in ground sigmas and levels, the likeliest first."""
-    distance, (otsu, *higher) = standout.distance, standout.levels
-    yield distance, otsu
-    for level in (*higher, *(factor * otsu for factor in _LEVEL_FACTORS)):
-        if level > _LOWEST_LEVEL:
-            yield distance, level
-    brightness = standout.brightness()
-    for sign in (-1.0, 1.0):
-        picture = np.maximum(np.float32(sign) * brightness, 0.0)
-        level, *higher = otsu_levels(picture)
-        if level > _LEAST_LEVEL:
-            for tried in (level, *higher, 0.5 * level):
-                yield picture, tried
-    for level in (_LEAST_LEVEL, _LOWEST_LEVEL):
-        yield distance, level
+def _levels(standout: Standout) -> list[float]:
+    """Levels in ground sigmas, the likeliest first."""
+    otsu, *higher = standout.levels
+    others = (*higher, *(factor * otsu for factor in _LEVEL_FACTORS))
+    return [otsu, *(level for level in others if level > _LOWEST_LEVEL)]
 
 
 def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]:
@@ -196,13 +165,13 @@ def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]
 
 def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Reading]:
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
-    for picture, level in _pictures(standout):
-        mask = strip_mask(picture > level, width)
+    for level in _levels(standout):
+        mask = strip_mask(standout.distance > level, width)
         if mask.mean() > _MAX_COVERED_SHARE:
             continue
         for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
-            strips = strips_in_bands(picture, mask, thick, width, most)
+            strips = _strips_in_bands(standout.distance, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
                 yield Reading(tuple(strips), mask, thick, width, level)
@@ -231,3 +200,46 @@ def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     closed = ridge_widths(strip_mask(above, widths[0][0])) if widths else []
     new = [guess for guess in closed if all(abs(np.log(guess[0] / known)) > 0.2 for known, _ in widths)]
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
+
+
+def _strips_in_bands(picture: Image, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
+    """Strips of the cable's width within the bands of a mask, longest first.
+
+    Parameters
+    ----------
+    picture : (h, w) ground sigmas
+        What the mask was made of.
+    mask : (h, w)
+    thick : (h, w)
+        What is wider than any band.
+    width : cells
+        The cable's.
+    most : widths
+        Of the widest band.
+    """
+    bands = find_strips(mask, thick, width, ratios=(WIDTH_RATIO_RANGE[0], most))
+    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0)) for band in bands]
+    return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
+
+
+def _cable_within(picture: Image, band: Strip, width: float, search: float) -> Strip | None:
+    """The cable's strip in a band; None where most sections show no pair of edges."""
+    path = smooth_path(band.path, SMOOTHING_WIDTHS * width)
+    # a skeleton runs into a corner of the band over its last half width
+    corner = round(0.5 * band.width)
+    path = path[corner : len(path) - corner]
+    if len(path) < MIN_PIECE_WIDTHS * width:
+        return None
+    _, normal = path_normals(path)
+    straight, offsets = straighten(picture, path, normal, width)
+    flanks = find_flanks(straight[..., 0], offsets, width, known=True, search=search)
+    both = np.isfinite(flanks.left + flanks.right)
+    if both.mean() < _MIN_BAND_EDGES:
+        return None
+    middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
+    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width, mode="nearest")
+    return replace(
+        band,
+        path=path + middle[:, None] * normal,
+        width=median((flanks.right - flanks.left)[both]),
+    )

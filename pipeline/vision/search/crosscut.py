@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter
@@ -19,7 +18,7 @@ from pipeline.records import Array
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import CELLS_ACROSS, Image, Standout
+from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
 SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
@@ -102,24 +101,22 @@ def cut_across(
     """
     path = smooth_path(path, SMOOTHING_WIDTHS * width)
     _, normal = path_normals(path)
-    straight, rows, offsets = straighten(standout.residual, path, normal, width)
+    straight, offsets = straighten(standout.residual, path, normal, width)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
     relief = grey - medians(grey[:, _beside(offsets / width)], axis=1)[:, None]
     core = np.abs(offsets) < 0.35 * width
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
-    pitch = len(path) / len(rows)
-    flanks = find_flanks(relief, offsets, width, pitch, known=known)
+    flanks = find_flanks(relief, offsets, width, known=known)
     step = _core_level(relief, offsets, flanks)
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
-    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width / pitch, mode="nearest")
-    nearest = np.rint(np.interp(np.arange(len(path)), rows, np.arange(len(rows)))).astype(int)
+    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width, mode="nearest")
     return CrossCut(
-        path=path + normal * np.interp(np.arange(len(path)), rows, middle)[:, None],
-        width=(flanks.right - flanks.left)[nearest],
-        step=step[nearest],
+        path=path + normal * middle[:, None],
+        width=flanks.right - flanks.left,
+        step=step,
         contrast=median(step),
         weights=weights,
         dark=sign < 0,
@@ -139,24 +136,11 @@ def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) ->
     return np.asarray(medians(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
 
 
-def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array, Array]:
-    """Picture ``(n, m, c)`` along the path, the places of its rows on it, and the offsets of its columns.
-
-    A wide strip is averaged to as many rows and twice as many columns a width as a cable of known diameter has cells.
-    """
+def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array]:
+    """Picture ``(n, m, c)`` along a path (n, 2), and the offsets (m,) of its columns."""
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
     straight = sampled(picture, path[:, None] + normal[:, None] * offsets[:, None])
-    rows = round(len(path) / max(1, int(width / CELLS_ACROSS)))
-    columns = len(offsets) // max(1, int(0.5 * width / CELLS_ACROSS))
-    if (columns, rows) != (len(offsets), len(path)):
-        straight = np.asarray(cv2.resize(straight, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
-    place, offset = _centres(len(path), rows), _centres(len(offsets), columns)
-    return straight.reshape(rows, columns, -1), place, np.interp(offset, np.arange(len(offsets)), offsets)
-
-
-def _centres(many: int, few: int) -> Array:
-    """Places of ``few`` means of equal size among ``many`` points."""
-    return np.asarray((np.arange(few) + 0.5) * (many / few) - 0.5)
+    return straight.reshape(len(path), len(offsets), -1), offsets
 
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:

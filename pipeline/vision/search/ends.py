@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import theilslopes
 
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
@@ -28,7 +29,8 @@ COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges
 _TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
 _STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
-_CUT_STD_WIDTHS = 0.04  # widths; a cut with pliers is square and the path centred to about a twentieth
+_CENTRED_WIDTHS = 0.04  # widths; how far aside of the cable's middle the search ends its path
+_EDGE_STD_PX = 0.25  # px; what halo, JPEG and grid move an edge, on all rows alike
 
 
 @dataclass(frozen=True)
@@ -130,14 +132,22 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
     points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
     profiles = sampled(closeup.grey, points)
     places = [_half_level(profile, along, width, _STROKE_WIDTHS * width) for profile in profiles]
-    known = np.array([place for place in places if place is not None])
+    known = np.array([(row, place) for row, place in zip(rows, places, strict=True) if place is not None])
     if len(known) < 5:
         return settled, path
-    middle = median(known)
-    # A cut is square to about a twentieth of the width; rows a quarter width apart share their blur.
-    std = float(np.hypot(scatter(known, middle) / 2.0, _CUT_STD_WIDTHS * width))
+    # a slanting cut is a straight line across, and ends the cable where the middle crosses it
+    slant, middle = (float(part) for part in theilslopes(known[:, 1], known[:, 0])[:2])
+    # rows a quarter width apart share their blur
+    uneven = scatter(known[:, 1] - middle - slant * known[:, 0], 0.0) / 2.0
+    std = float(np.linalg.norm([uneven, np.hypot(1.0, slant) * _CENTRED_WIDTHS * width, _EDGE_STD_PX]))
     path = led_on(body, outward, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
+
+
+def onto_curve(axis: Bearing, place: Array, width: float) -> Bearing:
+    """A visible end (u, v) px on the measured middle of the cable: how far aside the search had put it is known now."""
+    std = float(np.sqrt(max(axis.std_px**2 - (_CENTRED_WIDTHS * width) ** 2, _EDGE_STD_PX**2)))
+    return replace(axis, center_px=(float(place[0]), float(place[1])), std_px=std)
 
 
 def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
@@ -160,7 +170,7 @@ def _half_level(profile: Array, along: Array, width: float, stroke: float) -> fl
     relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
     low = relief < 0.5
     # a stroke of print is no end: the sheath goes on beyond it
-    for start, stop in _runs(low):
+    for start, stop in runs_of(low):
         if stop < len(low) and along[stop - 1] - along[start] < stroke:
             low[start:stop] = False
     fallen = np.flatnonzero(low & (along > -0.6 * width))
@@ -174,7 +184,7 @@ def without_specks(seen: NDArray[np.bool_], points_per_width: float) -> slice:
     """Range of a path from its first to its last seen point, without specks at the ends: a screw on a cover."""
     first, last = 0, len(seen)
     for direction in (1, -1):
-        runs = _runs(seen[::direction])
+        runs = runs_of(seen[::direction])
         while len(runs) > 1:
             (start, stop), (following, _) = runs[0], runs[1]
             if stop - start >= points_per_width or following - stop < 0.5 * points_per_width:
@@ -185,7 +195,7 @@ def without_specks(seen: NDArray[np.bool_], points_per_width: float) -> slice:
     return slice(first, max(last, first + 3))
 
 
-def _runs(seen: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(seen: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Start and stop of each run of True."""
     steps = np.diff(np.concatenate([[0], seen.astype(int), [0]]))
     return list(zip(np.flatnonzero(steps == 1).tolist(), np.flatnonzero(steps == -1).tolist(), strict=True))

@@ -44,7 +44,6 @@ def find_flanks(
     relief: NDArray[np.float32],
     offsets: Array,
     width: float,
-    pitch: float,
     *,
     known: bool,
     search: float = PAIR_SEARCH_WIDTHS,
@@ -54,13 +53,11 @@ def find_flanks(
     Parameters
     ----------
     relief : (n, m)
-        Straightened picture; positive in the cable.
+        Straightened picture, its rows a cell apart; positive in the cable.
     offsets : (m,)
         Evenly spaced.
     width : cells
         The cable's if ``known``, else that of the mask, which a shadow may have widened.
-    pitch : cells
-        Distance of neighbouring sections.
     known : bool
     search : widths
         How far beside the middle of the picture the pair's middle may lie.
@@ -76,7 +73,7 @@ def find_flanks(
     # Most sections tell how strong an edge is; letters count no more, and a highlight's edge, which may be three times
     # as strong as a flank, less than twice (the root).
     usual = median(np.abs(slope).max(axis=1)) + 1e-12
-    pooling = _PAIR_POOLING_WIDTHS * width / pitch
+    pooling = _PAIR_POOLING_WIDTHS * width
     rise, fall = (np.sqrt(_pooled(np.clip(edge / usual, 0.0, 1.0), pooling)) for edge in (slope, -slope))
     near = np.flatnonzero(np.abs(offsets) <= search * width)
     # Pooled sections repeat each other: every half width of them is enough for width and course.

@@ -8,7 +8,7 @@ All lengths in cells of the reduced photo; points are ``(u, v)``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths, step_lengths
 
 Mask = NDArray[np.uint8]
@@ -29,7 +29,6 @@ MIN_PIECE_WIDTHS = 2.5  # widths; shorter pieces are writing, dirt or texture
 WIDTH_RATIO_RANGE = (0.5, 1.7)  # to the diameter; mask widths of a cable with shadow or with a rim lost in glare
 JOINT_ANGLE_DEG = 30.0  # degrees; over five widths a cable turns by less unless its bend radius is ten widths
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
-_ROUGH_DISTANCE = 0.95  # rough distances over masks of 5 cells are 2 % off at most
 _CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
 _OPENING_WIDTHS = 0.3  # widths; specks removed: texture is finer than the cable
 _COVER_HOLE_WIDTHS = (0.5, 3.2)
@@ -52,15 +51,12 @@ class Strip:
         Along the middle, from one end to the other.
     width : cells
         Median along the path.
-    width_scatter : relative
-        Robust standard deviation of the width along the path.
     branch : cells
         Length of the longest part of the skeleton that leaves the path.
     """
 
     path: Array
     width: float
-    width_scatter: float
     branch: float
 
     @property
@@ -110,20 +106,13 @@ def thick_part(mask: Mask, least: float) -> Mask:
     disc = _disc(least)
     if len(disc) <= _LARGE_DISC:
         return _morphology(mask, cv2.MORPH_OPEN, disc)
-    # The same by distances, whose time does not grow with the disc. Rough ones, a third of the time of exact ones, show
-    # where anything is that wide; only there and around are they exact.
-    radius, opened = len(disc) // 2, np.zeros_like(mask)
-    likely = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5) > _ROUGH_DISTANCE * radius
-    u, v, width, height = cv2.boundingRect(likely.astype(np.uint8))
-    if not width:
-        return opened
-    around = np.s_[max(v - radius - 2, 0) : v + height + radius + 2, max(u - radius - 2, 0) : u + width + radius + 2]
-    exact = cv2.distanceTransform(mask[around].copy(), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    core = (exact > radius) & likely[around]
-    if core.any():
-        outside = np.logical_not(core).astype(np.uint8)
-        opened[around] = cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius
-    return opened
+    # the same by distances, whose time does not grow with the disc
+    radius = len(disc) // 2
+    core = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius
+    if not core.any():
+        return np.zeros_like(mask)
+    away = cv2.distanceTransform(np.logical_not(core).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(away <= radius, np.uint8)
 
 
 def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, float] | None = None) -> list[Strip]:
@@ -141,9 +130,7 @@ def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, f
         if strip is not None:
             low, high = WIDTH_RATIO_RANGE if ratios is None else ratios
             if low * width <= strip.width <= high * width:
-                strips.append(
-                    Strip(strip.path + np.array([u - 1, v - 1]), strip.width, strip.width_scatter, strip.branch)
-                )
+                strips.append(replace(strip, path=strip.path + np.array([u - 1, v - 1])))
     return sorted(strips, key=lambda strip: -strip.length)
 
 
@@ -177,7 +164,6 @@ def join_strips(strips: list[Strip], width: float, *, gap: float, obstacle: Mask
         joined = Strip(
             np.vstack([first, _bridge(first[-1], second[0]), second]),
             float(share @ (a.width, b.width)),
-            float(share @ (a.width_scatter, b.width_scatter)),
             max(a.branch, b.branch),
         )
         strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
@@ -249,9 +235,7 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     depth = cv2.distanceTransform(piece, cv2.DIST_L2, 5)
     along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
     inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
-    middle = median(inner)
-    uneven = scatter(inner, middle) / max(middle, 1e-9)
-    return Strip(path, middle, uneven, _longest_branch(skeleton, vu[nodes], width))
+    return Strip(path, median(inner), _longest_branch(skeleton, vu[nodes], width))
 
 
 def _farthest(reach: Array) -> int:

@@ -8,9 +8,8 @@ import pytest
 from scipy.special import erfc
 
 from pipeline.vision.bearings import cover_size
-from pipeline.vision.bearings.axes import BearingHints, find_bearings, left_first
 from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
-from pipeline.vision.bearings.covers import find_again, find_cover, find_rim
+from pipeline.vision.bearings.covers import BearingHints, find_again, find_bearings, find_cover, find_rim, left_first
 from pipeline.vision.bearings.rim import SAME_RADIUS, Circle, Radius
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
@@ -179,7 +178,7 @@ def test_strips_that_end_alike_share_one_search(monkeypatch: pytest.MonkeyPatch)
         places.append(end)
         return find_cover(photo, end, Radius(radius, 0.01), 41.0)
 
-    monkeypatch.setattr("pipeline.vision.bearings.axes.find_cover", searched)
+    monkeypatch.setattr("pipeline.vision.bearings.covers.find_cover", searched)
     hints = BearingHints(cover_px=2.0 * radius)
     for shift in (0.0, 0.05, 0.3):  # radii; the second is the same end, the third another
         ends = tuple(rough_end(picture, side, radius) for side in (0, 1))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo

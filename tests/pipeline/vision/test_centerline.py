@@ -17,8 +17,7 @@ from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import render
 from pipeline.vision.render.ground import Ground
 from pipeline.vision.render.sheath import WHITE, Sheath
-from pipeline.vision.scale.chord import chord_frame
-from pipeline.vision.scale.plane import Lens, PlaneMap
+from pipeline.vision.scale.plane import Lens, PlaneMap, chord_frame
 from tests.pipeline.vision.bow_scene import (
     DIAMETER,
     LENGTH,

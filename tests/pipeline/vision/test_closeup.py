@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline.records import Rejected
-from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Curve, Scene, Sensor, Strand, render

@@ -12,8 +12,7 @@ from pipeline.vision.centerline.axes_of_series import told_by_others
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.path import fit_along
 from pipeline.vision.render import Curve
-from pipeline.vision.scale.chord import ChordFrame
-from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.scale.plane import ChordFrame, PlaneMap
 from rod.characteristic import Characteristic
 from tests.pipeline.vision.bow_scene import DIAMETER, LENGTH, bow
 from tests.rod.elastica import natural_chord, uniform_equilibrium

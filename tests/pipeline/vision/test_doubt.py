@@ -7,8 +7,7 @@ import numpy as np
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.render import Camera, ChessBoard
 from pipeline.vision.render.strand import Curve
-from pipeline.vision.scale.calibration import Calibration, from_number
-from pipeline.vision.scale.doubt import with_doubt_of_plane
+from pipeline.vision.scale.calibration import Calibration, from_number, with_doubt_of_plane
 from pipeline.vision.scale.plane_fit import USUAL_LENS, fit_views
 from tests.pipeline.vision.test_calibration import SQUARE, views_of
 

@@ -6,10 +6,9 @@ import pytest
 from pipeline.messages import Message
 from pipeline.records import LoadStep, Rejected
 from pipeline.vision.photo import Photo
-from pipeline.vision.picture_size import of_one_size
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.segmentation import find_cable
-from pipeline.vision.shots import Shot
+from pipeline.vision.shots import Shot, of_one_size
 
 NOTHING = np.empty(0)
 

@@ -22,3 +22,25 @@ def test_end_of_a_cable_is_not_taken_for_the_middle_of_a_cover_hardly_wider(slop
     photo = Photo("a", np.rint(grey).clip(0, 255).astype(np.uint8), 8)
     for off in (-0.4, 0.0, 0.4):
         assert find_cover(photo, CableEnd(end + off * outward, outward), Radius(7.1, 0.01), 8.9) is None
+
+
+@pytest.mark.parametrize("stub", [0.0, 16.0])
+@pytest.mark.parametrize("step", [0.0, 2.0])
+def test_pin_of_the_grounds_own_grey_is_found_by_the_hollow_in_which_it_cuts_the_cable_off(
+    step: float, stub: float
+) -> None:
+    """Its rim does not show; the cable may come out of it beyond, and a stub's own end is no rim."""
+    v, u = (np.mgrid[0:320, 0:640] / 4.0) - 0.375
+    outward, pin, radius, half = np.array([np.cos(0.3), np.sin(0.3)]), np.array([100.2, 52.3]), 15.0, 11.0
+    along = (u - pin[0]) * outward[0] + (v - pin[1]) * outward[1]
+    aside = (v - pin[1]) * outward[0] - (u - pin[0]) * outward[1]
+    seen = (along < (radius + stub if stub else 0.0)) & (np.abs(aside) < half)
+    drawn = np.where(seen, 60.0, 190.0)
+    drawn[np.hypot(along, aside) < radius] = 190.0 + step
+    grey = cv2.GaussianBlur(drawn, (0, 0), 4.0).reshape(80, 4, 160, 4).mean(axis=(1, 3))
+    grey += np.random.default_rng(5).normal(0.0, 3.0, grey.shape)
+    photo = Photo("a", np.rint(grey).clip(0, 255).astype(np.uint8), 8)
+    end = pin + (radius + stub if stub else -radius) * outward
+    found = find_cover(photo, CableEnd(end, outward), Radius(radius, 0.01), 2.0 * half)
+    assert found is not None
+    assert np.hypot(*np.subtract(found.center, pin)) < 2.0 * found.std < 1.5

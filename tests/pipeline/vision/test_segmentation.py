@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fixtures.photographed.renderer import photograph, random_look
 from pipeline.records import Rejected
-from pipeline.vision.bearings.axes import BearingHints
+from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing
@@ -128,7 +128,7 @@ def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
 def strip_of(*corners: tuple[float, float]) -> Strip:
     """A strip ten cells wide through the corners, points a cell apart."""
     legs = [np.linspace(a, b, int(np.hypot(*np.subtract(b, a)))) for a, b in pairwise(corners)]
-    return Strip(np.vstack(legs), 10.0, 0.0, 0.0)
+    return Strip(np.vstack(legs), 10.0, 0.0)
 
 
 @pytest.mark.parametrize(

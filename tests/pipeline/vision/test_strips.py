@@ -46,5 +46,5 @@ def test_branch_is_what_leaves_the_longest_path_by_more_than_a_width(branch):
 
 def test_a_flat_strip_of_unknown_width_shows_no_edges():
     offsets = np.arange(-22.0, 22.1)
-    flanks = find_flanks(np.zeros((90, 45), np.float32), offsets, 10.0, 1.0, known=False)
+    flanks = find_flanks(np.zeros((90, 45), np.float32), offsets, 10.0, known=False)
     assert np.isnan(flanks.left).all() and np.isnan(flanks.right).all()
