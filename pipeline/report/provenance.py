@@ -14,7 +14,7 @@ from pipeline.units import suited
 # Shown in their own places, not in the list of plain facts.
 APART = ("clock", "command", "inputs_sha256", "settings")
 
-RELATIVE = ("scale", "parallax")
+UNITS = {"scale": "-", "parallax": "-", "lens": "-", "tilt_along": "1/m", "tilt_across": "1/m"}
 """What is fitted besides the law as a share of itself; all else of that kind is in m."""
 
 
@@ -75,7 +75,6 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
         return []
     rows = [
         (words("fit_outcome"), words.said(part.said).sentence if part.advice else part.outcome),
-        (words("fit_iterations"), f"{part.iterations} ({words('exact')})"),
     ]
     if part.misfit is not None:
         misfit, force = part.misfit, force_unit(result, words)
@@ -93,11 +92,9 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
 
 
 def nuisance_rows(result: Result, words: Words) -> list[tuple[str, str]]:
-    """What was fitted besides stiffness and pre-curvature: what all steps share, then what a step adds."""
+    """What was fitted besides stiffness and pre-curvature."""
     rows = []
     for name, (value, std) in (result.inverse.nuisance if result.inverse else {}).items():
-        shared, _, step = name.partition("/")
-        label = words.known(f"nuisance_{shared}", shared) + (f", {words('step')} {step}" if step else "")
-        unit = words.unit("-" if shared in RELATIVE else "m", value, std)
-        rows.append((label, unit.text(value, std)))
+        unit = words.unit(UNITS.get(name, "m"), value, std)
+        rows.append((words.known(f"nuisance_{name}", name), unit.text(value, std)))
     return rows

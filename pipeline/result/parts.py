@@ -281,7 +281,6 @@ class InversePart(WayPart):
 
     reading: Literal["tangent"] = Field("tangent", description="f_EI is dm/dkappa")
     converged: bool = Field(description="whether the fit is to be trusted")
-    iterations: int = Field(0, description="of the fit")
     knots: list[KnotPart] = Field([], description="points of f_EI along the fitted law")
     misfit: MisfitPart | None = Field(None, description="how well the simulation explains the data")
     nuisance: dict[str, tuple[Number, Number]] = Field({}, description="fitted value and std, e.g. scale, length")

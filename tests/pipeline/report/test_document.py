@@ -188,13 +188,19 @@ def test_no_line_break_takes_a_quantity_apart(page):
 
 
 def test_what_was_fitted_besides_has_names_and_units(full_result):
-    fitted = {"length": (-4e-5, 9e-5), "scale": (0.0013, 0.0005), "left_along/3": (4.2e-6, 2.7e-6)}
+    fitted = {
+        "length": (-4e-5, 9e-5),
+        "scale": (0.0013, 0.0005),
+        "left_along": (4.2e-6, 2.7e-6),
+        "tilt_along": (0.01, 0.02),
+    }
     inverse = full_result.inverse.model_copy(update={"nuisance": fitted})
     rows = nuisance_rows(full_result.model_copy(update={"inverse": inverse}), Words("de"))
     assert rows == [
         ("Länge", "−40 ± 90\u00a0µm"),
         ("Maßstab", "0,13 ± 0,05\u00a0%"),
-        ("linke Achse, längs der Sehne, Schritt 3", "4,2 ± 2,7\u00a0µm"),
+        ("linke Achse, längs der Sehne", "4,2 ± 2,7\u00a0µm"),
+        ("Neigung der Kamera, längs der Sehne", "0,010 ± 0,020\u00a01/m"),
     ]
 
 

@@ -184,7 +184,6 @@ def ways(rng):
     inverse = InversePart(
         outcome="converged",
         converged=True,
-        iterations=9,
         pre_curvature_per_m=2.004,
         pre_curvature_std_per_m=0.013,
         supported_per_m=(2.0, 8.7),
