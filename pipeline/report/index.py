@@ -157,7 +157,9 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words, settings))
     shown = {row.state for row in rows}
-    page = environment().get_template("index.html").render(
+    # rows are drawn by a script too, from texts as they are; and narrow columns must break somewhere
+    engine = environment().overlay(finalize=lambda value: value)
+    page = engine.get_template("index.html").render(
         words=words,
         rows=[_cells(row, unit, words) for row in rows[:BLOCK]],
         unit=unit.symbol,

@@ -25,7 +25,7 @@ from tests.rod.elastica import uniform_equilibrium
 from tests.rod.virtual_cable import StickSlip, equilibrium, force_free
 from tests.rod.virtual_photo import bending_test, random_cable
 
-CABLES = int(os.environ.get("CABLEBEND_STUDY_CABLES", "5"))
+CABLES = int(os.environ.get("CABLEBEND_STUDY_CABLES", "8"))
 LENGTH = 0.2
 POINTS = PredictSettings().elements + 1
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)

@@ -81,7 +81,7 @@ def test_no_cable_is_called_impossible(EI, diameter):
 
 def test_the_figures_are_right():
     (finding,) = size_findings(0.2, 5e-3, steps(1000.0, 0.012), settings=SETTINGS)
-    EI = float(re.search(r"pi\^2 = ([\d.]+)\u00a0N m²", finding.message)[1])
+    EI = float(re.search(r"π² = ([\d.]+)\u00a0N m²", finding.message)[1])
     modulus = float(re.search(r"modulus of ([\d.e+]+) MPa", finding.message)[1])
     expected = 1000.0 * 0.2**2 / np.pi**2
     # both are printed to three digits, half of the last of which is at most 0.5 % of the number
