@@ -1,4 +1,4 @@
-"""The raw midline of one photo as independent data: block means along the normal, and the whitener of their noise.
+"""The raw midline of one photo as independent data: block means along the normal, and their noise.
 
 A photo holds a thousand and more midline sections whose errors are correlated over some ten pixels and share a slowly
 varying part (light). A hundred blocks know a bent cable as well as all of them: the mean over a block of width b keeps
@@ -88,11 +88,6 @@ class Midline:
     def factor(self) -> Array:
         """Lower triangular (b, b) m; ``factor @ factor.T = covariance``."""
         return np.asarray(np.linalg.cholesky(self.covariance), float)
-
-    @cached_property
-    def whitener(self) -> Array:
-        """Its inverse, (b, b) 1/m; ``whitener @ covariance @ whitener.T = 1``."""
-        return np.tril(np.linalg.inv(self.factor))
 
     @property
     def on_curve(self) -> Array:

@@ -1,6 +1,6 @@
 """The base model: what is fitted before anything is suspected.
 
-A cable of uniform pre-curvature K0 with a law of any form (`fits.laws`), on ideal bearings, the displacement counted
+A cable of uniform pre-curvature K0 with a law of any form (`laws`), on ideal bearings, the displacement counted
 from the mounted position, loading and unloading with one and the same law. Beside them, with the prior knowledge the
 measurement states: where the bearing axes are on all photos alike, how far the camera is from looking straight down
 through a true lens, the scale of the photos and the length of the cable. Every candidate cause is an addition to this.

@@ -1,6 +1,6 @@
 """The model that is fitted: the base model with causes added to it as terms, and how its parameter vector is laid out.
 
-The vector holds the parameters of the base model first (see `fits.base`), then the numbers of each term: its amount,
+The vector holds the parameters of the base model first (see `base`), then the numbers of each term: its amount,
 and whatever of its form (place, width) is tuned along. What a term does to the model is the business of its cause; here
 is only which number goes where, and how far it may go.
 """

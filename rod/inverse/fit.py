@@ -1,7 +1,7 @@
 """Fit of a model to an observation: Gauss-Newton on whitened residuals, damped where whole steps lead nowhere.
 
 What is fitted is an `extension.Extension`, the base model with or without causes added; rows and columns of the linear
-problem are those of `fits.sensitivities`. One iteration takes the first of these that lowers chi-square: the whole
+problem are those of `sensitivities`. One iteration takes the first of these that lowers chi-square: the whole
 step, a part of it, steps of rising damping (Levenberg, Marquardt). It ends when the linear model promises nothing more,
 when a step brought nothing, when it crawls, or when what is left could not save a model that lies too far behind.
 

@@ -1,7 +1,7 @@
 """Residual of a model against an observation, and how it moves with every parameter: the rows and columns of a fit.
 
 Rows: the whitened data in the order of `observation.Row`, then one row per piece of prior knowledge. Columns: whatever
-bends the cable by the implicit function theorem (`rod.sensitivity`), in one go for all parameters (`fits.bending`);
+bends the cable by the implicit function theorem (`rod.sensitivity`), in one go for all parameters (`bending`);
 what only load cell and camera change by the observers alone. Nothing is simulated anew but where a number changes the
 kind of the model (a load that keeps the mounted cable from lying free); then by difference quotients with warm starts.
 

@@ -59,7 +59,7 @@ def test_blocks_lose_next_to_nothing():
     """A constant push of all sections is known as well from the blocks as from every section."""
     shape = measured().steps[1].shape
     blocks = midline(shape)
-    known = np.sum((blocks.whitener @ np.ones(blocks.s.size)) ** 2)
+    known = np.sum(np.linalg.solve(blocks.factor, np.ones(blocks.s.size)) ** 2)
     gap = np.diff(shape.section_s)
     rho = np.exp(-gap / shape.correlation_length)
     # Information on a constant in a Markov process, section by section.
@@ -75,7 +75,7 @@ def test_block_means_lie_on_the_curve_not_inside_it():
     assert np.abs(-np.sin(blocks.theta) * (blocks.x - x) + np.cos(blocks.theta) * (blocks.y - y)).max() < 2e-6
 
 
-def test_whitener_needs_sections():
+def test_a_midline_needs_sections():
     shape = measured().steps[1].shape
     few = replace(shape, section_s=shape.section_s[:4], section_x=shape.section_x[:4], section_y=shape.section_y[:4])
     with pytest.raises(ValueError, match="do not make a shape"):
