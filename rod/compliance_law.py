@@ -257,7 +257,8 @@ class ComplianceLaw(LawOfBend):
         square, doubt = (by @ self.coefficients) ** 2, KNOWN**2 * np.sum((by @ covariance) * by, axis=1)
         size = square**1.5 / np.maximum(square + doubt, np.finfo(float).tiny)
         inside = (moment >= b.moments[0]) & (moment <= b.moments[-1])
-        return np.where(inside, size * b.abscissa(moment, 1), 0.0)
+        # between its points the abscissa may swing back where the law is hardly stiff at all
+        return np.where(inside, size * np.abs(b.abscissa(moment, 1)), 0.0)
 
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""

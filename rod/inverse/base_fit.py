@@ -18,7 +18,7 @@ from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, start
 from rod.inverse.extension import Extension
 from rod.inverse.fit import ITERATIONS, Fit, fit, fit_from
-from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, turned
+from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
 from rod.inverse.noise import calibrate_photo_noise
 from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
 from rod.inverse.prediction import Facts
@@ -133,7 +133,8 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
     rise, known, size = base.law.basis.law(fitted.vector[:count]), fitted.covariance[:count, :count], count
     if base.law.over != over:
         size = COEFFICIENTS
-        rise = turned(law, visited, over)
+        assert isinstance(law, StiffnessLaw)
+        rise = over_moments(law, visited)
         known = np.zeros((rise.basis.size, rise.basis.size))
     if over == "moment":
         visited = law.moment(visited, np.zeros(1))

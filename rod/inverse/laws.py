@@ -223,11 +223,10 @@ FINE = 256
 """Coefficients of a law on its way from one abscissa to another: a plateau is hardly anything of the moments."""
 
 
-def turned(law: FreeLaw, bends: Array, over: Abscissa) -> ComplianceLaw:
-    """The rise of a law over the moments of given bends (n,) 1/m, or over these bends."""
+def over_moments(law: StiffnessLaw, bends: Array) -> ComplianceLaw:
+    """The same law as one over the moments of the given bends (n,) 1/m."""
     bend = np.linspace(min(float(bends.min()), 0.0), max(float(bends.max()), 0.0), 20 * FINE)
-    moment, f = law.bound(np.zeros(1))(bend)
-    at, rate, unit = (bend, f, law.stiffness_scale) if over == "bend" else (moment, 1.0 / f, 1.0 / law.stiffness_scale)
-    basis = moment_basis(float(at[0]), float(at[-1]), unit=unit, size=FINE)
-    log_rate = np.interp(basis.moments, at, np.log(rate / unit))
-    return basis.law(np.asarray(np.linalg.lstsq(basis.at_ends, log_rate, rcond=None)[0]))
+    moment, f = law.rise.bend(bend), law.rise.compliance(bend)  # told as the bend over the moment, see `StiffnessLaw`
+    basis = moment_basis(float(moment[0]), float(moment[-1]), unit=1.0 / law.stiffness_scale, size=FINE)
+    log_c = np.interp(basis.moments, moment, np.log(law.stiffness_scale / f))
+    return basis.law(np.asarray(np.linalg.lstsq(basis.at_ends, log_c, rcond=None)[0]))

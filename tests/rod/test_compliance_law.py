@@ -6,8 +6,10 @@ from scipy.integrate import quad
 from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
+from rod.inverse.laws import over_moments
 from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
 from rod.measured_law import propagated
+from rod.stiffness_law import StiffnessLaw
 
 RNG = np.random.default_rng(3)
 RIPPLE = 0.2
@@ -248,3 +250,18 @@ def test_bands_of_all_readings_are_those_of_their_derivatives():
         assert np.allclose(std[away], exact[away], rtol=1e-6)
     assert law.secant_std[~away] == pytest.approx(law.tangent_std[~away])
     assert law.pre_curvature_std == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("size", [3.0, 6.0, 10.0])
+def test_an_abscissa_along_a_law_that_is_hardly_stiff_at_all_rises(size):
+    """A fit on its way to nowhere made such laws, whose own abscissa swings back between its points."""
+    start = moment_basis(0.0, 10.0, unit=5e-3, size=16)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        law = StiffnessLaw(start.law(size * rng.standard_normal(16)))
+        rise, known = over_moments(law, np.array([0.0, 10.0])), 0.0
+        for _ in range(4):
+            moments = law.rise.bend(np.array([0.0, 10.0]))
+            basis = refreshed(rise, known * np.eye(rise.basis.size), *moments, size=24)
+            assert np.all(np.diff(basis.moments) > 0.0)
+            rise, known = basis.law(basis.projected(rise) + 0.5 * size * rng.standard_normal(24)), 1e-2
