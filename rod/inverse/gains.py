@@ -84,19 +84,17 @@ def loaded_pre_curvature(
     """K0 and its standard deviation, 1/m, without the photos of the steps ``rest``: a witness of its own."""
     at = fitted.extension.base.pre_curvature_index
     value, J = linearised(observation, fitted, np.zeros((len(fitted.residual), 0)))
-    count = observation.rows.count
-    kept = ~np.isin(observation.rows.step, list(rest))
-    if not kept.all():
-        alone = observe(
-            test, photo_noise=observation.photo_noise, functions=functions, without_photos=rest, without_forces=rest
-        )
-        weight = weights(observation, fitted)
+    count, kept = observation.rows.count, ~np.isin(observation.rows.step, list(rest))
+    if kept.all():
+        return float(fitted.vector[at]), float(np.sqrt(rows_posterior(fitted, value, J).covariance[at, at]))
+    alone = observe(
+        test, photo_noise=observation.photo_noise, functions=functions, without_photos=rest, without_forces=rest
+    )
+    weight = weights(observation, fitted)
 
-        def without(rows: Array) -> Array:
-            scaled = (rows[:count].T / weight).T
-            left = alone.joined(observation.separated(scaled)[kept])
-            return np.concatenate([(left.T * weight[kept]).T, rows[count:]])
+    def without(rows: Array) -> Array:
+        left = alone.joined(observation.separated((rows[:count].T / weight).T)[kept])
+        return np.concatenate([(left.T * weight[kept]).T, rows[count:]])
 
-        value, J = without(value), without(J)
-    found = rows_posterior(fitted, value, J)
+    found = rows_posterior(fitted, without(value), without(J))
     return float(found.mean[at]), float(np.sqrt(found.covariance[at, at]))

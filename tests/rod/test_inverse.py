@@ -110,8 +110,7 @@ def test_without_the_force_free_photo_the_pre_curvature_is_still_found():
     assert abs(result.pre_curvature - LAW.K0) < 3 * result.pre_curvature_std
     # ten times that with the photo, 0.0005, and less than the pre-curvature itself
     assert 0.005 < result.pre_curvature_std < 0.3
-    settled = 0.05 * result.pre_curvature_std
-    assert result.loaded_pre_curvature == pytest.approx(result.pre_curvature, abs=settled)
+    assert result.loaded_pre_curvature == pytest.approx(result.pre_curvature)
 
 
 def test_the_force_free_photo_sharpens_the_pre_curvature_and_is_left_out_of_the_loaded_one():
@@ -243,7 +242,7 @@ def test_a_wrong_length_ends_in_an_outcome():
     test = measured()
     short = estimate(replace(test, length=0.17, length_std=1e-5))
     lost = (InverseOutcome.NO_EQUILIBRIUM, InverseOutcome.LIMIT_POINT)
-    assert short.outcome in lost or weights(short.observation, short.fitted).min() < 0.5
+    assert short.outcome in lost or weights(short.observation, short.fitted).min() < 1.0 / 3.0
 
 
 def test_without_any_photo_the_outcome_says_what_to_do():
