@@ -29,9 +29,8 @@ Array = NDArray[np.float64]
 LEAST_SECTIONS = 8
 """Raw midline points that make a shape."""
 
-BLOCKS = 96
-"""Of one photo: four for each of the functions by which the inverse problem compares shapes, so that noise and misfit
-are measured apart."""
+BLOCKS = 160
+"""Of one photo, for both ways to the law."""
 
 
 @dataclass(frozen=True, eq=False)

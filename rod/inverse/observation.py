@@ -34,12 +34,15 @@ from rod.inverse.noise import (
 )
 from rod.inverse.prediction import Prediction
 from rod.measurement import MeasuredTest
-from rod.midline import LEAST_SECTIONS, NOWHERE, Midline, midline
+from rod.midline import BLOCKS, LEAST_SECTIONS, NOWHERE, Midline, midline
 
 Array = NDArray[np.float64]
 
 HOLD_NOISE_LEVEL = 1e-3
 """Probability; holds have noise levels of their own only if equality is refuted at this level."""
+
+COARSE_BLOCKS = 96
+"""Block means of a photo for that few functions, four for each and more: noise and misfit are measured apart."""
 
 SHAPE_FUNCTIONS = 20
 """Legendre polynomials a photo, which resolve a kink to L / 20, and seven photos stay a problem of 150 rows."""
@@ -233,7 +236,8 @@ def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise, functions: in
     step = test.steps[index]
     assert step.chord is not None
     seen = step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
-    sections = midline(step.shape) if seen and step.shape is not None else NOWHERE
+    blocks = COARSE_BLOCKS if functions == SHAPE_FUNCTIONS else BLOCKS
+    sections = midline(step.shape, blocks=blocks) if seen and step.shape is not None else NOWHERE
     basis = smooth_basis(sections.s, test.length, functions=min(functions, len(sections.s) // 2))
     stated = step.chord_std if step.chord_std is not None else CHORD_STD * step.chord
     whiten = _whitening(step.chord, stated, sections, basis, noise)
