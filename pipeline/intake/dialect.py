@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import math
 import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -177,6 +178,8 @@ def decimal_sign(
     separator: str,
     decimal: Decimal | None = None,
     others: Callable[[], Iterable[str]] = tuple,
+    travels: Iterable[str] = (),
+    farthest: float = math.inf,
 ) -> Decimal:
     """The decimal sign of a file from all its number cells.
 
@@ -189,6 +192,10 @@ def decimal_sign(
     others : callable
         Gives the remaining cells of the table. They are asked only where every force and displacement can be read both
         ways, and believed only where they agree.
+    travels : iterable of str
+        Displacements; asked last. Those that would lie farther apart than ``farthest`` as thousands are fractions.
+    farthest : float
+        In the unit of the log.
 
     Raises
     ------
@@ -212,6 +219,11 @@ def decimal_sign(
     told = {_decisive(cell) for cell in others()} - {None}
     if len(told) == 1:
         return "," if "," in told else "."
+    mark: Decimal = "," if "," in marked[0] else "."
+    as_thousands = [to_number(cell, "." if mark == "," else ",") for cell in travels]
+    values = [value for value in as_thousands if value is not None]
+    if values and max(values) - min(values) > farthest:
+        return mark
     raise InputError(Message("log/ambiguous-decimal", number=repr(smooth(marked[0]))), path=path)
 
 

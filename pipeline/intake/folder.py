@@ -7,6 +7,7 @@ finding and the rest of the specimen is read.
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 from collections.abc import Iterable, Iterator
@@ -176,7 +177,8 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     # what is wrong with it is told with the rest of the description
     asked = file.log if file else Complaints().kept(asked_of_log, source, settings) if source else None
     place = wrong.kept(_log_path, folder, asked, source, settings) if source and asked else None
-    log = wrong.kept(read_force_log, place[0], asked, settings) if place and asked else None
+    length = file.length_m if file else math.inf
+    log = wrong.kept(read_force_log, place[0], asked, settings, length) if place and asked else None
     if asked is None and not candidate_logs(folder):
         wrong.note(_no_log(folder))
     calibration = file.camera.calibration if file else None

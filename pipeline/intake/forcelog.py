@@ -7,6 +7,7 @@ bearing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,7 @@ class ForceLog:
     findings: tuple[Finding, ...]
 
 
-def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> ForceLog:
+def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: float = math.inf) -> ForceLog:
     """Read a force log.
 
     Parameters
@@ -41,6 +42,8 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> Force
     spec : LogSpec
         What the user says about it in ``specimen.toml``.
     settings : IntakeSettings
+    length : m
+        Of the cable. No displacement is larger, which tells a fraction from a thousand where nothing else does.
 
     Returns
     -------
@@ -56,7 +59,7 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings) -> Force
         read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
     )
     columns, rows = find_columns(text, spec, path=path, settings=settings)
-    samples, columns = read_samples(rows, columns, spec, path=path, settings=settings)
+    samples, columns = read_samples(rows, columns, spec, path=path, settings=settings, length=length)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
     check_response(steps, path=path, settings=settings)
     return ForceLog(steps, columns, encoding, (*_reading(columns, encoding, path), *samples.findings, *findings))

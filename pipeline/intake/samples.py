@@ -7,6 +7,7 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
+import math
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -81,9 +82,9 @@ class Samples:
 
 
 def read_samples(
-    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings
+    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings, length: float = math.inf
 ) -> tuple[Samples, Columns]:
-    """Convert the rows below the header.
+    """Convert the rows below the header; ``length`` (m) of the cable is farther than it was pushed.
 
     Returns
     -------
@@ -111,6 +112,8 @@ def read_samples(
         separator=columns.separator,
         decimal=_decimal(spec),
         others=lambda: read.others(_told(columns)),
+        travels=displacement,
+        farthest=length / columns.factor["displacement"],
     )
     numbers = _Numbers(decimal, columns, path, lines, settings.number_limit)
     steps = _carry_down(table["step"])[0] if "step" in table else []

@@ -180,6 +180,20 @@ def test_what_no_column_decides_is_refused(cells, tmp_path):
     assert refused.value.code == "log/ambiguous-decimal"
 
 
+def test_no_cable_is_pushed_farther_than_it_is_long(tmp_path):
+    # 1,500 to 4,250 mm lie 2.75 mm or 2.75 m apart, and the cable has a quarter of a metre
+    path = tmp_path / "force.csv"
+    path.write_text(AMBIGUOUS.format("1", "", "2", ""), encoding="utf-8")
+    log = read_force_log(path, LogSpec(), SETTINGS, 0.25)
+    assert log.steps[1].displacement_m == pytest.approx(4.25e-3)
+    assert log.steps[1].forces_N[0] == pytest.approx(2.902e-3)
+    # 1500 and 4250 um are travels of such a cable, so nothing decides
+    path.write_text(AMBIGUOUS.format("1", "", "2", "").replace("[mm]", "[µm]"), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_force_log(path, LogSpec(), SETTINGS, 0.25)
+    assert refused.value.code == "log/ambiguous-decimal"
+
+
 def test_a_log_without_header_by_column_numbers(tmp_path):
     rows = "\n".join(PLAIN.splitlines()[1:])
     columns = {"step": 1, "branch": 2, "time": 3, "displacement": 4, "force": 5, "image": 6}
