@@ -203,6 +203,9 @@ class Prediction:
         Arc length of the points.
     x, y, theta : (n, v) m, rad
         Shapes in the chord frame, as the camera sees them.
+    at_once : (n,) N or None
+        ``force`` before anything of it relaxed: what relaxes at several rates does so side by side. None where nothing
+        does.
     """
 
     force: Array
@@ -212,6 +215,7 @@ class Prediction:
     x: Array
     y: Array
     theta: Array
+    at_once: Array | None = None
 
     @classmethod
     def varied(cls, each: Sequence[Prediction]) -> Prediction:

@@ -3,7 +3,7 @@
     force_offset  shown = F + a
     force_gain    shown = F (1 + a)
     force_drift   shown = F + a t                            t: since the first hold began
-    relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; tau is scanned
+    relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; sums of such forms
 
 Relaxation belongs to the cable, but as it scales moments everywhere alike it changes forces only.
 """
@@ -103,6 +103,8 @@ class Relaxation(Cause):
     name = "relaxation"
     unit = "-"
     sign = 1
+    combines = True
+    additive = True
     limited = True
     seat = "cable"
 
@@ -114,13 +116,17 @@ class Relaxation(Cause):
         """Relaxation times from a tenth of a hold to three holds; each hold by itself, or all with a memory of others.
 
         What a cable has lost in one hold it does not win back in the next: a bow that grows by little loses little.
+        A cable of several materials has several times: its relaxation is a sum of forms.
         A log without times is taken as sampled evenly from its first row to its last.
         """
         span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
         if span <= 0.0:
             return ()
         reach = (0.02 * span, 10.0 * span)
-        forms = (Variant("decaying in every hold"), Variant("decaying since every change of the bow", width=1.0))
+        forms = (
+            Variant("decaying in every hold"),
+            Variant("decaying since every change of the bow", width=1.0, setting="memory"),
+        )
         return tuple(
             replace(form, at=share * span, tuned=("at",), at_range=reach)
             for form in forms
@@ -130,25 +136,28 @@ class Relaxation(Cause):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time, t since the hold began.
 
-        With a memory (``width`` 1) it is the changes of the force from hold to hold that decay so, each since its own
-        hold began: a standard linear solid, by Boltzmann's superposition.
+        With a memory (``width`` 1) it is the changes of the moment, force times bow, from hold to hold that decay so,
+        each since its own hold began: a standard linear solid, by Boltzmann's superposition.
         """
 
-        def left(since: Array) -> Array:
-            return np.asarray(1.0 - amount * (1.0 - np.exp(-since / variant.at)))
-
-        if not variant.width:
-            return model.observed(shown(lambda force, time, begin: force * left(time)))
+        def lost(since: Array) -> Array:
+            return np.asarray(-amount * np.expm1(-since / variant.at))
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
-            change = np.diff(prediction.force, prepend=0.0, axis=-1)
+            at_once = prediction.force if prediction.at_once is None else prediction.at_once
+            bow = np.maximum(np.max(np.abs(prediction.y), axis=-1), 1e-9 * facts.length)
+            change = np.diff(at_once * bow, prepend=0.0, axis=-1)
 
-            def lost(k: int, times: Array) -> Array:
+            def taken(k: int, times: Array) -> Array:
+                if not variant.width:
+                    return np.asarray(at_once[..., k, None] * lost(times))
                 since = facts.clock[k] + times - facts.clock[: k + 1, None]
-                return np.asarray(change[..., : k + 1] @ (1.0 - left(since)))
+                return np.asarray(change[..., : k + 1] @ lost(since) / bow[..., k, None])
 
-            samples = [held - lost(k, facts.hold_times[k]) for k, held in enumerate(prediction.samples)]
-            photo = [lost(k, facts.photo_time[k : k + 1]) for k in range(len(samples))]
-            return replace(prediction, force=prediction.force - np.concatenate(photo, axis=-1), samples=tuple(samples))
+            samples = tuple(held - taken(k, facts.hold_times[k]) for k, held in enumerate(prediction.samples))
+            photo = [taken(k, facts.photo_time[k : k + 1]) for k in range(len(samples))]
+            return replace(
+                prediction, force=prediction.force - np.concatenate(photo, axis=-1), samples=samples, at_once=at_once
+            )
 
         return model.observed(observer)

@@ -120,11 +120,12 @@ def _begun_unseen(fitted: Fit) -> list[NDArray[np.float64]]:
     """What forces (n,) N may have lost before the first sample of their holds, where the cable relaxes."""
     extension, forces = fitted.extension, np.array([step.force for step in fitted.run.steps])
     terms = [extension.formed(fitted.vector, k) for k in range(len(extension.terms))]
-    return [
-        lost_unseen(fitted.amount(k)[0], term.variant, extension.facts) * forces
+    lost = [
+        lost_unseen(fitted.amount(k)[0], term.variant, extension.facts)
         for k, term in enumerate(terms)
         if isinstance(term.cause, Relaxation)
     ]
+    return [sum(lost) * forces] if lost else []
 
 
 def left_out(bench: Workbench) -> tuple[list[int], list[int]]:
