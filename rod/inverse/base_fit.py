@@ -1,13 +1,12 @@
 """The base model fitted to a test: the start of every inverse problem, with and without causes that extend it.
 
 Strategy: a rough start by what photos show over the moment P y, or a constant; where no force-free photo holds K0,
-starts on both sides of it; the photos' noise by what is faster along the cable than any misfit; and once more, with the
-abscissa of the law laid along the law found.
+a start on the other side of straight; in each valley the abscissa of the law laid along the law found, as often as that
+brings something (`settled`); the photos' noise by what is faster along the cable than any misfit; and all once more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, start
 from rod.inverse.extension import Extension
-from rod.inverse.fit import ITERATIONS, Fit, fit, fit_from
+from rod.inverse.fit import CRAWL_FAR, ITERATIONS, Fit, fit, fit_from
 from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
 from rod.inverse.noise import calibrate_photo_noise
 from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
@@ -27,9 +26,6 @@ from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
-
-SIDE = 0.15
-"""Of the range of curvature: how far to both sides of K0 a second valley is looked for."""
 
 
 class BaseFit(NamedTuple):
@@ -78,7 +74,7 @@ def base_fit(
     """
     observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
     base = replace(start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin), elements=elements)
-    fitted = _first_fit(observation, base, facts)
+    fitted = min((settled(observation, one) for one in _valleys(observation, base, facts)), key=_cost)
     if fitted.run.prediction is None or not observation.photos:
         return BaseFit(observation, fitted)
     if calibrated:
@@ -93,36 +89,61 @@ def base_fit(
     here = fitted.extension, fitted.vector
     # laid along itself the law moves a little, and a cable that was about to snap over may do so
     again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))
-    return BaseFit(observation, next((found for found in again if found.run.prediction is not None), fitted))
+    fitted = next((found for found in again if found.run.prediction is not None), fitted)
+    return BaseFit(observation, settled(observation, fitted))
 
 
-def _first_fit(observation: Observation, base: Base, facts: Facts) -> Fit:
-    """The best fit from the law and K0 that photos show, or from a constant law, and from both sides of its K0."""
-    best: Fit | None = None
-
-    def better(vector: Array) -> Fit:
-        found = fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS)
-        fits = found.run.prediction is not None and (best is None or found.chi2 < best.chi2)
-        return found if fits or best is None else best
-
+def _valleys(observation: Observation, base: Base, facts: Facts) -> list[Fit]:
+    """Fits from the law and K0 that photos show, or from a constant law, and from the K0 of the other side."""
+    found: list[Fit] = []
     for vector in (base.as_seen(), base.neutral()):
-        best = better(vector)
-        if best.converged:
+        found.append(fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS))
+        if found[-1].converged:
             break
-    assert best is not None
-    if best.run.prediction is not None and "mounted" not in facts.branch:
-        for vector in _beside(base, best.vector, SIDE * facts.curvature_scale):
-            best = better(vector)
-    return best
+    best = min(found, key=_cost)
+    if best.run.prediction is None or "mounted" in facts.branch:
+        return [best]
+    # a cable bent to the other side at rest that has snapped over shows nearly the same shapes under load
+    mirrored, at = best.vector.copy(), base.pre_curvature_index
+    assert at is not None  # only a photo at rest holds it
+    mirrored[at] *= -1.0
+    other = fit(observation, Extension(base, facts), mirrored, iterations=2 * ITERATIONS)
+    apart = (other.vector[at] - best.vector[at]) ** 2 > best.covariance[at, at]
+    return [best, other] if apart and other.run.prediction is not None else [best]
 
 
-def _beside(base: Base, vector: Array, apart: float) -> Iterator[Array]:
-    """The vector with its K0 moved to both sides, 1/m."""
-    at = base.pre_curvature_index
-    for shift in () if at is None else (-apart, apart):
-        moved = vector.copy()
-        moved[at] += shift
-        yield moved
+def _cost(fitted: Fit) -> float:
+    return fitted.chi2 if fitted.run.prediction is not None else np.inf
+
+
+PAYS, ATTEMPTS = 16.0, 3
+"""Chi-square (4 sigma) that a law laid along itself must bring to be laid once more, and how often at most."""
+
+
+def settled(observation: Observation, fitted: Fit) -> Fit:
+    """A fit gone on with where it ran out of steps, or where its law is pulled by what is known of its form.
+
+    The abscissa lies along the law that a fit began with, and the law found may bend elsewhere: a knee that none was
+    there is pulled to a smooth law by 10 sigma. A K0 of the other side, or a cause, then looks likelier than it is.
+    """
+    for _ in range(ATTEMPTS):
+        if fitted.run.prediction is None or (fitted.converged and not _law_is_pulled(fitted)):
+            break
+        start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
+        further = fit_from(observation, *start, fitted)
+        gained = fitted.chi2 - _cost(further)
+        if gained > 0.0:
+            fitted = further
+        if gained < max(PAYS, CRAWL_FAR * fitted.chi2):
+            break
+    return fitted
+
+
+def _law_is_pulled(fitted: Fit) -> bool:
+    """Whether what is known of the law's form pulls at its numbers by more than a standard deviation each (rms)."""
+    base, known = fitted.extension.base, fitted.residual[-len(fitted.extension.prior) :]
+    pull = known[base.known : len(base.prior)]
+    return bool(pull @ pull > pull.size)
 
 
 def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:

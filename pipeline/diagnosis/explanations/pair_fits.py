@@ -13,15 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, with_more_forms
+from pipeline.diagnosis.explanations.forms import with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from rod.inverse.base_fit import laid_along
 from rod.inverse.extension import Extension
-from rod.inverse.fit import Fit, fit_from
+from rod.inverse.fit import fit_from
 
 
 def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
@@ -103,34 +102,3 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
 
 IN_ANY_FORM = 2
 """Pairs, the best first, that get forms with a place of their own; time."""
-
-
-def settled(bench: Workbench, pair: Explanation) -> Explanation:
-    """An explanation fitted on where its fit ran out of steps, or where its law is pulled by what is known of its form.
-
-    Beside a half-way cause scores mislead. The abscissa lies along the law of the base model, which bends to hide what
-    a cause now explains: a knee that is none there was pulled to a smooth law by 10 sigma, and told as unexplained.
-    """
-    fitted = pair.fitted
-    for _ in range(ATTEMPTS):
-        if fitted.converged and not _law_is_pulled(fitted):
-            break
-        start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
-        further = fit_from(bench.observation, *start, fitted)
-        gained = fitted.chi2 - further.chi2 if further.run.prediction is not None else 0.0
-        if gained > 0.0:
-            fitted = further
-        if gained < SHAPE_GAIN:
-            break
-    return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
-
-
-def _law_is_pulled(fitted: Fit) -> bool:
-    """Whether what is known of the law's form pulls at its numbers by more than a standard deviation each (rms)."""
-    base, known = fitted.extension.base, fitted.residual[-len(fitted.extension.prior) :]
-    pull = known[base.known : len(base.prior)]
-    return bool(pull @ pull > pull.size)
-
-
-ATTEMPTS = 3
-"""Fits at most that go on where the last one ended too early."""

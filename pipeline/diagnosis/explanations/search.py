@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
-from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, settled, together, with_all_forms
+from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -26,6 +26,7 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
+from rod.inverse.base_fit import settled
 from rod.inverse.fit import fit_from
 
 MATTERS = 0.1
@@ -65,10 +66,14 @@ class Search:
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        best = [settled(self.bench, one) for _, one in new[:LIKELIEST]]
+        best = [self._settled(one) for _, one in new[:LIKELIEST]]
         self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
         self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
         return [*best, *(one for _, one in new[LIKELIEST:])]
+
+    def _settled(self, one: Explanation) -> Explanation:
+        fitted = settled(self.bench.observation, one.fitted)
+        return one if fitted is one.fitted else explanation_of(one.causes, self.bench.base, fitted)
 
     def singles(self) -> list[Explanation]:
         """Refit causes that matter or come near the best score; all others where something else is likelier than these.
