@@ -219,13 +219,15 @@ def start(
     exact: float = 0.0,
     near: MeasuredLaw | None = None,
     begin: tuple[float, float] | None = None,
+    side: float | None = None,
 ) -> Base:
     """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
     The law is one of any form, or a spline of ``points``. Where the moments show none it begins with one that was
-    measured otherwise (``near``); with ``begin`` (N m^2, 1/m) given it is that constant EI and K0. A displacement that
-    is known to ``exact`` (m) or better has no error of its own.
+    measured otherwise (``near``); with ``begin`` (N m^2, 1/m) given it is that constant EI and K0, with ``side`` (1/m)
+    the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or better has no error of its
+    own.
 
     Raises
     ------
@@ -240,15 +242,16 @@ def start(
     stiffness = float(1.0 / slope)
     if begin is not None:
         stiffness, rest = begin
+    rest = rest if side is None else side
     law: Law = FewPoints(np.linspace(0.0, reach, points), stiffness)
     seen = None
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
-        shown = None if begin is not None else as_photographed(m, K, unit=stiffness)
+        shown = None if begin is not None else as_photographed(m, K, unit=stiffness, rest=side)
         # from the other side of straight a law with an early knee is never found; else the line will do
         at_rest = (step.shape for step in test.steps if step.branch == "mounted" and step.shape is not None)
         told = any(np.median(shape.kappa) * rest > 0.0 for shape in at_rest)
-        if shown is None and near is not None and not told:
+        if shown is None and near is not None and side is None and not told:
             measured = as_measured(near, unit=stiffness)
             shown = measured if measured is not None and measured[2] * rest < 0.0 else None
         if shown is not None:
@@ -270,6 +273,18 @@ def start(
         moved_std=facts.displacement_std[list(moved)],
         moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),
     )
+
+
+def bent_at_rest(test: MeasuredTest) -> float | None:
+    """Size of K0, 1/m, by how far apart the axes stood at rest; None where nobody tells."""
+    chords = [step.chord for step in test.steps if step.branch == "mounted" and step.chord is not None]
+    logged = [(step.chord, step.displacement) for step in test.steps]
+    chords = chords or [chord + moved for chord, moved in logged if chord is not None and moved is not None]
+    if not chords:
+        return None
+    half_turn = np.linspace(0.0, np.pi, 2001)
+    found = np.interp(-float(np.mean(chords)) / test.length, -np.sinc(half_turn / np.pi), half_turn)
+    return float(found) * 2.0 / test.length
 
 
 def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: float) -> float:

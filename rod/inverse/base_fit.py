@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
-from rod.inverse.base import ELEMENTS, Base, start
+from rod.inverse.base import ELEMENTS, Base, bent_at_rest, start
 from rod.inverse.extension import Extension
 from rod.inverse.fit import CRAWL_FAR, ITERATIONS, Fit, fit, fit_from
 from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
@@ -73,8 +73,19 @@ def base_fit(
         If no step has both a photo and a force.
     """
     observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
-    base = replace(start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin), elements=elements)
-    fitted = min((settled(observation, one) for one in _valleys(observation, base, facts)), key=_cost)
+
+    def begun(side: float | None = None) -> Base:
+        base = start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin, side=side)
+        return replace(base, elements=elements)
+
+    valleys = [settled(observation, _first(observation, begun(), facts))]
+    if facts.rest_side == "natural" and valleys[0].run.prediction is not None:
+        # a cable bent to the other side at rest that has snapped over shows nearly the same shapes under load
+        bent = bent_at_rest(test) or abs(_rest(valleys[0]))
+        for side in (bent, -bent):
+            one = settled(observation, _first(observation, begun(side), facts))
+            valleys += [one] if one.run.prediction is not None and all(_apart(one, two) for two in valleys) else []
+    fitted = min(valleys, key=_cost)
     if fitted.run.prediction is None or not observation.photos:
         return BaseFit(observation, fitted)
     if calibrated:
@@ -93,23 +104,25 @@ def base_fit(
     return BaseFit(observation, settled(observation, fitted))
 
 
-def _valleys(observation: Observation, base: Base, facts: Facts) -> list[Fit]:
-    """Fits from the law and K0 that photos show, or from a constant law, and from the K0 of the other side."""
+def _first(observation: Observation, base: Base, facts: Facts) -> Fit:
+    """The best fit from the law and K0 that photos show, or from a constant law where that does not converge."""
     found: list[Fit] = []
     for vector in (base.as_seen(), base.neutral()):
         found.append(fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS))
         if found[-1].converged:
             break
-    best = min(found, key=_cost)
-    if best.run.prediction is None or "mounted" in facts.branch:
-        return [best]
-    # a cable bent to the other side at rest that has snapped over shows nearly the same shapes under load
-    mirrored, at = best.vector.copy(), base.pre_curvature_index
+    return min(found, key=_cost)
+
+
+def _rest(fitted: Fit) -> float:
+    return fitted.extension.base.pre_curvature(fitted.vector)
+
+
+def _apart(one: Fit, other: Fit) -> bool:
+    """Whether a fit lies in another valley: its K0 more than a standard deviation away, or its chi-square lower."""
+    at = other.extension.base.pre_curvature_index
     assert at is not None  # only a photo at rest holds it
-    mirrored[at] *= -1.0
-    other = fit(observation, Extension(base, facts), mirrored, iterations=2 * ITERATIONS)
-    apart = (other.vector[at] - best.vector[at]) ** 2 > best.covariance[at, at]
-    return [best, other] if apart and other.run.prediction is not None else [best]
+    return bool((_rest(one) - _rest(other)) ** 2 > other.covariance[at, at] or one.chi2 < other.chi2 - 1.0)
 
 
 def _cost(fitted: Fit) -> float:

@@ -2,7 +2,8 @@
 
 The discrete rod is fitted to the midlines and to the forces of all steps at once, each residual divided by its standard
 deviation (Eq. (7) with statistical weights in place of w; the paper's own objective is in `rod.paper_fit`). The
-chords of the photos drive the simulation, and where there is no photo the displacement log does. What is fitted:
+chords of the photos drive the simulation, and where there is no photo the displacement log does. Without a force-free
+photo it is the log that tells where the axes stood at rest, unless that contradicts the photos. What is fitted:
 `rod.inverse.base`; how: `rod.inverse.base_fit`; the law as the mean over what is not known of its form:
 `rod.inverse.mean_law`. A force-free photo is held against the arc of curvature K0; its force says something about the
 load cell, nothing about the cable, and is left out. Where the simulation cannot follow the data within their noise, the
@@ -25,12 +26,12 @@ import numpy as np
 from rod.compliance_law import ComplianceLaw
 from rod.equilibrium import Outcome
 from rod.inverse.base import ELEMENTS, measured_curvatures
-from rod.inverse.base_fit import base_fit, law_of
+from rod.inverse.base_fit import BaseFit, base_fit, law_of
 from rod.inverse.fit import Fit
 from rod.inverse.gains import gains, loaded_pre_curvature
 from rod.inverse.laws import FreeLaw
 from rod.inverse.mean_law import linearised, mean_law, moved_by_forces, rows_posterior, weights
-from rod.inverse.observation import KINDS, Observation
+from rod.inverse.observation import KINDS, ZERO_STD, Observation
 from rod.inverse.prediction import facts_of
 from rod.measured_law import POINTS, Array, MeasuredLaw, propagated
 from rod.measurement import MeasuredStep, MeasuredTest
@@ -188,28 +189,48 @@ def estimate(
     """
     if len({step.step for step in test.steps}) < len(test.steps):
         raise ValueError("every step of a test needs a number of its own")
-    test = _driven(replace(test, steps=tuple(step for step in test.steps if _tells(step))))
+    test, at_rest = _driven(test)
     rest = frozenset(i for i, step in enumerate(test.steps) if step.branch == "mounted")
     if not any(step.shape is not None and step.force != 0.0 for i, step in enumerate(test.steps) if i not in rest):
         return Estimate(InverseOutcome.NO_DATA)
     curvatures, moments = measured_curvatures(test)
     if np.corrcoef(moments, curvatures)[0, 1] < OPPOSITE:
         return Estimate(InverseOutcome.OPPOSITE_FORCES)
-    observation, fitted = base_fit(
-        test,
-        facts_of(test),
-        near=near,
-        begin=begin,
-        elements=elements,
-        functions=FUNCTIONS,
-        calibrated=False,
-        without_forces=rest,
-    )
-    if fitted.run.prediction is None:
-        limit = fitted.run.failed is Outcome.LIMIT_POINT
+
+    def fitted_to(data: MeasuredTest, unloaded: frozenset[int]) -> BaseFit:
+        return base_fit(
+            data,
+            facts_of(data),
+            near=near,
+            begin=begin,
+            elements=elements,
+            functions=FUNCTIONS,
+            calibrated=False,
+            without_forces=unloaded,
+        )
+
+    if at_rest is not None and not rest:
+        longer, unloaded = replace(test, steps=(at_rest, *test.steps)), frozenset([0])
+        told = fitted_to(longer, unloaded)
+        if told.fitted.run.prediction is not None and _without(told, 0) < CONTRADICTS:
+            return _read_off(longer, told.observation, mean_law(*told, ("bend", "moment")), unloaded)
+    found = fitted_to(test, rest)
+    if found.fitted.run.prediction is None:
+        limit = found.fitted.run.failed is Outcome.LIMIT_POINT
         return Estimate(InverseOutcome.LIMIT_POINT if limit else InverseOutcome.NO_EQUILIBRIUM)
-    found = mean_law(observation, fitted, ("bend",) if rest else ("bend", "moment"))
-    return _read_off(test, observation, found, rest)
+    return _read_off(test, found.observation, mean_law(*found, ("bend",) if rest else ("bend", "moment")), rest)
+
+
+CONTRADICTS = 16.0
+"""Chi-square (4 sigma) by which the zero of the log contradicts all other data."""
+
+
+def _without(found: BaseFit, step: int) -> float:
+    """Chi-square that goes, to first order, with the chord of a step, by its index."""
+    rows, fitted = found.observation.rows, found.fitted
+    row = int(np.flatnonzero((rows.kind == KINDS.index("chord")) & (rows.step == step))[0])
+    known = float(fitted.jacobian[row] @ fitted.covariance @ fitted.jacobian[row])
+    return float(fitted.residual[row] ** 2 / max(1.0 - known, 1e-9))  # a row that alone tells K0 contradicts nothing
 
 
 def _tells(step: MeasuredStep) -> bool:
@@ -221,13 +242,14 @@ def _shown(step: MeasuredStep) -> bool:
     return step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
 
 
-def _driven(test: MeasuredTest) -> MeasuredTest:
-    """The test as it drives the simulation: by chords alone, so that a wrong zero of the log moves nothing.
+def _driven(test: MeasuredTest) -> tuple[MeasuredTest, MeasuredStep | None]:
+    """The test as it drives the simulation, and the cable at rest where the log alone tells of it.
 
-    The chord of a step without a photo is that of the log, whose zero the photos of the others tell. A force is that of
-    its photo, whatever it does during the hold.
+    Chords of photos drive, so that a wrong zero of the log moves nothing. The chord of a step without a photo is that
+    of the log, whose zero the photos of the others tell. A force is that of its photo, whatever it does in the hold.
     """
-    loaded = [step for step in test.steps if _shown(step) and step.displacement is not None]
+    steps = [step for step in test.steps if _tells(step)]
+    loaded = [step for step in steps if _shown(step) and step.displacement is not None]
     zeros = np.array([_chord(step) + (step.displacement or 0.0) for step in loaded])
     scatter = float(zeros.std(ddof=1)) if zeros.size > 1 else 0.0
     std = np.hypot(scatter, max((step.chord_std or 0.0 for step in loaded), default=0.0))
@@ -241,7 +263,13 @@ def _driven(test: MeasuredTest) -> MeasuredTest:
         own = np.hypot(std, step.displacement_std or 0.0)
         return replace(free, shape=None, chord=float(zeros.mean()) - step.displacement, chord_std=float(own))
 
-    return replace(test, steps=tuple(driven(step) for step in test.steps))
+    at_rest = None
+    # what unloads only may have taken a set, and comes to rest elsewhere
+    if zeros.size and all(step.chord is not None for step in loaded) and any(s.branch == "loading" for s in steps):
+        number = min(step.step for step in steps) - 1
+        chord, own = float(zeros.mean()), float(np.hypot(std, ZERO_STD))
+        at_rest = MeasuredStep(number, "mounted", 0.0, force=0.0, force_std=1.0, chord=chord, chord_std=own)
+    return replace(test, steps=tuple(map(driven, steps))), at_rest
 
 
 def _chord(step: MeasuredStep) -> float:

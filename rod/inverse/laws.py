@@ -146,7 +146,9 @@ SURE = 0.3
 """Standard deviation of log f_EI as photos show it by the moment P y alone."""
 
 
-def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
+def as_photographed(
+    moment: Array, curvature: Array, *, unit: float, rest: float | None = None
+) -> tuple[AnyLaw, Array, float] | None:
     """The law that photos show by the moment P y, without any simulation: K(m) rises, whatever its form.
 
     A law with an early knee, beside K0 by a straight line through all curvatures, would be sought from the other side
@@ -158,6 +160,8 @@ def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[An
         Of all sections of all photos.
     unit : N m^2
         Of the coefficients.
+    rest : 1/m or None
+        K0, where it is known; else as the smallest moments show it.
 
     Returns
     -------
@@ -169,7 +173,8 @@ def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[An
     K = isotonic_regression(K).x
     low = m < m[0] + 0.1 * (m[-1] - m[0])
     low[:3] = True
-    slope, rest = np.polyfit(m[low], K[low], 1)
+    slope, at_zero = np.polyfit(m[low], K[low], 1)
+    rest = float(at_zero) if rest is None else rest
     bend = np.append(0.0, K - rest)
     rises = np.append(True, np.diff(np.maximum.accumulate(bend)) > 1e-4 * np.ptp(bend))
     bend, m = bend[rises], np.append(0.0, m)[rises]
@@ -183,7 +188,7 @@ def as_photographed(moment: Array, curvature: Array, *, unit: float) -> tuple[An
         found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
         rise = law.basis.law(found)
         law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
-    return law, law.basis.projected(rise), float(rest)
+    return law, law.basis.projected(rise), rest
 
 
 def as_measured(measured: MeasuredLaw, *, unit: float) -> tuple[AnyLaw, Array, float] | None:

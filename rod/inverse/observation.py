@@ -82,6 +82,10 @@ CHORD_STD = 3e-5
 DISPLACEMENT_STD = 2e-6
 """Of one displacement of the log against the chord, m: spindle and last digit of a log in 0.001 mm."""
 
+ZERO_STD = 2e-5
+"""Of the zero of the displacement, m: who sets a dial or a spindle by eye or by the first force does so to a few
+hundredths of a millimetre."""
+
 KINDS = ("force", "chord", "shape", "prior")
 
 

@@ -7,11 +7,15 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
+from fixtures.laws.measured import Trial
 from rod.characteristic import Characteristic
 from rod.inverse import InverseOutcome, estimate
+from rod.inverse.base_fit import base_fit
 from rod.inverse.estimate import invisible_combinations
-from rod.inverse.mean_law import weights
+from rod.inverse.mean_law import mean_law, weights
+from rod.inverse.prediction import facts_of
 from rod.inverse.simulation import run
+from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredTest
 from tests.rod.virtual_cable import SplineLaw, StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test, moved_axes, parted_axes, random_cable, scaled, stretched
@@ -110,7 +114,42 @@ def test_without_the_force_free_photo_the_pre_curvature_is_still_found():
     assert abs(result.pre_curvature - LAW.K0) < 3 * result.pre_curvature_std
     # ten times that with the photo, 0.0005, and less than the pre-curvature itself
     assert 0.005 < result.pre_curvature_std < 0.3
-    assert result.loaded_pre_curvature == pytest.approx(result.pre_curvature)
+    # the log's zero tells where the axes stood at rest: a witness of its own beside photos under load
+    assert result.pre_curvature_std < 0.9 * result.loaded_pre_curvature_std
+    assert abs(result.loaded_pre_curvature - LAW.K0) < 3 * result.loaded_pre_curvature_std
+    unlogged = law_of(replace(test, steps=tuple(replace(step, displacement=None) for step in test.steps)))
+    assert unlogged.loaded_pre_curvature == pytest.approx(unlogged.pre_curvature)
+
+
+def test_a_zero_of_the_log_that_contradicts_the_photos_moves_nothing():
+    test = measured(mounted=False)
+    unlogged = law_of(replace(test, steps=tuple(replace(step, displacement=None) for step in test.steps)))
+    off = law_of(
+        replace(test, steps=tuple(replace(step, displacement=step.displacement + 2e-3) for step in test.steps))
+    )
+    assert off.pre_curvature == pytest.approx(unlogged.pre_curvature)
+    np.testing.assert_allclose(off.tangent, unlogged.tangent, rtol=1e-9)
+
+
+def test_an_early_knee_is_found_by_where_the_log_says_the_axes_stood_at_rest():
+    """By photos under load alone f_EI was 11 % off: the bend at which the cable gives way depends on K0."""
+    errors = []
+    for seed in (701, 703, 705, 707, 709):
+        trial = Trial("knee-5", seed, 7)
+        law, D = estimate(trial.measured()[0]).law, trial.cable.law.reach * np.linspace(0.0, 1.0, 201)
+        found = np.interp(trial.cable.law.K0 + D, law.kappa, np.log(law.tangent))
+        errors.append(np.sqrt(np.mean((found - np.log(trial.cable.law.tangent(D))) ** 2)))
+    assert np.median(errors) < 0.06  # what few photos with this noise allow a knee; 0.039 here
+
+
+@pytest.mark.parametrize("seed", [811, 815, 835])
+def test_a_cable_that_has_snapped_over_is_told_from_one_that_has_not(seed):
+    """Three photos under load of a cable with an early knee: fitted from one side only, K0 was -0.98 for 0.98 1/m."""
+    trial = Trial("knee-5", seed, 3)
+    test, _ = trial.measured()
+    for law in (estimate(test).law, mean_law(*base_fit(test, facts_of(test)))):
+        found = law.pre_curvature if isinstance(law, MeasuredLaw) else law.extension.base.pre_curvature(law.vector)
+        assert found == pytest.approx(trial.cable.law.K0, abs=0.05)  # three times what the log tells of it
 
 
 def test_the_force_free_photo_sharpens_the_pre_curvature_and_is_left_out_of_the_loaded_one():

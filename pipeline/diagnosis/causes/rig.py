@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from rod.inverse.cause import Cause, Variant
+from rod.inverse.observation import ZERO_STD
 from rod.inverse.prediction import Facts, Model
 
 UNDER_LOAD = "mounted under the load"
@@ -140,10 +141,6 @@ class RigCompliance(Cause):
         return replace(model, bending=replace(model.bending, compliance=model.bending.compliance + amount))
 
 
-ZERO = 2e-5
-"""Of a displacement, m: who sets a dial or a spindle to zero by eye or by the first force does so to a few hundredths
-of a millimetre."""
-
 MEASURED = 1e-3
 """Of a length: a cable is cut and measured with a steel rule, 0.3 mm of 300."""
 
@@ -165,8 +162,8 @@ class DisplacementOffset(Cause):
         A mounted cable is free of force wherever the zero of its rig lies: no ordinary rig presses it.
         """
         if "mounted" not in facts.branch:
-            return (Variant(ordinary=ZERO),)
-        pushed = Variant("between the mounted position and the first step", ordinary=ZERO)
+            return (Variant(ordinary=ZERO_STD),)
+        pushed = Variant("between the mounted position and the first step", ordinary=ZERO_STD)
         return (pushed, Variant("at every step", at=1.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
