@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.causes.profile import step, wave
+from pipeline.diagnosis.causes.profile import piece, step, wave
 from pipeline.diagnosis.causes.rig import BearingFriction, by_step
 from pipeline.messages import catalogue
 from pipeline.report.diagnosed import _named
@@ -80,7 +80,7 @@ def test_every_form_of_a_cause_is_said_in_words():
     labels = {(cause.name, form.label) for cause in CATALOGUE for form in cause.variants(facts)}
     labels |= {("bearing_friction", form.label) for form in by_step(BearingFriction(), 1.0, facts)}
     for name in ("pre_curvature_varying", "stiffness_varying"):
-        labels |= {(name, form.label) for form in (step(), wave(1))}
+        labels |= {(name, form.label) for form in (piece(), step(), wave(1))}
     said = {tuple(key.split(".", 2)[1:]) for key in catalogue("en") if key.startswith("form.")}
     assert {one for one in labels if one[1]} == said
 

@@ -5,9 +5,9 @@ so the amount is the largest deviation from the mean; only a soft spot counts fr
 is the one that is wanted. Forms: growing along the cable, more (or less) in the middle than at the
 ends, S-shaped, and a spot at a place that is found by scanning. Several forms may add up.
 
-What is none of these (a kink, several bumps) is a sum of waves, or a step between two pieces: `wave` k has k half
-periods over the cable, and any profile of mean zero is a sum of them. They are no forms to be suspected, their number
-would drown a true cause in chance; they take the place of the forms once the cause is known
+What is none of these (a kink, several bumps) is a sum of waves, or a piece of another kind, or a step between two:
+`wave` k has k half periods over the cable, and any profile of mean zero is a sum of them. They are no forms to be
+suspected, their number would drown a true cause in chance; they take the place of the forms once the cause is known
 (`explanations.free_profile`).
 """
 
@@ -36,7 +36,7 @@ WAVE_COST = 4
 """Free numbers that one wave counts for: it is known beforehand to a few usual amounts and afterwards to a fiftieth of
 that (exp(-4)). As cheap as the others, eight waves stood alone for a spot and a spring in the bearings."""
 
-SEAM = "in a step"
+SEAM, PIECE = "in a step", "in a piece"
 
 LEAST = 0.05
 """Relative stiffness that no form goes below: a cable without any has no equilibrium."""
@@ -78,6 +78,11 @@ def step() -> Variant:
     )
 
 
+def piece() -> Variant:
+    """A piece of another kind with two borders: a splice, a sleeve, a repair; half as much at ``width`` off ``at``."""
+    return replace(step(), label=PIECE, width=0.1, width_range=(0.02, 0.3))
+
+
 def wave(half_periods: int) -> Variant:
     """One of the waves any profile is a sum of; ``at`` is minus its number of half periods.
 
@@ -97,6 +102,8 @@ def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> 
         values = np.cos(variant.at * np.pi * position)
     elif variant.label == SEAM:
         values = np.tanh((position - variant.at) / variant.width)
+    elif variant.label == PIECE:
+        values = np.exp2(-(((position - variant.at) / variant.width) ** 6))
     elif variant.width > 0.0:
         values = np.exp(-0.5 * ((position - variant.at) / variant.width) ** 2)
     elif variant.at == 2.0:
@@ -110,8 +117,8 @@ def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> 
     return np.asarray(deviation / np.max(np.abs(deviation)))
 
 
-def form_between(uniform: Model, varying: Model) -> tuple[Variant, float, float] | None:
-    """The one spot or step that looks most like what varies along the cable.
+def forms_between(uniform: Model, varying: Model) -> list[tuple[Variant, float, float]]:
+    """The spot, the piece and the step that look most like what varies along the cable.
 
     Parameters
     ----------
@@ -120,35 +127,36 @@ def form_between(uniform: Model, varying: Model) -> tuple[Variant, float, float]
 
     Returns
     -------
-    (Variant, float, float) or None
-        Form, amount, and by how much (relative) the cable beside the spot is stiffer. None if nothing varies.
+    list of (Variant, float, float)
+        Form, amount, and by how much (relative) the cable beside it is stiffer. Empty if nothing varies.
     """
     before, after = uniform.bending.rod.section, varying.bending.rod.section
     relative = after.profile is not None
     change = np.asarray(after.pre_curvature - before.pre_curvature if after.profile is None else after.profile - 1.0)
     if before.profile is not None or change.ndim == 0 or not np.ptp(change) > 0.0:
-        return None
+        return []
     position = position_of(varying)
     weight = np.sin(np.pi * position)  # where no moment is, no stiffness shows
-    best: tuple[float, Variant, Array] | None = None
-    for form in _places():
-        columns = np.column_stack([np.ones_like(position), profile(form, position, from_beside=relative)])
-        found = np.linalg.lstsq(weight[:, None] * columns, weight * change, rcond=None)[0]
-        left = float(np.sum((weight * (change - columns @ found)) ** 2))
-        if best is None or left < best[0]:
-            best = left, form, np.asarray(found)
-    if best is None or not best[2][0] > -1.0:
-        return None
-    beside, amount = (float(value) for value in best[2])
-    return (best[1], amount / (1.0 + beside), beside) if relative else (best[1], amount, 0.0)
+    closest = []
+    for kind in (forms()[-1], piece(), step()):
+        best: tuple[float, Variant, Array] | None = None
+        for form in _places(kind):
+            columns = np.column_stack([np.ones_like(position), profile(form, position, from_beside=relative)])
+            found = np.linalg.lstsq(weight[:, None] * columns, weight * change, rcond=None)[0]
+            left = float(np.sum((weight * (change - columns @ found)) ** 2))
+            if best is None or left < best[0]:
+                best = left, form, np.asarray(found)
+        if best is not None and best[2][0] > -1.0:
+            beside, amount = (float(value) for value in best[2])
+            closest.append((best[1], amount / (1.0 + beside), beside) if relative else (best[1], amount, 0.0))
+    return closest
 
 
-def _places() -> Iterator[Variant]:
-    """Spots and steps over the whole cable and of every width."""
-    for kind in (forms()[-1], step()):
-        for at in np.linspace(*kind.at_range, 48):
-            for width in np.geomspace(*kind.width_range, 12):
-                yield replace(kind, at=float(at), width=float(width))
+def _places(kind: Variant) -> Iterator[Variant]:
+    """A form over the whole cable and of every width."""
+    for at in np.linspace(*kind.at_range, 48):
+        for width in np.geomspace(*kind.width_range, 12):
+            yield replace(kind, at=float(at), width=float(width))
 
 
 def deviation(uniform: Model, varying: Model, cause: Cause) -> Array:

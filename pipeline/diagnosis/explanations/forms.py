@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.profile import form_between
+from pipeline.diagnosis.causes.profile import forms_between
 from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.fits.search import Suspicion, suspect
@@ -144,7 +144,7 @@ def differing_by_step(observation: Observation, fitted: Fit, cause: Cause) -> Fi
 
 
 def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:
-    """One spot or step in the place of several forms along the cable, if its chi-square is ``worse`` by no more.
+    """One spot, piece or step in the place of several forms along the cable, if its chi-square is ``worse`` by no more.
 
     A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
     not: what they add up to tells where the spot is.
@@ -153,12 +153,11 @@ def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:
     count = len(extension.terms)
     if count < 2 or len(extension.terms_of(extension.terms[0].cause)) < count:
         return fitted
-    spot = form_between(extension.base_model(fitted.vector), extension.model(fitted.vector))
-    if spot is None:
-        return fitted
-    variant, amount, stiffer = spot
-    alone = Extension(extension.base, extension.facts, (Term(extension.terms[0].cause, variant),))
-    start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
-    one = fit_from(observation, alone, start, fitted)
-    as_well = one.run.prediction is not None and one.chi2 < fitted.chi2 + worse
-    return one if as_well else fitted
+    cause, best = extension.terms[0].cause, fitted
+    for variant, amount, stiffer in forms_between(extension.base_model(fitted.vector), extension.model(fitted.vector)):
+        alone = Extension(extension.base, extension.facts, (Term(cause, variant),))
+        start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
+        one = fit_from(observation, alone, start, fitted)
+        enough = fitted.chi2 + worse if best is fitted else best.chi2
+        best = one if one.run.prediction is not None and one.chi2 < enough else best
+    return best

@@ -12,7 +12,7 @@ from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, hidden_test
 from pipeline.diagnosis import explain
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.causes.profile import form_between
+from pipeline.diagnosis.causes.profile import PIECE, forms_between, piece
 from pipeline.simulate.effects import ONE_SIDED
 from rod.inverse.base import start
 from rod.inverse.prediction import facts_of
@@ -178,12 +178,22 @@ def test_several_forms_that_add_up_to_one_spot_are_told_as_it(bench, name, amoun
     cause = BY_NAME[name]
     spot = replace(cause.variants(facts)[-1], at=0.405, width=0.06)
     parts = cause.apply(cause.apply(model, 0.6 * amount, spot, facts), 0.4 * amount, spot, facts)
-    variant, size, stiffer = form_between(model, parts)
+    variant, size, stiffer = forms_between(model, parts)[0]
     assert variant.at == pytest.approx(0.405, abs=0.01)  # half a step of the search
     assert variant.width == pytest.approx(0.06, rel=0.13)
     assert size == pytest.approx(amount, rel=0.1)
     assert stiffer == pytest.approx(0.0, abs=0.01)
-    assert form_between(model, model) is None
+    assert forms_between(model, model) == []
+
+
+@pytest.mark.parametrize("name", ["pre_curvature_varying", "stiffness_varying"])
+def test_a_splice_is_told_by_place_and_length(bench, name):
+    facts, model, _ = bench
+    spliced = BY_NAME[name].apply(model, 0.5, replace(piece(), at=0.39, width=0.08), facts)
+    found = {variant.label: (variant, size) for variant, size, _ in forms_between(model, spliced)}
+    variant, size = found[PIECE]
+    assert (variant.at, variant.width) == pytest.approx((0.39, 0.08), rel=0.13)  # half a step of the search
+    assert size == pytest.approx(0.5, rel=0.1)
 
 
 @pytest.mark.parametrize("sines", [(0.06, 0.07), (-0.06, 0.07), (0.03, -0.1)])
