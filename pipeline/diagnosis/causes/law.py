@@ -47,6 +47,10 @@ class NonlinearStiffness(Cause):
         return model
 
 
+WIRES = 6
+"""Elements of a round corner: its loop is then a parabola to a hundredth of its half width."""
+
+
 class Hysteresis(Cause):
     """``hysteresis``: friction between the wires."""
 
@@ -63,26 +67,32 @@ class Hysteresis(Cause):
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Elements that slip after some share of the range of curvatures; a round loop is a sum of them.
+        """Friction that slips after some share of the range of curvatures, at once or one wire after the other.
 
-        On loading alone they are part of the law.
+        A loop of any form is a sum of them. On loading alone they are part of the law.
         """
         # what has not slipped over the whole range is elastic, and no other than the law itself
         reach = (0.01 * facts.curvature_scale, 0.9 * facts.curvature_scale)
         return tuple(
             Variant(
-                "with a sharp corner",
+                label,
                 at=share * facts.curvature_scale,
+                width=float(wires),
                 tuned=("at",),
                 at_range=reach,
                 of_law=not facts.returns,
             )
+            for label, wires in (("with a sharp corner", 1), ("with a round corner", WIRES))
             for share in (0.05, 0.12, 0.25, 0.5, 0.8)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is."""
-        friction = InternalFriction(max(amount, 0.0), variant.at, 1, beside=model.bending.friction)
+        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is.
+
+        ``width`` is the number of elements that slip one after the other up to that change.
+        """
+        wires = max(round(variant.width), 1)
+        friction = InternalFriction(max(amount, 0.0), variant.at, wires, beside=model.bending.friction)
         return replace(model, bending=replace(model.bending, friction=friction))
 
 

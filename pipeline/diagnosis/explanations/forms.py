@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import forms_between
 from pipeline.diagnosis.causes.rig import by_step
-from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.statistics.score import descending
 from rod.inverse.extension import Extension, Term
@@ -57,6 +57,8 @@ def with_more_forms(
     hopeless : float
         Chi-square above which the result is of no use.
     """
+    if cause.additive:
+        return in_all_forms(observation, fitted, cause, setting)
     while len(fitted.extension.terms_of(cause)) < SHAPES_MOST:
         least = max(SHAPE_GAIN, LEAST_SHARE * fitted.chi2)
         more = suspect(observation, fitted, [cause])
@@ -76,6 +78,34 @@ def with_more_forms(
             break
         fitted = without_needless_forms(observation, added, cause)
     return fitted
+
+
+def in_all_forms(observation: Observation, fitted: Fit, cause: Cause, setting: str) -> Fit:
+    """The model with all forms of a cause whose amounts add up, then with those alone that it needs, each in its place.
+
+    Amounts of one sign are a nearly linear problem. Added one by one they are not: beside a round loop that is none no
+    form of it promises anything.
+    """
+    forms = [form for form in cause.variants(fitted.extension.facts) if form.setting == setting]
+    own = fitted.extension.terms_of(cause)
+    total = sum(fitted.amount(k)[0] for k in own)
+    rest, vector = fitted.extension.without(fitted.vector, own)
+    every = tuple(Term(cause, replace(form, tuned=())) for form in forms)
+    start = np.r_[vector, np.full(len(every), total / len(every))]
+    spread = fit_from(observation, replace(rest, terms=(*rest.terms, *every)), start, fitted)
+    if spread.run.prediction is None:
+        return fitted
+    amounts = spread.vector[len(vector) :]
+    needed = [
+        (Term(cause, form), amount) for form, amount in zip(forms, amounts, strict=True) if amount > LEAST_SHARE * total
+    ]
+    terms = tuple(term for term, _ in needed)
+    start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in needed)])
+    found = fit_from(observation, replace(rest, terms=(*rest.terms, *terms)), start, spread)
+    if found.run.prediction is None:
+        return fitted
+    found = without_needless_forms(observation, found, cause)
+    return found if cost(found) < cost(fitted) else fitted
 
 
 def may_join(term: Term, fitted: Fit, setting: str) -> bool:

@@ -27,7 +27,7 @@ from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
 from rod.inverse.base_fit import settled
-from rod.inverse.fit import fit_from
+from rod.inverse.fit import FITS, fit_from
 
 MATTERS = 0.1
 """Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
@@ -163,7 +163,9 @@ def searched(bench: Workbench) -> Search:
     search = Search(bench)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    silent = silent and first.word == "base" and bench.largest < bench.limit
+    # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
+    fits = bench.base.chi2 < FITS * (len(bench.base.residual) - bench.base.extension.size)
+    silent = silent and first.word == "base" and bench.largest < bench.limit and fits
     hidden = hidden_pair(bench.suspicion) if silent else ()
     if silent and not hidden:
         return search
