@@ -30,7 +30,7 @@ from pipeline.vision.search.beyond import (
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
-from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
     COVER_MARGIN_WIDTHS,
     at_border,
@@ -207,7 +207,7 @@ def _assemble(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], cable: Cable
 ) -> RoughCable | Rejected:
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.step > SEEN_SHARE * cut.contrast, cut.usual_width)
+    kept = without_specks(cut.seen)
     unlike = unlike_from(path, kept, axes, cut.usual_width)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)
