@@ -14,12 +14,12 @@ from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
 
 
-def _bow_with(draw):
-    """A cable 26 px wide on a level ground, with what ``draw`` draws over its ends; and its ends."""
+def _bow_with(draw, width=26):
+    """A cable so many px wide on a level ground, with what ``draw`` draws over its ends; and its ends."""
     u = np.linspace(150.0, 1450.0, 500)
     course = np.column_stack([u, 300.0 + 220.0 * np.sin(np.pi * (u - 150.0) / 1300.0)])
     picture = np.full((760, 1600, 3), 150, np.uint8)
-    cv2.polylines(picture, [np.round(16.0 * course).astype(np.int32)], False, (40, 40, 40), 26, cv2.LINE_AA, 4)
+    cv2.polylines(picture, [np.round(16.0 * course).astype(np.int32)], False, (40, 40, 40), width, cv2.LINE_AA, 4)
     draw(picture, course)
     noisy = cv2.GaussianBlur(picture, (0, 0), 1.0) + np.random.default_rng(0).normal(0.0, 2.0, picture.shape)
     return Photo("a.png", np.clip(noisy, 0, 255).astype(np.uint8), 8), course
@@ -53,3 +53,21 @@ def test_a_longer_reading_forbids_a_strip_only_where_it_goes_on_beyond_it(more, 
     cut = Rejected(photo.name, Message("photo/hidden-end.goes-on", u_px=1450.0, v_px=300.0))
     chosen = segmentation._chosen(photo, [segmentation._Judged([found, cut], [found.path_px, longer], [1.0, 1.0])])
     assert getattr(chosen, "code", None) == code
+
+
+def test_a_cable_is_followed_across_a_band_to_the_cover_close_behind_it():
+    """A bright band across the cable, two widths before its cover: the piece between is too short for a strip."""
+
+    def band_and_covers(picture, course):
+        for u, v in (course[0], course[-1]):
+            cv2.circle(picture, (round(u), round(v)), 66, (210, 210, 210), cv2.FILLED, cv2.LINE_AA)
+            cv2.circle(picture, (round(u), round(v)), 6, (20, 20, 20), cv2.FILLED, cv2.LINE_AA)
+        along = course[80] - course[56]
+        aside = 0.55 * 44.0 * np.array([-along[1], along[0]]) / np.hypot(*along)
+        band = np.array([course[56] - aside, course[80] - aside, course[80] + aside, course[56] + aside])
+        cv2.fillPoly(picture, [np.round(16.0 * band).astype(np.int32)], (152, 152, 152), cv2.LINE_AA, 4)
+
+    photo, course = _bow_with(band_and_covers, width=44)
+    found = find_cable(photo, cable=Cable(diameter_px=44.0, length_px=1430.0, bearings=BearingHints(cover_px=132.0)))
+    assert isinstance(found, RoughCable)
+    assert np.hypot(*np.subtract(found.left.center_px, course[0])) < 1.0
