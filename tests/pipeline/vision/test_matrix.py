@@ -16,10 +16,11 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from fixtures.scenes import usual_photography
+from fixtures.things import Thing
 from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Specimen, Traces
 from pipeline.settings import VisionSettings
 from pipeline.simulate import Experiment, State
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.lighting import DIRECTIONAL, EVEN, Light
 from pipeline.vision.render.sensor import write_picture
 from pipeline.vision.render.sheath import WHITE, Sheath

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, Thing, render, render_board
+from fixtures.things import Thing
+from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, render, render_board
 from pipeline.vision.render.clutter import ChessBoard
 from pipeline.vision.render.lens import Camera
 from pipeline.vision.render.lighting import DIRECTIONAL, Light, cylinder
@@ -82,8 +83,6 @@ def test_curve_of_constant_curvature_is_a_circle() -> None:
     assert curve.chord == pytest.approx(2 / 8.0 * sin(0.8), rel=1e-13)
     assert curve.y.max() == pytest.approx((1 - cos(0.8)) / 8.0, rel=1e-12)
     assert curve.theta[0] == pytest.approx(0.8, rel=1e-12)
-    again = Curve.from_points(curve.s, curve.x, curve.y)
-    assert again.kappa[200:-200] == pytest.approx(8.0, rel=1e-6)  # second derivatives lose half of sixteen digits
 
 
 CAMERAS = [
@@ -111,7 +110,6 @@ def test_camera_keeps_its_word() -> None:
     assert u == pytest.approx(499.5 + 0.96 * half) and v == pytest.approx(399.5)
     # True tilt: seen at 30 degrees from 0.5 m, a point 0.1 m up the slope. Pinhole by hand.
     tilted = Camera(1000, 800, 5000.0, look_at_m=(0.0, 0.0), perspective_per_m=(sin(0.5) / 0.5, 0.0), distance_m=0.5)
-    assert tilted.tilt_rad == pytest.approx(0.5)
     u, _ = tilted.project(0.1, 0.0)
     assert u - 499.5 == pytest.approx(5000 * 0.5 * 0.1 * cos(0.5) / (0.5 + 0.1 * sin(0.5)))
     # A plane 5 mm below the axis looks smaller by D / (D + h).

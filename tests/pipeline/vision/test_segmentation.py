@@ -10,11 +10,12 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fixtures.photographed.renderer import photograph, random_look
+from fixtures.things import Thing
 from pipeline.records import Rejected
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.candidates import Reading, branches
