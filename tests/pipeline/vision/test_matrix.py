@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from fixtures.scenes import usual_photography
 from fixtures.things import Thing
+from fixtures.turned import turned_jpeg
 from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Specimen, Traces
 from pipeline.settings import VisionSettings
 from pipeline.simulate import Experiment, State
@@ -72,7 +73,10 @@ def photo_of(scene: Scene, picture: Picture, case: Case, folder: Path) -> Traces
     """The picture as the only photo of a specimen."""
     path = folder / case.file
     path.parent.mkdir(exist_ok=True)
-    write_picture(path, picture.pixels, jpeg_quality=case.jpeg_quality, exif_orientation=case.exif_orientation)
+    if case.exif_orientation == 1:
+        write_picture(path, picture.pixels, jpeg_quality=case.jpeg_quality)
+    else:
+        path.write_bytes(turned_jpeg(picture.pixels, case.exif_orientation, jpeg_quality=case.jpeg_quality))
     cover = scene.covers[0]
     rig = RigSpec(
         marker_diameter_m=cover.diameter_m if cover is not None and case.size_given else None,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fixtures.things import Thing
+from fixtures.turned import turned_jpeg
 from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, render, render_board
 from pipeline.vision.render.clutter import ChessBoard
 from pipeline.vision.render.lens import Camera
@@ -226,7 +227,7 @@ def test_noise_has_the_spread_asked_for() -> None:
 def test_exif_orientation_shows_the_picture_as_it_is(orientation: int) -> None:
     v, u = np.mgrid[0:64, 0:96]
     pixels = (u * 2 + v // 2).astype(np.uint8)
-    data = np.frombuffer(encode(pixels, ".jpg", exif_orientation=orientation), np.uint8)
+    data = np.frombuffer(turned_jpeg(pixels, orientation), np.uint8)
     with_tag = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)  # OpenCV obeys the tag
     assert with_tag.shape == pixels.shape
     assert np.abs(with_tag.astype(int) - pixels).max() <= 2  # levels that a jpg takes from a ramp
