@@ -15,6 +15,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from fixtures.grounds import cloth, squared, stone, wood
 from fixtures.scenes import usual_photography
 from fixtures.things import Thing
 from fixtures.turned import turned_jpeg
@@ -197,8 +198,8 @@ TRACED: dict[str, Case] = {
     "open ends": Case(scene={"covers": (None, None)}, axes_given=True),
     "mirrored": Case(camera={"mirrored": True}),
     "rolled": Case(camera={"roll_rad": -0.3}),
-    "cloth": Case(scene={"ground": Ground("cloth", (0.8, 0.8, 0.78), 0.05)}),
-    "squared paper": Case(scene={"ground": Ground("squared", (0.9, 0.9, 0.9), 0.4, 1.5)}),
+    "cloth": Case(scene={"ground": Ground(cloth, (0.8, 0.8, 0.78), 0.05)}),
+    "squared paper": Case(scene={"ground": Ground(squared, (0.9, 0.9, 0.9), 0.4, 1.5)}),
     "clutter": Case(scene={"things": CLUTTER}),
     "5 px/mm": Case(px_per_m=5_000.0),
     "blur 3 px": Case(scene={"sensor": Sensor(blur_px=3.0)}),
@@ -283,10 +284,10 @@ def test_impossible_photo_is_refused_with_its_figure(name: str, tmp_path: Path) 
 
 # Hard photos: an answer or a refusal, but never a wrong answer.
 HARD: dict[str, Case] = {
-    "wood": Case(scene={"ground": Ground("wood", (0.6, 0.45, 0.3), 0.1, 2.0, 0.3)}),
-    "stone": Case(scene={"ground": Ground("stone", (0.6, 0.6, 0.6), 0.1)}),
+    "wood": Case(scene={"ground": Ground(wood, (0.6, 0.45, 0.3), 0.1, 2.0, 0.3)}),
+    "stone": Case(scene={"ground": Ground(stone, (0.6, 0.6, 0.6), 0.1)}),
     "dark on dark": Case(scene={"ground": Ground("plain", (0.24, 0.24, 0.24))}),
-    "white on white cloth": Case(sheath=PALE, scene={"ground": Ground("cloth", (0.82, 0.82, 0.82), 0.03)}),
+    "white on white cloth": Case(sheath=PALE, scene={"ground": Ground(cloth, (0.82, 0.82, 0.82), 0.03)}),
     "sharp shadow": Case(
         px_per_m=8_000.0, scene={"light": Light(elevation_rad=0.6, ambient=0.35, shadow=0.7, softness=0.08)}
     ),

@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
+from fixtures.grounds import cloth, squared, stone, wood
 from fixtures.things import Thing
 from fixtures.turned import turned_jpeg
 from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, render, render_board
 from pipeline.vision.render.clutter import ChessBoard
+from pipeline.vision.render.ground import Texture
 from pipeline.vision.render.lens import Camera
 from pipeline.vision.render.lighting import DIRECTIONAL, Light, cylinder
 from pipeline.vision.render.sensor import encode
@@ -187,7 +189,7 @@ def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
         Thing("text", (0.1, 0.05), text="a"),
     )
     camera = Camera(800, 500, 5000.0)
-    scene = Scene(cable, camera, light=DIRECTIONAL, ground=Ground("cloth", contrast=0.1, angle_rad=0.2), things=things)
+    scene = Scene(cable, camera, light=DIRECTIONAL, ground=Ground(cloth, contrast=0.1, angle_rad=0.2), things=things)
     assert np.array_equal(render(scene).pixels, render(scene).pixels)
     assert not np.array_equal(render(scene).pixels, render(replace(scene, seed=1)).pixels)
     assert np.array_equal(render(scene).u_px, render(replace(scene, seed=1)).u_px)
@@ -195,8 +197,8 @@ def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
 
 @pytest.mark.parametrize("mode", ["grey", "colour", "alpha"])
 @pytest.mark.parametrize("bit_depth", [8, 12, 16])
-@pytest.mark.parametrize("kind", ["plain", "brushed", "cloth", "wood", "stone", "squared"])
-def test_every_ground_in_every_format(kind: str, bit_depth: int, mode: str) -> None:
+@pytest.mark.parametrize("kind", ["plain", "brushed", cloth, wood, stone, squared])
+def test_every_ground_in_every_format(kind: str | Texture, bit_depth: int, mode: str) -> None:
     cable = Strand(Curve.from_curvature(6.0, 0.1))
     sensor = Sensor(bit_depth=bit_depth, mode=mode, noise=0.0)
     scene = Scene(cable, Camera(300, 200, 1500.0), ground=Ground(kind, (0.5, 0.5, 0.5), 0.05), sensor=sensor)
