@@ -59,7 +59,7 @@ class Photography:
         Lying on the table, half a diameter below the axis; placed in the middle of the view. None: made to fit.
     suffix : str
         ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
-    jpeg_quality, exif_orientation : int
+    jpeg_quality : int
     """
 
     width: int = 2448
@@ -80,7 +80,6 @@ class Photography:
     board: ChessBoard | None = None
     suffix: str = ".png"
     jpeg_quality: int = 92
-    exif_orientation: int = 1
 
     def __post_init__(self) -> None:
         if self.scale == "markers" and None in self.covers:

@@ -124,7 +124,7 @@ class _Traced:
 
 
 def _save(path: Path, pixels: Any, photography: Photography) -> None:
-    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality, exif_orientation=photography.exif_orientation)
+    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
 
 
 def _calibrate(folder: Path, experiment: Experiment, photography: Photography, camera: Camera, state: State) -> None:

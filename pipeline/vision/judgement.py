@@ -21,6 +21,7 @@ from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.beyond import (
+    LEAST_MORE_WIDTHS,
     follow,
     followed_in,
     goes_on_at,
@@ -30,7 +31,7 @@ from pipeline.vision.search.beyond import (
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
-from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
     COVER_MARGIN_WIDTHS,
     at_border,
@@ -43,6 +44,7 @@ from pipeline.vision.search.ends import (
 from pipeline.vision.search.strips import Strip
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
+_LEAST_BEFORE_COVER = 1.0  # widths; a shorter piece of cable between a band across it and a cover shows no direction
 _MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
 _LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
@@ -78,13 +80,17 @@ def refused(photo: Photo, key: str, **figure: float) -> Rejected:
 def judge_strip(
     photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable
 ) -> RoughCable | Rejected:
-    """One strip: is it the cable? One that is a piece of it is followed beyond its ends and judged again."""
+    """One strip: is it the cable? One that is a piece of it is followed beyond its ends and judged again.
+
+    So is one that ends before any cover: the cover judges what was followed, so that a short piece is enough.
+    """
     outcome = _judge(photo, standout, reading, strip, cable)
-    going_on = outcome.code == "photo/hidden-end" if isinstance(outcome, Rejected) else outcome.goes_on
-    if not going_on:
+    code = outcome.code if isinstance(outcome, Rejected) else "photo/hidden-end" * outcome.goes_on
+    if code not in ("photo/hidden-end", "photo/bearing"):
         return outcome
     cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
-    path = follow(standout, cut, cut.usual_width)
+    least = LEAST_MORE_WIDTHS if code == "photo/hidden-end" else _LEAST_BEFORE_COVER
+    path = follow(standout, cut, cut.usual_width, least=least)
     if path is None:
         return outcome
     whole = replace(strip, path=path)
@@ -207,7 +213,7 @@ def _assemble(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], cable: Cable
 ) -> RoughCable | Rejected:
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.step > SEEN_SHARE * cut.contrast, cut.usual_width)
+    kept = without_specks(cut.seen)
     unlike = unlike_from(path, kept, axes, cut.usual_width)
     if unlike is not None:
         return _goes_on_beyond(photo, unlike)

@@ -26,6 +26,7 @@ from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, in_one_colour, stand_out
+from pipeline.vision.search.beyond import LEAST_MORE_WIDTHS
 from pipeline.vision.search.candidates import Reading, Wanted, read_photo
 
 Window = tuple[int, int, int, int]
@@ -203,7 +204,8 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
         # blur is judged last: a strip refused for it looks like a cable in all else
         if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
             return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=length)
-        if length > best.length_px and refusal.code in ("photo/crossing", "photo/hidden-end"):
+        longer = length > best.length_px and _length_beyond(path, best) > 2.0 * LEAST_MORE_WIDTHS * best.half_width_px
+        if longer and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
             return refusal
@@ -251,6 +253,12 @@ def _is_rival(found: RoughCable, best: RoughCable) -> bool:
     alike = 0.6 < found.half_width_px / best.half_width_px < 1.6
     long = found.evidence.value > _RIVAL * best.evidence.value
     return alike and long and found.evidence.enough and not _lies_on(found, [best.path_px])
+
+
+def _length_beyond(path: Array, best: RoughCable) -> float:
+    """Length (px) of what a strip's path has farther than a width from the course of another: flanks lie nearer."""
+    away = np.asarray(cKDTree(best.path_px).query(path)[0]) > 2.0 * best.half_width_px
+    return float(step_lengths(path)[away[1:]].sum())
 
 
 def _lies_on(found: RoughCable, paths: list[Array]) -> bool:

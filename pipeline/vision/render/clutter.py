@@ -1,4 +1,4 @@
-"""What else lies in the picture: discs over the bearings, tools, rulers, writing; and the chessboard of a calibration.
+"""What else lies in the picture: discs over the bearings; and the chessboard of a calibration.
 
 All places are table metres, so that lens and tilt act on them as on the cable.
 """
@@ -49,34 +49,6 @@ class Cover:
     slot: bool = False
 
 
-@dataclass(frozen=True)
-class Thing:
-    """Another object: ``disc``, ``box``, ``ruler``, ``pen``, ``text``.
-
-    Attributes
-    ----------
-    kind : str
-    place_m : (X, Y) m
-        Its middle on the table.
-    size_m : (float, float) m
-        Length and width (text: height of the letters is the width).
-    angle_rad : float
-    colour : (r, g, b)
-    text : str
-    """
-
-    kind: str
-    place_m: tuple[float, float]
-    size_m: tuple[float, float] = (0.02, 0.02)
-    angle_rad: float = 0.0
-    colour: Colour = (0.3, 0.3, 0.3)
-    text: str = ""
-
-    def __post_init__(self) -> None:
-        if self.kind not in ("disc", "box", "ruler", "pen", "text"):
-            raise ValueError(f"thing {self.kind!r} is none of disc, box, ruler, pen, text")
-
-
 def cover_layers(
     cover: Cover, place_m: tuple[float, float], camera: Camera, light: Light, channels: int, *, blur_px: float = 0.0
 ) -> list[Layer]:
@@ -96,69 +68,6 @@ def cover_layers(
             colour[slot] *= 0.4
         layers.append(Layer(index, alpha, colour))
     return layers
-
-
-def thing_layers(thing: Thing, camera: Camera, light: Light, channels: int) -> list[Layer]:
-    """Layers of an object, anti-aliased to 8 bit: no truth hangs on it."""
-    level = light.strength * (light.ambient + (1 - light.ambient) * light.direction[2])
-    if thing.kind == "disc":
-        index, alpha, _ = disc_cover(camera, thing.place_m, 0.5 * thing.size_m[0])
-        return [Layer(index, alpha, np.broadcast_to(level * ink(thing.colour, channels), (index.size, channels)))]
-    paint = {"box": _box, "pen": _pen, "ruler": _ruler, "text": _text}[thing.kind]
-    layers = []
-    for mask, gain in paint(thing, camera):
-        index = np.flatnonzero(mask)
-        colour = np.broadcast_to(gain * level * ink(thing.colour, channels), (index.size, channels))
-        layers.append(Layer(index, mask.ravel()[index] / 255.0, colour))
-    return layers
-
-
-def _polygon(
-    thing: Thing, camera: Camera, a: Array, b: Array, mask: NDArray[np.uint8] | None = None
-) -> NDArray[np.uint8]:
-    """Mask of a polygon given in the thing's own axes (m from its middle)."""
-    c, q = np.cos(thing.angle_rad), np.sin(thing.angle_rad)
-    u, v = camera.project(thing.place_m[0] + c * a - q * b, thing.place_m[1] + q * a + c * b)
-    if mask is None:
-        mask = np.zeros((camera.height, camera.width), np.uint8)
-    points = np.rint(np.clip(np.column_stack([u, v]), -30_000, 30_000) * 16).astype(np.int32)
-    cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
-    return mask
-
-
-def _frame(length: float, width: float) -> tuple[Array, Array]:
-    return 0.5 * length * np.array([-1.0, 1.0, 1.0, -1.0]), 0.5 * width * np.array([-1.0, -1.0, 1.0, 1.0])
-
-
-def _box(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
-    return [(_polygon(thing, camera, *_frame(*thing.size_m)), 1.0)]
-
-
-def _pen(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
-    length, width = thing.size_m
-    a = np.array([-0.5, 0.42, 0.5, 0.42, -0.5]) * length
-    b = np.array([-0.5, -0.5, 0.0, 0.5, 0.5]) * width
-    return [(_polygon(thing, camera, a, b), 1.0), (_polygon(thing, camera, *_frame(0.8 * length, 0.2 * width)), 1.5)]
-
-
-def _ruler(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
-    length, width = thing.size_m
-    ticks = np.zeros((camera.height, camera.width), np.uint8)
-    for k, at in enumerate(np.arange(-0.48 * length, 0.48 * length, 0.001)):
-        deep = 0.45 if k % 10 == 0 else 0.25
-        a = at + 1e-4 * np.array([-1.0, 1.0, 1.0, -1.0])
-        _polygon(thing, camera, a, width * np.array([0.5, 0.5, 0.5 - deep, 0.5 - deep]), ticks)
-    return [(_polygon(thing, camera, *_frame(length, width)), 1.0), (ticks, 0.15)]
-
-
-def _text(thing: Thing, camera: Camera) -> list[tuple[NDArray[np.uint8], float]]:
-    font, scale = cv2.FONT_HERSHEY_SIMPLEX, thing.size_m[1] * camera.px_per_m / 22.0
-    (w, h), _ = cv2.getTextSize(thing.text, font, scale, 2)
-    u, v = (float(a) for a in camera.project(*thing.place_m))
-    mask = np.zeros((camera.height, camera.width), np.uint8)
-    cv2.putText(mask, thing.text, (int(u - w / 2), int(v + h / 2)), font, scale, 255, 2, cv2.LINE_AA)
-    turn = cv2.getRotationMatrix2D((u, v), -np.degrees(thing.angle_rad + camera.roll_rad), 1.0)
-    return [(np.asarray(cv2.warpAffine(mask, turn, (camera.width, camera.height)), np.uint8), 1.0)]
 
 
 @dataclass(frozen=True)

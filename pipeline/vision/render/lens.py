@@ -71,11 +71,6 @@ class Camera:
         """Distance from the middle to a corner, the unit of the lens distortion."""
         return 0.5 * hypot(self.width, self.height)
 
-    @property
-    def tilt_rad(self) -> float:
-        """Angle between the optical axis and the table's normal; 0 at infinite distance."""
-        return 0.0 if isinf(self.distance_m) else float(np.arcsin(hypot(*self.perspective_per_m) * self.distance_m))
-
     def turned(self, quarter_turns: int) -> Camera:
         """Turn the camera by multiples of 90 degrees; the picture's sides swap with odd ones."""
         odd = quarter_turns % 2 == 1

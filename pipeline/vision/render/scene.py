@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.vision.render.clutter import ChessBoard, Cover, Thing, board_layer, cover_layers, thing_layers
+from pipeline.vision.render.clutter import ChessBoard, Cover, board_layer, cover_layers
 from pipeline.vision.render.ground import Ground, paint
 from pipeline.vision.render.lens import Camera
 from pipeline.vision.render.lighting import EVEN, Light, cast_shadow, sheet
@@ -30,6 +30,13 @@ __all__ = ["Picture", "Scene", "render", "render_board"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
+
+
+class Thing(Protocol):
+    """An object below the cable."""
+
+    def layers(self, camera: Camera, light: Light, channels: int) -> list[Layer]:
+        """What it puts on the picture."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,7 @@ class Picture:
 def render(scene: Scene) -> Picture:
     """Draw a scene."""
     camera, channels = scene.camera, scene.sensor.channels
-    layers = [layer for thing in scene.things for layer in thing_layers(thing, camera, scene.light, channels)]
+    layers = [layer for thing in scene.things for layer in thing.layers(camera, scene.light, channels)]
     draw: dict[str, Any] = {
         "camera": camera,
         "light": scene.light,

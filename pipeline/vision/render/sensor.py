@@ -6,13 +6,11 @@ Noise has the two parts of every sensor: a constant one, and shot noise whose va
 from __future__ import annotations
 
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image as PillowImage
 
 Image = NDArray[np.float32]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
@@ -102,23 +100,18 @@ def _streak(length_px: float, angle_rad: float) -> Image:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
-def encode(pixels: Pixels, suffix: str, *, jpeg_quality: int = 95, exif_orientation: int = 1) -> bytes:
+def encode(pixels: Pixels, suffix: str, *, jpeg_quality: int = 95) -> bytes:
     """Bytes of a picture file of the kind ``suffix`` (``.png``, ``.jpg``, ``.bmp``, ``.tif``).
-
-    With an EXIF orientation (2 to 8, JPEG only) the pixels are stored turned so that a reader that obeys the tag shows
-    ``pixels`` as they are.
 
     Raises
     ------
     ValueError
-        If the format cannot hold the picture (16 bit or alpha in JPEG or BMP) or the orientation.
+        If the format cannot hold the picture (16 bit or alpha in JPEG or BMP).
     """
     suffix = suffix.lower()
     narrow = suffix in (".jpg", ".jpeg", ".bmp")
     if narrow and (pixels.dtype != np.uint8 or (pixels.ndim == 3 and pixels.shape[2] == 4)):
         raise ValueError(f"{suffix} holds neither 16 bit nor alpha")
-    if exif_orientation != 1:
-        return _turned_jpeg(pixels, suffix, jpeg_quality, exif_orientation)
     swapped = pixels
     if pixels.ndim == 3:
         swapped = pixels[:, :, [2, 1, 0]] if pixels.shape[2] == 3 else pixels[:, :, [2, 1, 0, 3]]
@@ -130,27 +123,6 @@ def encode(pixels: Pixels, suffix: str, *, jpeg_quality: int = 95, exif_orientat
     return data.tobytes()
 
 
-def write_picture(path: Path, pixels: Pixels, *, jpeg_quality: int = 95, exif_orientation: int = 1) -> None:
+def write_picture(path: Path, pixels: Pixels, *, jpeg_quality: int = 95) -> None:
     """Write a picture file; the kind follows the suffix. See `encode`."""
-    path.write_bytes(encode(pixels, path.suffix, jpeg_quality=jpeg_quality, exif_orientation=exif_orientation))
-
-
-def _turned_jpeg(pixels: Pixels, suffix: str, quality: int, orientation: int) -> bytes:
-    if suffix not in (".jpg", ".jpeg") or orientation not in range(1, 9):
-        raise ValueError("only JPEG files get an EXIF orientation, 1 to 8")
-    # EXIF n shows stored(...) as the right-hand side's inverse; listed is what must be stored.
-    stored = {
-        2: lambda p: p[:, ::-1],
-        3: lambda p: p[::-1, ::-1],
-        4: lambda p: p[::-1],
-        5: lambda p: p.swapaxes(0, 1),
-        6: lambda p: np.rot90(p, 1),
-        7: lambda p: p[::-1, ::-1].swapaxes(0, 1),
-        8: lambda p: np.rot90(p, -1),
-    }[orientation](pixels)
-    picture = PillowImage.fromarray(np.ascontiguousarray(stored))
-    exif = PillowImage.Exif()
-    exif[0x0112] = orientation
-    buffer = BytesIO()
-    picture.save(buffer, format="JPEG", quality=quality, exif=exif)
-    return buffer.getvalue()
+    path.write_bytes(encode(pixels, path.suffix, jpeg_quality=jpeg_quality))

@@ -77,14 +77,6 @@ class Curve:
         c, q = np.cos(lift), np.sin(lift)
         return cls(s, c * x - q * y, q * x + c * y, lift - angle(s), values.copy())
 
-    @classmethod
-    def from_points(cls, s: ArrayLike, x: ArrayLike, y: ArrayLike) -> Curve:
-        """Curve through points at known arc lengths (a solver's output), by cubic splines x(s), y(s)."""
-        s, x, y = (np.asarray(a, dtype=float) for a in (s, x, y))
-        fx, fy = CubicSpline(s, x), CubicSpline(s, y)
-        dx, dy = fx(s, 1), fy(s, 1)
-        return cls(s, x, y, np.arctan2(dy, dx), -(dx * fy(s, 2) - dy * fx(s, 2)) / np.hypot(dx, dy) ** 3)
-
     @property
     def chord(self) -> float:
         """Distance of the ends, m."""

@@ -122,8 +122,8 @@ def _arc_joins(end: Array, leaving: Array, rest: Array, width: float) -> bool:
     return bool(max(abs(out), abs(back)) < _SHEET_TURN_DEG and abs(out - back) < JOINT_ANGLE_DEG)
 
 
-def follow(standout: Standout, cut: CrossCut, width: float) -> Array | None:
-    """The path of a strip, led on beyond both ends for as long as there is more of the same.
+def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = LEAST_MORE_WIDTHS) -> Array | None:
+    """The path of a strip, led on beyond both ends for as long as there is more of the same, ``least`` widths long.
 
     None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
     """
@@ -131,10 +131,10 @@ def follow(standout: Standout, cut: CrossCut, width: float) -> Array | None:
     most = (1.0 + _BEYOND_MOST_SHARE) * len(path)
     for _ in range(2):
         path = path[::-1]
-        longer, scraps = _ahead(standout, cut, path, width)
+        longer, scraps = _ahead(standout, cut, path, width, least)
         while longer is not None and len(longer) < most:
             path = longer
-            longer, scraps = _ahead(standout, cut, path, width)
+            longer, scraps = _ahead(standout, cut, path, width, least)
         if scraps > LEAST_MORE_WIDTHS * width:
             return None
     return path if len(path) > len(cut.path) else None
@@ -165,7 +165,9 @@ def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Stri
     )
 
 
-def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tuple[Array | None, int]:
+def _ahead(
+    standout: Standout, cut: CrossCut, path: Array, width: float, least: float = LEAST_MORE_WIDTHS
+) -> tuple[Array | None, int]:
     """The path and the more of the same beyond its last point, None if there is none; and how much in all there is.
 
     A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place.
@@ -174,7 +176,7 @@ def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tupl
     best, scraps = None, 0
     for lead in _BEYOND_LEADS_WIDTHS:
         led, ahead = _led_into_picture(standout, path, width, lead)
-        if len(ahead) < LEAST_MORE_WIDTHS * width:
+        if len(ahead) < least * width:
             continue
         more = cut_across(standout, ahead, width, known=True, weights=cut.weights)
         if more.dark != cut.dark:
@@ -182,7 +184,7 @@ def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tupl
         alike = _alike(standout, more, width, usual)
         scraps = max(scraps, int(alike.sum()))
         # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
-        stop = min(_end_of_more(more, alike, width, cut.contrast), len(ahead))
+        stop = min(_end_of_more(more, alike, width, least, cut.contrast), len(ahead))
         if stop and (best is None or len(led) + stop > len(best)):
             best = np.vstack([led, more.path[:stop]])
             if stop > 0.8 * len(ahead):
@@ -190,10 +192,10 @@ def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float) -> tupl
     return best, scraps
 
 
-def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, contrast: float) -> int:
+def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, least: float, contrast: float) -> int:
     """How many sections there are to the end of the last long run of those alike; 0 without a long one."""
     edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
-    long = np.flatnonzero(edges[1::2] - edges[::2] > LEAST_MORE_WIDTHS * width)
+    long = np.flatnonzero(edges[1::2] - edges[::2] > least * width)
     if not len(long):
         return 0
     stop = int(edges[1::2][long[-1]])

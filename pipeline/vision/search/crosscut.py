@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.vision.median import median, medians
@@ -22,6 +22,8 @@ from pipeline.vision.search.backdrop import Image, Standout
 from pipeline.vision.search.flanks import Flanks, find_flanks
 
 SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
+_CORE = ((-0.35, 0.35),)  # widths from the middle
+_CLOSE_BY = ((-0.85, -0.65), (0.65, 0.85))  # widths; beyond the blur of the edges, within a jaw not twice as wide
 SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 
 
@@ -37,6 +39,9 @@ class CrossCut:
         Between the two edges; NaN where one is not seen.
     step : (k,) fraction of full range
         Core minus ground along ``weights``, positive where the section looks like the cable.
+    beside : (k,) fraction of full range
+        What is just beside it, measured in the same way, where it looks like the cable most: on a jaw, or a cover, that
+        is wider than the cable about the step.
     contrast : float
         Median of ``step``.
     weights : (c,)
@@ -48,6 +53,7 @@ class CrossCut:
     path: Array
     width: Array
     step: Array
+    beside: Array
     contrast: float
     weights: Array
     dark: bool
@@ -56,6 +62,14 @@ class CrossCut:
     def seen_widths(self) -> Array:
         """Widths (k,) of the sections on which both edges are seen, cells."""
         return self.width[np.isfinite(self.width)]
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Sections (k,) that look like the cable, and are not beside what looks so: that is wider than the cable."""
+        wide = self.beside - median(self.beside) > (1.0 - SEEN_SHARE) * self.contrast
+        # edges are pooled over a width: they reach so far into a jaw
+        lost = maximum_filter1d(~np.isfinite(self.width), 2 * round(self.usual_width) + 1)
+        return np.asarray((self.step > SEEN_SHARE * self.contrast) & ~(wide & lost))
 
     @cached_property
     def usual_width(self) -> float:
@@ -109,7 +123,7 @@ def cut_across(
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
     flanks = find_flanks(relief, offsets, width, known=known)
-    step = _core_level(relief, offsets, flanks)
+    step, beside = (_level(relief, offsets, flanks, *part) for part in (_CORE, _CLOSE_BY))
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
     middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), 0.5 * width, mode="nearest")
@@ -117,6 +131,7 @@ def cut_across(
         path=path + normal * middle[:, None],
         width=flanks.right - flanks.left,
         step=step,
+        beside=beside,
         contrast=median(step),
         weights=weights,
         dark=sign < 0,
@@ -128,12 +143,12 @@ def _beside(offset_widths: Array) -> NDArray[np.bool_]:
     return np.asarray((np.abs(offset_widths) > 0.9) & (np.abs(offset_widths) < 1.7))
 
 
-def _core_level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks) -> Array:
-    """Median of each section ``(n,)`` over the core of the cable."""
-    spacing = float(offsets[1] - offsets[0])
-    half = int(0.35 * flanks.width / spacing)
-    column = np.rint((flanks.middle - offsets[0]) / spacing).astype(int)[:, None] + np.arange(-half, half + 1)
-    return np.asarray(medians(np.take_along_axis(relief, column.clip(0, len(offsets) - 1), axis=1), axis=1))
+def _level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks, *parts: tuple[float, float]) -> Array:
+    """Median of each section ``(n,)`` over a part of it, in widths from its middle; the highest of several."""
+    column = np.rint((flanks.middle - offsets[0]) / (offsets[1] - offsets[0])).astype(int)[:, None]
+    reach = np.divide(parts, offsets[1] - offsets[0]) * flanks.width
+    places = [(column + np.arange(int(first), int(last) + 1)).clip(0, len(offsets) - 1) for first, last in reach]
+    return np.asarray(np.max([medians(np.take_along_axis(relief, place, axis=1), axis=1) for place in places], axis=0))
 
 
 def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array]:

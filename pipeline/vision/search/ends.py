@@ -180,14 +180,17 @@ def _half_level(profile: Array, along: Array, width: float, stroke: float) -> fl
     return float(along[i] + share * (along[i + 1] - along[i]))
 
 
-def without_specks(seen: NDArray[np.bool_], points_per_width: float) -> slice:
-    """Range of a path from its first to its last seen point, without specks at the ends: a screw on a cover."""
+def without_specks(seen: NDArray[np.bool_]) -> slice:
+    """Range of a path from its first to its last seen point, without specks at the ends: a screw on a cover.
+
+    What is no longer than the gap that parts it from the rest is none of that.
+    """
     first, last = 0, len(seen)
     for direction in (1, -1):
         runs = runs_of(seen[::direction])
         while len(runs) > 1:
             (start, stop), (following, _) = runs[0], runs[1]
-            if stop - start >= points_per_width or following - stop < 0.5 * points_per_width:
+            if stop - start >= following - stop:
                 break
             runs = runs[1:]
         edge = runs[0][0] if runs else 0

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
+from skimage.graph import pixel_graph
 from skimage.morphology import skeletonize
 
 from pipeline.records import Array
@@ -223,7 +223,7 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     vu = np.argwhere(skeleton)
     if len(vu) < 3:
         return None
-    graph = _skeleton_graph(skeleton, vu)
+    graph, _ = pixel_graph(skeleton, connectivity=2)  # its nodes are in the order of ``vu``
     start = _farthest(dijkstra(graph, indices=[0])[0])
     reach, before = (of_start[0] for of_start in dijkstra(graph, indices=[start], return_predecessors=True))
     node = _farthest(reach)
@@ -241,24 +241,6 @@ def _trace(piece: Mask, width: float) -> Strip | None:
 def _farthest(reach: Array) -> int:
     """Node with the longest way to it, among those that can be reached."""
     return int(np.argmax(np.where(np.isfinite(reach), reach, -1.0)))
-
-
-def _skeleton_graph(skeleton: NDArray[np.bool_], vu: NDArray[np.intp]) -> csr_matrix[np.float64]:
-    index = np.full(skeleton.shape, -1, np.int32)
-    index[tuple(vu.T)] = np.arange(len(vu))
-    rows, columns, weights = [], [], []
-    for dv, du in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        # the piece is padded by one cell, so neighbours never leave the array
-        other = index[vu[:, 0] + dv, vu[:, 1] + du]
-        near = np.flatnonzero(other >= 0)
-        rows.append(near)
-        columns.append(other[near])
-        weights.append(np.full(len(near), np.hypot(dv, du)))
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    weight = np.concatenate(weights)
-    return coo_matrix(
-        (np.tile(weight, 2), (np.concatenate([row, column]), np.concatenate([column, row]))), shape=(len(vu),) * 2
-    ).tocsr()
 
 
 def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], width: float) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
+from fixtures.grounds import squared, wood
 from pipeline.vision.bearings import cover_size
 from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
 from pipeline.vision.bearings.covers import BearingHints, find_again, find_bearings, find_cover, find_rim, left_first
@@ -79,8 +80,8 @@ LOOKS = {
     "dark rim and slot": {"covers": (Cover(rim=0.4, slot=True),) * 2},
     "hardly wider than the cable": {"covers": (Cover(diameter_m=0.007),) * 2},
     "brushed ground": {"ground": Ground("brushed", GREY, 0.04)},
-    "wood": {"ground": Ground("wood", GREY, 0.05)},
-    "squared paper": {"ground": Ground("squared", GREY, 0.2)},
+    "wood": {"ground": Ground(wood, GREY, 0.05)},
+    "squared paper": {"ground": Ground(squared, GREY, 0.2)},
     "shadow on one side": {"light": Light(elevation_rad=0.95, ambient=0.45, shadow=0.35)},
     "bevel in a hard shadow": {
         "light": Light(0.8, 0.6, ambient=0.35, shadow=0.7, softness=0.1),

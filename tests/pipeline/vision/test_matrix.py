@@ -15,11 +15,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from fixtures.grounds import cloth, squared, stone, wood
 from fixtures.scenes import usual_photography
+from fixtures.things import Thing
+from fixtures.turned import turned_jpeg
 from pipeline.records import CameraSpec, Centerline, LoadStep, Rejected, RigSpec, Specimen, Traces
 from pipeline.settings import VisionSettings
 from pipeline.simulate import Experiment, State
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Picture, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.lighting import DIRECTIONAL, EVEN, Light
 from pipeline.vision.render.sensor import write_picture
 from pipeline.vision.render.sheath import WHITE, Sheath
@@ -71,7 +74,10 @@ def photo_of(scene: Scene, picture: Picture, case: Case, folder: Path) -> Traces
     """The picture as the only photo of a specimen."""
     path = folder / case.file
     path.parent.mkdir(exist_ok=True)
-    write_picture(path, picture.pixels, jpeg_quality=case.jpeg_quality, exif_orientation=case.exif_orientation)
+    if case.exif_orientation == 1:
+        write_picture(path, picture.pixels, jpeg_quality=case.jpeg_quality)
+    else:
+        path.write_bytes(turned_jpeg(picture.pixels, case.exif_orientation, jpeg_quality=case.jpeg_quality))
     cover = scene.covers[0]
     rig = RigSpec(
         marker_diameter_m=cover.diameter_m if cover is not None and case.size_given else None,
@@ -192,8 +198,8 @@ TRACED: dict[str, Case] = {
     "open ends": Case(scene={"covers": (None, None)}, axes_given=True),
     "mirrored": Case(camera={"mirrored": True}),
     "rolled": Case(camera={"roll_rad": -0.3}),
-    "cloth": Case(scene={"ground": Ground("cloth", (0.8, 0.8, 0.78), 0.05)}),
-    "squared paper": Case(scene={"ground": Ground("squared", (0.9, 0.9, 0.9), 0.4, 1.5)}),
+    "cloth": Case(scene={"ground": Ground(cloth, (0.8, 0.8, 0.78), 0.05)}),
+    "squared paper": Case(scene={"ground": Ground(squared, (0.9, 0.9, 0.9), 0.4, 1.5)}),
     "clutter": Case(scene={"things": CLUTTER}),
     "5 px/mm": Case(px_per_m=5_000.0),
     "blur 3 px": Case(scene={"sensor": Sensor(blur_px=3.0)}),
@@ -278,10 +284,10 @@ def test_impossible_photo_is_refused_with_its_figure(name: str, tmp_path: Path) 
 
 # Hard photos: an answer or a refusal, but never a wrong answer.
 HARD: dict[str, Case] = {
-    "wood": Case(scene={"ground": Ground("wood", (0.6, 0.45, 0.3), 0.1, 2.0, 0.3)}),
-    "stone": Case(scene={"ground": Ground("stone", (0.6, 0.6, 0.6), 0.1)}),
+    "wood": Case(scene={"ground": Ground(wood, (0.6, 0.45, 0.3), 0.1, 2.0, 0.3)}),
+    "stone": Case(scene={"ground": Ground(stone, (0.6, 0.6, 0.6), 0.1)}),
     "dark on dark": Case(scene={"ground": Ground("plain", (0.24, 0.24, 0.24))}),
-    "white on white cloth": Case(sheath=PALE, scene={"ground": Ground("cloth", (0.82, 0.82, 0.82), 0.03)}),
+    "white on white cloth": Case(sheath=PALE, scene={"ground": Ground(cloth, (0.82, 0.82, 0.82), 0.03)}),
     "sharp shadow": Case(
         px_per_m=8_000.0, scene={"light": Light(elevation_rad=0.6, ambient=0.35, shadow=0.7, softness=0.08)}
     ),

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
+from fixtures.grounds import cloth
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.measurement import measure_centerline
@@ -197,7 +198,7 @@ def test_path_beside_the_cable_is_refused(seed):
     assert found.figure["measured_share"] == 0.0
 
 
-@pytest.mark.parametrize("ground", [Ground("plain", (0.85,) * 3), Ground("cloth", (0.8,) * 3, 0.03)])
+@pytest.mark.parametrize("ground", [Ground("plain", (0.85,) * 3), Ground(cloth, (0.8,) * 3, 0.03)])
 def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
     rng = np.random.default_rng([96, 112])
     white = Sheath(colour=(0.85, 0.85, 0.85), gloss=0.2)

@@ -9,8 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, Thing, render, render_board
+from fixtures.grounds import cloth, squared, stone, wood
+from fixtures.things import Thing
+from fixtures.turned import turned_jpeg
+from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, render, render_board
 from pipeline.vision.render.clutter import ChessBoard
+from pipeline.vision.render.ground import Texture
 from pipeline.vision.render.lens import Camera
 from pipeline.vision.render.lighting import DIRECTIONAL, Light, cylinder
 from pipeline.vision.render.sensor import encode
@@ -82,8 +86,6 @@ def test_curve_of_constant_curvature_is_a_circle() -> None:
     assert curve.chord == pytest.approx(2 / 8.0 * sin(0.8), rel=1e-13)
     assert curve.y.max() == pytest.approx((1 - cos(0.8)) / 8.0, rel=1e-12)
     assert curve.theta[0] == pytest.approx(0.8, rel=1e-12)
-    again = Curve.from_points(curve.s, curve.x, curve.y)
-    assert again.kappa[200:-200] == pytest.approx(8.0, rel=1e-6)  # second derivatives lose half of sixteen digits
 
 
 CAMERAS = [
@@ -111,7 +113,6 @@ def test_camera_keeps_its_word() -> None:
     assert u == pytest.approx(499.5 + 0.96 * half) and v == pytest.approx(399.5)
     # True tilt: seen at 30 degrees from 0.5 m, a point 0.1 m up the slope. Pinhole by hand.
     tilted = Camera(1000, 800, 5000.0, look_at_m=(0.0, 0.0), perspective_per_m=(sin(0.5) / 0.5, 0.0), distance_m=0.5)
-    assert tilted.tilt_rad == pytest.approx(0.5)
     u, _ = tilted.project(0.1, 0.0)
     assert u - 499.5 == pytest.approx(5000 * 0.5 * 0.1 * cos(0.5) / (0.5 + 0.1 * sin(0.5)))
     # A plane 5 mm below the axis looks smaller by D / (D + h).
@@ -188,7 +189,7 @@ def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
         Thing("text", (0.1, 0.05), text="a"),
     )
     camera = Camera(800, 500, 5000.0)
-    scene = Scene(cable, camera, light=DIRECTIONAL, ground=Ground("cloth", contrast=0.1, angle_rad=0.2), things=things)
+    scene = Scene(cable, camera, light=DIRECTIONAL, ground=Ground(cloth, contrast=0.1, angle_rad=0.2), things=things)
     assert np.array_equal(render(scene).pixels, render(scene).pixels)
     assert not np.array_equal(render(scene).pixels, render(replace(scene, seed=1)).pixels)
     assert np.array_equal(render(scene).u_px, render(replace(scene, seed=1)).u_px)
@@ -196,8 +197,8 @@ def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
 
 @pytest.mark.parametrize("mode", ["grey", "colour", "alpha"])
 @pytest.mark.parametrize("bit_depth", [8, 12, 16])
-@pytest.mark.parametrize("kind", ["plain", "brushed", "cloth", "wood", "stone", "squared"])
-def test_every_ground_in_every_format(kind: str, bit_depth: int, mode: str) -> None:
+@pytest.mark.parametrize("kind", ["plain", "brushed", cloth, wood, stone, squared])
+def test_every_ground_in_every_format(kind: str | Texture, bit_depth: int, mode: str) -> None:
     cable = Strand(Curve.from_curvature(6.0, 0.1))
     sensor = Sensor(bit_depth=bit_depth, mode=mode, noise=0.0)
     scene = Scene(cable, Camera(300, 200, 1500.0), ground=Ground(kind, (0.5, 0.5, 0.5), 0.05), sensor=sensor)
@@ -228,7 +229,7 @@ def test_noise_has_the_spread_asked_for() -> None:
 def test_exif_orientation_shows_the_picture_as_it_is(orientation: int) -> None:
     v, u = np.mgrid[0:64, 0:96]
     pixels = (u * 2 + v // 2).astype(np.uint8)
-    data = np.frombuffer(encode(pixels, ".jpg", exif_orientation=orientation), np.uint8)
+    data = np.frombuffer(turned_jpeg(pixels, orientation), np.uint8)
     with_tag = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)  # OpenCV obeys the tag
     assert with_tag.shape == pixels.shape
     assert np.abs(with_tag.astype(int) - pixels).max() <= 2  # levels that a jpg takes from a ramp

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from fixtures.grounds import cloth, squared, stone, wood
 from fixtures.photographed.renderer import photograph, random_look
+from fixtures.things import Thing
 from pipeline.records import Rejected
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand, Thing
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.candidates import Reading, branches
@@ -84,10 +86,10 @@ LOOKS: dict[str, dict[str, object]] = {
     "shadow": {"light": Light(elevation_rad=0.95, ambient=0.45, shadow=0.35)},
     "light falls off": {"light": Light(gradient=(0.5, -0.3), vignette=0.3)},
     "brushed metal": {"ground": Ground("brushed", GREY, 0.05, 2.0)},
-    "cloth": {"ground": Ground("cloth", GREY, 0.05, 2.0)},
-    "wood": {"ground": Ground("wood", GREY, 0.06, 2.0, 0.7)},
-    "stone": {"ground": Ground("stone", GREY, 0.05)},
-    "squared paper": {"ground": Ground("squared", GREY, 0.3)},
+    "cloth": {"ground": Ground(cloth, GREY, 0.05, 2.0)},
+    "wood": {"ground": Ground(wood, GREY, 0.06, 2.0, 0.7)},
+    "stone": {"ground": Ground(stone, GREY, 0.05)},
+    "squared paper": {"ground": Ground(squared, GREY, 0.3)},
     "noise of 5 %": {"sensor": Sensor(noise=0.05)},
     "12 bits in 16": {"sensor": Sensor(bit_depth=12, noise=0.01)},
     "blur of 2 px": {"sensor": Sensor(blur_px=2.0, noise=0.01)},
@@ -271,7 +273,7 @@ def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
 SECOND = Strand(CURVE, DIAMETER, place_m=(0.0, 0.022))
 ACROSS = Strand(Curve.from_curvature(0.1, 0.06), DIAMETER, place_m=(0.06, 0.02), angle_rad=1.0)
 ASIDE = replace(CAMERA, look_at_m=(0.14, 0.022))
-CLOTH = Ground("cloth", GREY, 0.03)
+CLOTH = Ground(cloth, GREY, 0.03)
 
 
 @pytest.mark.parametrize(
@@ -309,7 +311,7 @@ def test_a_poor_photo_that_a_person_would_trace_is_traced(changes: dict[str, obj
 
 
 @pytest.mark.parametrize("cable", [UNKNOWN, Cable(DIAMETER * SCALE)], ids=["nothing known", "diameter known"])
-@pytest.mark.parametrize("ground", [Ground(colour=GREY), Ground("cloth", GREY, 0.05)], ids=["plain", "cloth"])
+@pytest.mark.parametrize("ground", [Ground(colour=GREY), Ground(cloth, GREY, 0.05)], ids=["plain", "cloth"])
 @pytest.mark.parametrize("turn", [1.35, 1.45, 1.55, 1.7, 1.85])
 def test_cable_that_crosses_itself_is_refused(turn: float, ground: Ground, cable: Cable) -> None:
     # the two straight ends cross at an angle of turn - 1 half circles, from 63 to 153 degrees
@@ -353,8 +355,8 @@ def test_piece_of_a_cable_that_leaves_the_frame_is_not_taken_for_it(cable: Cable
     camera = Camera(1000, 1000, SCALE, look_at_m=(0.5 * loop.chord, 0.5 * float(loop.y.max() + loop.y.min())))
     strand = Strand(loop, DIAMETER, overhang_m=0.10)
     # the texture tears the mask of the cable at some levels
-    cloth = Ground("cloth", GREY, 0.05)
-    outcome, _ = find(scene(cable=strand, camera=camera, covers=(None, None), ground=cloth), cable)
+    woven = Ground(cloth, GREY, 0.05)
+    outcome, _ = find(scene(cable=strand, camera=camera, covers=(None, None), ground=woven), cable)
     assert isinstance(outcome, Rejected)
     assert outcome.code == "photo/leaves-frame"
 

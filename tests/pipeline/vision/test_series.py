@@ -12,6 +12,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from fixtures.things import Thing
 from pipeline.intake.folder import read_specimen
 from pipeline.messages import Message
 from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejected, RigSpec, Side, Specimen, Traces
@@ -21,7 +22,7 @@ from pipeline.vision import shots as shots_module
 from pipeline.vision.bearings.steady import fixed_cover
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, Thing, render
+from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.series import trace_series
