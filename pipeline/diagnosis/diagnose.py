@@ -32,7 +32,6 @@ from pipeline.messages import Message
 from pipeline.records import Finding
 from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.balance import BalanceGraph
 from rod.inverse import InverseOutcome
 from rod.inverse.fit import Fit
 from rod.inverse.observation import CHORD_STD
@@ -67,19 +66,18 @@ def diagnose(
     """
     settings = settings or DiagnosisSettings()
     reason = _not_to_be_compared(faults, identification)
-    graph = None if identification is None else identification.balance
-    bench = reason or prepare(faults, settings, graph=graph)
+    bench = reason or prepare(faults, settings)
     if isinstance(bench, Message):
         return Diagnosed(_nothing_to_compare(bench), faults.findings, faults)
     fault = _data_at_fault(bench)
     if fault is not None:
         joined = joined_with_outlier(faults, fault)
-        again = prepare(joined, settings, graph=graph)
+        again = prepare(joined, settings)
         if not isinstance(again, Message) and again.largest <= again.limit:
             faults, bench = joined, again
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
-    faults, bench, conclusion = concluded(faults, bench, settings, graph)
+    faults, bench, conclusion = concluded(faults, bench, settings)
     rig = _rig_off(bench, conclusion)
     part = present(bench, conclusion, settings, identified=known, shown=rig)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
@@ -106,9 +104,7 @@ def conclude(bench: Workbench) -> Conclusion:
     return conclusion_of(bench, searched(bench))
 
 
-def concluded(
-    faults: Faults, bench: Workbench, settings: DiagnosisSettings, graph: BalanceGraph | None = None
-) -> tuple[Faults, Workbench, Conclusion]:
+def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> tuple[Faults, Workbench, Conclusion]:
     """The same with displacements known to their scatter only, where it is likelier that they scatter than not.
 
     What is found then is held against the exact displacements once more: a search that had missed it took what it
@@ -122,7 +118,7 @@ def concluded(
     ):  # scatter is among the error models: where something else is likelier, it is none
         return faults, bench, first
     scattered = with_scatter(faults, std)
-    again = prepare(scattered, settings, graph=graph)
+    again = prepare(scattered, settings)
     if isinstance(again, Message):
         return faults, bench, first
     second = conclude(again)

@@ -37,7 +37,7 @@ def identify(faults: Faults, images: Mapping[int, str], settings: IdentifySettin
 def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identification:
     """`identify` of all of a test."""
     graph = balance(test)
-    inverse = estimate(test, near=graph.law)
+    inverse = estimate(test)
     branches = _branches(test)
     found = Identification(
         test=test,

@@ -22,9 +22,8 @@ from rod.bending_test import BendingTest
 from rod.characteristic import ParametricCurve
 from rod.compliance_law import moment_basis
 from rod.inverse.camera import DISTORTED, axes_off, scaled, tilt_of
-from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_measured, as_photographed
+from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_photographed
 from rod.inverse.prediction import Facts, Model, Observer
-from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -217,17 +216,15 @@ def start(
     points: int = 0,
     straight: bool = False,
     exact: float = 0.0,
-    near: MeasuredLaw | None = None,
     begin: tuple[float, float] | None = None,
     side: float | None = None,
 ) -> Base:
     """Base model with its first guesses, by the photographed curvature over the moment P y: a constant, and any law.
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
-    The law is one of any form, or a spline of ``points``. Where the moments show none it begins with one that was
-    measured otherwise (``near``); with ``begin`` (N m^2, 1/m) given it is that constant EI and K0, with ``side`` (1/m)
-    the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or better has no error of its
-    own.
+    The law is one of any form, or a spline of ``points``. With ``begin`` (N m^2, 1/m) given it is that constant EI and
+    K0, with ``side`` (1/m) the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or
+    better has no error of its own.
 
     Raises
     ------
@@ -248,12 +245,6 @@ def start(
     if not points:
         law = AnyLaw(moment_basis(0.0, reach, unit=stiffness, size=COEFFICIENTS))
         shown = None if begin is not None else as_photographed(m, K, unit=stiffness, rest=side)
-        # from the other side of straight a law with an early knee is never found; else the line will do
-        at_rest = (step.shape for step in test.steps if step.branch == "mounted" and step.shape is not None)
-        told = any(np.median(shape.kappa) * rest > 0.0 for shape in at_rest)
-        if shown is None and near is not None and side is None and not told:
-            measured = as_measured(near, unit=stiffness)
-            shown = measured if measured is not None and measured[2] * rest < 0.0 else None
         if shown is not None:
             law, coefficients, bend = shown
             seen = np.r_[coefficients, bend]

@@ -21,7 +21,6 @@ from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
 from rod.inverse.noise import calibrate_photo_noise
 from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
 from rod.inverse.prediction import Facts
-from rod.measured_law import MeasuredLaw
 from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
 
@@ -39,7 +38,6 @@ def base_fit(
     test: MeasuredTest,
     facts: Facts,
     *,
-    near: MeasuredLaw | None = None,
     begin: tuple[float, float] | None = None,
     elements: int = ELEMENTS,
     functions: int = SHAPE_FUNCTIONS,
@@ -54,8 +52,6 @@ def base_fit(
     test : MeasuredTest
     facts : Facts
         Its circumstances.
-    near : MeasuredLaw or None
-        A law to start from where photos and forces show none by themselves.
     begin : (N m^2, 1/m) or None
         Constant EI and K0 to start from instead of what photos show.
     elements : int
@@ -75,7 +71,7 @@ def base_fit(
     observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
 
     def begun(side: float | None = None) -> Base:
-        base = start(test, facts, exact=DISPLACEMENT_STD, near=near, begin=begin, side=side)
+        base = start(test, facts, exact=DISPLACEMENT_STD, begin=begin, side=side)
         return replace(base, elements=elements)
 
     valleys = [settled(observation, _first(observation, begun(), facts))]

@@ -161,7 +161,6 @@ def _nowhere(law: int, vector: Array) -> Array:
 def estimate(
     test: MeasuredTest,
     *,
-    near: MeasuredLaw | None = None,
     begin: tuple[float, float] | None = None,
     elements: int = ELEMENTS,
 ) -> Estimate:
@@ -170,8 +169,6 @@ def estimate(
     Parameters
     ----------
     test : MeasuredTest
-    near : MeasuredLaw or None
-        A law to start from where photos and forces show none by themselves.
     begin : (N m^2, 1/m) or None
         Constant EI and K0 to start from; None takes both from the curvatures that photos show over the moment P y.
     elements : int
@@ -201,7 +198,6 @@ def estimate(
         return base_fit(
             data,
             facts_of(data),
-            near=near,
             begin=begin,
             elements=elements,
             functions=FUNCTIONS,

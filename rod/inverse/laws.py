@@ -19,7 +19,6 @@ from scipy.optimize import isotonic_regression
 from rod.characteristic import Characteristic, ParametricCurve
 from rod.compliance_law import ComplianceLaw, LawBasis, moment_basis, refreshed
 from rod.law_prior import priors
-from rod.measured_law import MeasuredLaw
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
@@ -189,32 +188,6 @@ def as_photographed(
         rise = law.basis.law(found)
         law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
     return law, law.basis.projected(rise), rest
-
-
-def as_measured(measured: MeasuredLaw, *, unit: float) -> tuple[AnyLaw, Array, float] | None:
-    """The same of a law that was measured otherwise, where the moments alone show none; None without a bend.
-
-    Parameters
-    ----------
-    measured : MeasuredLaw
-    unit : N m^2
-        Of the coefficients.
-    """
-    bend = measured.kappa - measured.pre_curvature
-    above = bend > 0.0
-    if np.count_nonzero(above) < LEAST:
-        return None
-    tangent, bend = measured.tangent[above], bend[above]
-    law, coefficients = following(np.append(tangent[0], tangent), np.append(0.0, bend), unit=unit)
-    for _ in range(LAYINGS):
-        rise = law.basis.law(coefficients)
-        law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
-        coefficients = law.basis.projected(rise)
-    return law, coefficients, measured.pre_curvature
-
-
-LEAST = 4
-"""Points above rest that a law needs."""
 
 
 def following(tangent: Array, bend: Array, *, unit: float) -> tuple[AnyLaw, Array]:

@@ -19,7 +19,6 @@ from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.balance import BalanceGraph
 from rod.inverse.base_fit import base_fit
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
@@ -81,7 +80,6 @@ def prepare(
     settings: DiagnosisSettings,
     *,
     causes: Sequence[Cause] = SUSPECTS,
-    graph: BalanceGraph | None = None,
 ) -> Workbench | Message:
     """Fit the base model and score all causes.
 
@@ -91,8 +89,6 @@ def prepare(
         The test and what of it is not to be used.
     settings : DiagnosisSettings
     causes : sequence of Cause
-    graph : BalanceGraph or None
-        What the balance equations say of the test, from which the fit may start.
 
     Returns
     -------
@@ -103,7 +99,6 @@ def prepare(
     observation, fitted = base_fit(
         test,
         facts_of(test),
-        near=None if graph is None else graph.law,
         without_photos=faults.photos,
         without_forces=faults.forces,
     )

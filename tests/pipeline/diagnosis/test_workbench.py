@@ -17,7 +17,6 @@ from pipeline.faults import faults_of_input
 from pipeline.result import Curve
 from pipeline.run import measure
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.balance import balance
 from tests.rod.virtual_photo import parted_axes
 
 SETTINGS = DiagnosisSettings()
@@ -60,7 +59,7 @@ def test_a_law_with_an_early_knee_is_begun_on_the_side_where_its_cable_is_bent(s
     """A straight line through all curvatures asks for a K0 of the other sign, and moments alone show no law."""
     trial = LawTrial("knee-20", seed, steps)
     test = trial.measured()[0]
-    bench = workbench.prepare(faults_of_input(test), SETTINGS, graph=balance(test))
+    bench = workbench.prepare(faults_of_input(test), SETTINGS)
     found = bench.base.extension.base.pre_curvature(bench.base.vector)
     # a hundredth of the curvatures met is what photos without one at rest tell
     assert found == pytest.approx(trial.cable.law.K0, abs=0.01 * trial.cable.law.reach)
