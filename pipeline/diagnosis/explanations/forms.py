@@ -7,6 +7,7 @@ where they add up to one spot or one step, that is tried in their place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.statistics.score import descending
+from rod.inverse.cause import Variant
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import Fit, fit_from
 from rod.inverse.observation import Observation
@@ -84,9 +86,15 @@ def in_all_forms(observation: Observation, fitted: Fit, cause: Cause, setting: s
     """The model with all forms of a cause whose amounts add up, then with those alone that it needs, each in its place.
 
     Amounts of one sign are a nearly linear problem. Added one by one they are not: beside a round loop that is none no
-    form of it promises anything.
+    form of it promises anything. Forms of each kind are tried by themselves too, as places are few.
     """
     forms = [form for form in cause.variants(fitted.extension.facts) if form.setting == setting]
+    kinds = {label: [form for form in forms if form.label == label] for label in (form.label for form in forms)}
+    tried = [*kinds.values(), *([forms] if len(kinds) > 1 else [])]
+    return min((fitted, *(_spread(observation, fitted, cause, some) for some in tried)), key=cost)
+
+
+def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence[Variant]) -> Fit:
     own = fitted.extension.terms_of(cause)
     total = sum(fitted.amount(k)[0] for k in own)
     rest, vector = fitted.extension.without(fitted.vector, own)
@@ -95,17 +103,11 @@ def in_all_forms(observation: Observation, fitted: Fit, cause: Cause, setting: s
     spread = fit_from(observation, replace(rest, terms=(*rest.terms, *every)), start, fitted)
     if spread.run.prediction is None:
         return fitted
-    amounts = spread.vector[len(vector) :]
-    needed = [
-        (Term(cause, form), amount) for form, amount in zip(forms, amounts, strict=True) if amount > LEAST_SHARE * total
-    ]
-    terms = tuple(term for term, _ in needed)
+    amounts = zip(forms, spread.vector[len(vector) :], strict=True)
+    needed = [(Term(cause, form), amount) for form, amount in amounts if amount > LEAST_SHARE * total]
     start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in needed)])
-    found = fit_from(observation, replace(rest, terms=(*rest.terms, *terms)), start, spread)
-    if found.run.prediction is None:
-        return fitted
-    found = without_needless_forms(observation, found, cause)
-    return found if cost(found) < cost(fitted) else fitted
+    found = fit_from(observation, replace(rest, terms=(*rest.terms, *(term for term, _ in needed))), start, spread)
+    return fitted if found.run.prediction is None else without_needless_forms(observation, found, cause)
 
 
 def may_join(term: Term, fitted: Fit, setting: str) -> bool:

@@ -163,11 +163,11 @@ def searched(bench: Workbench) -> Search:
     search = Search(bench)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
+    silent = silent and first.word == "base" and bench.largest < bench.limit
+    hidden = hidden_pair(bench.suspicion) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.chi2 < FITS * (len(bench.base.residual) - bench.base.extension.size)
-    silent = silent and first.word == "base" and bench.largest < bench.limit and fits
-    hidden = hidden_pair(bench.suspicion) if silent else ()
-    if silent and not hidden:
+    if silent and fits and not hidden:
         return search
     search.singles()
     credible = [one.found for one in search.posterior.credible() if one.found is not None][:LIKELIEST]
