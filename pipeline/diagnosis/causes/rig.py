@@ -11,6 +11,7 @@ in_plane_load        dead load along and across the chord, N/m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,12 +19,25 @@ import numpy as np
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.observation import ZERO_STD
 from rod.inverse.prediction import Facts, Model
+from rod.support import Support
 
 UNDER_LOAD = "mounted under the load"
 """Setting of a load in the plane: displacement is counted from where the cable lies without force, but under it."""
 
 WITH_FORCE = "that grows with the force"
 """Label of the friction of a bearing without preload: Coulomb's, by the measured force."""
+
+
+SIDES = ("at the left bearing", "at the right bearing")
+"""Labels of what one bearing has alone: a dirty one, a clamp, a cable that is led in."""
+
+
+def _at_bearings(model: Model, variant: Variant, change: Callable[[Support], Support]) -> Model:
+    """The model with both bearings changed, or the one that the label of the form names."""
+    bending, one = model.bending, variant.label in SIDES
+    left = bending.left if one and variant.label != SIDES[0] else change(bending.left)
+    right = bending.right if one and variant.label != SIDES[1] else change(bending.right)
+    return replace(model, bending=replace(bending, left=left, right=right))
 
 
 class BearingFriction(Cause):
@@ -39,12 +53,12 @@ class BearingFriction(Cause):
         return 0.03 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, slipping at once or only after they have been turned by some angle.
+        """Both bearings alike, slipping at once or only after they have been turned by some angle; or one of them.
 
         The friction of a seal is one moment, that of a journal grows with the force on it.
         """
         yielding = Variant("that yields before it slips", at=0.03, tuned=("at",), at_range=(0.004, 0.1))
-        return (Variant("that slips at once"), Variant(WITH_FORCE), yielding)
+        return (Variant("that slips at once"), Variant(WITH_FORCE), yielding, *map(Variant, SIDES))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
@@ -59,9 +73,7 @@ class BearingFriction(Cause):
             before = 0.0 if bending.friction_by_step is None else bending.friction_by_step
             return replace(model, bending=replace(bending, friction_by_step=before + more))
         angle = variant.at or bending.left.stick_angle
-        left = replace(bending.left, friction_moment=amount, stick_angle=angle)
-        right = replace(bending.right, friction_moment=amount, stick_angle=angle)
-        return replace(model, bending=replace(bending, left=left, right=right))
+        return _at_bearings(model, variant, lambda end: replace(end, friction_moment=amount, stick_angle=angle))
 
 
 SCATTER = 0.3
@@ -77,23 +89,25 @@ def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:
 
 
 class BearingStiffness(Cause):
-    """``bearing_stiffness``: rotational spring in each bearing, both alike."""
+    """``bearing_stiffness``: rotational spring in each bearing, or in one."""
 
     name = "bearing_stiffness"
     unit = "N m/rad"
     sign = 1
+    combines = True
     seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
         """A twentieth of the cable's own stiffness EI/L."""
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
 
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """Both bearings alike, or one."""
+        return (Variant(), *map(Variant, SIDES))
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Give both bearings the spring ``amount``."""
-        bending = model.bending
-        left = replace(bending.left, stiffness=bending.left.stiffness + amount)
-        right = replace(bending.right, stiffness=bending.right.stiffness + amount)
-        return replace(model, bending=replace(bending, left=left, right=right))
+        """Give the bearings the spring ``amount``."""
+        return _at_bearings(model, variant, lambda end: replace(end, stiffness=end.stiffness + amount))
 
 
 class RigidEnds(Cause):
@@ -102,6 +116,7 @@ class RigidEnds(Cause):
     name = "rigid_ends"
     unit = "m"
     sign = 1
+    combines = True
     limited = True
     seat = "rig"
 
@@ -110,17 +125,16 @@ class RigidEnds(Cause):
         return 0.02 * facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form: both ends alike. Its trace grows with more than the square of the length, so a large one counts.
+        """Both ends alike, or one. The trace grows with more than the square of the length, so a large one counts.
 
         At twice the plausible size it points elsewhere than at a fifth: 4.8 mm scored 0.8 and removed 32.
         """
-        return (Variant(), Variant(trace=10.0))
+        return tuple(Variant(side, trace=trace) for side in ("", *SIDES) for trace in (1.0, 10.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Make ``amount`` of the cable at both ends stiff; at most a fifth of its length."""
-        bending, piece = model.bending, min(max(amount, 0.0), 0.2 * facts.length)
-        left, right = replace(bending.left, rigid_length=piece), replace(bending.right, rigid_length=piece)
-        return replace(model, bending=replace(bending, left=left, right=right))
+        """Make ``amount`` of the cable at the ends stiff; at most a fifth of its length."""
+        piece = min(max(amount, 0.0), 0.2 * facts.length)
+        return _at_bearings(model, variant, lambda end: replace(end, rigid_length=end.rigid_length + piece))
 
 
 class RigCompliance(Cause):

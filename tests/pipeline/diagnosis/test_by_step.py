@@ -46,6 +46,22 @@ def with_journals(cable, protocol):
     return cable
 
 
+@pytest.mark.parametrize(
+    ("name", "cable"),
+    [
+        ("bearing_friction", Cable(bearing_friction=3e-3, sides=(1.0, 0.0))),
+        ("bearing_stiffness", Cable(bearing_stiffness=4e-3, sides=(0.0, 1.0))),
+        ("bearing_stiffness", Cable(bearing_stiffness=4e-3, sides=(1.0, 0.4))),
+    ],
+)
+def test_one_bearing_alone_is_named_with_its_side(name, cable):
+    """With both alike these were unexplained, or a load in the plane and a stiffness that varies were named."""
+    part, covered = found(cable, "loop", 43)
+    assert part.verdict == "named" and part.causes[0].name == name, part.headline
+    labels = [form.label for form in part.causes[0].forms]
+    assert covered > 0.9 and any(label.startswith("at the ") for label in labels), labels
+
+
 ON_LOADING = Protocol(tuple(i / 6 for i in range(1, 7)), ("loading",) * 6)
 
 
