@@ -105,6 +105,8 @@ def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence
         return fitted
     amounts = zip(forms, spread.vector[len(vector) :], strict=True)
     needed = [(Term(cause, form), amount) for form, amount in amounts if amount > LEAST_SHARE * total]
+    if not needed:
+        return fitted
     start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in needed)])
     found = fit_from(observation, replace(rest, terms=(*rest.terms, *(term for term, _ in needed))), start, spread)
     return fitted if found.run.prediction is None else without_needless_forms(observation, found, cause)

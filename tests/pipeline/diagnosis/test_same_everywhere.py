@@ -40,8 +40,8 @@ BORDERLINE = [
     ("six", "rig_compliance", 6.658e-6, DISPLACED, "rig_compliance length_error"),
     ("six", "displacement_offset", 4.872e-5, DISPLACED, ""),
     ("six", "displacement_offset", 4.907e-5, DISPLACED, "displacement_offset length_error"),
-    ("loop", "bearing_friction", 7.625e-5, TURNING_BACK, ""),
-    ("loop", "bearing_friction", 7.680e-5, TURNING_BACK, "bearing_friction hysteresis plastic_set"),
+    ("loop", "bearing_friction", 8.046e-5, TURNING_BACK, ""),
+    ("loop", "bearing_friction", 8.102e-5, TURNING_BACK, "bearing_friction hysteresis plastic_set"),
     ("loop", "force_offset", 0.01201, LOADS, ""),
     ("loop", "force_offset", 0.01209, LOADS, "force_offset in_plane_load displacement_offset"),
 ]
