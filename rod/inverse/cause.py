@@ -44,6 +44,8 @@ class Variant:
     known : float
         Multiple of the usual amount that is the standard deviation of what is known of the amount beforehand; infinite
         where nothing is.
+    rare : bool
+        Whether few rigs have it so: it is sought, but says nothing of what would have been seen of the cause.
     ordinary : float
         Standard deviation, in the unit of the cause, of what every rig has of it because nobody sets or measures it
         better. So much is among the errors of the data, and is not named.
@@ -60,6 +62,7 @@ class Variant:
     power: float = 1.0
     known: float = np.inf
     of_law: bool = False
+    rare: bool = False
     ordinary: float = 0.0
 
     @property

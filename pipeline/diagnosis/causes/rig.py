@@ -58,7 +58,12 @@ class BearingFriction(Cause):
         The friction of a seal is one moment, that of a journal grows with the force on it.
         """
         yielding = Variant("that yields before it slips", at=0.03, tuned=("at",), at_range=(0.004, 0.1))
-        return (Variant("that slips at once"), Variant(WITH_FORCE), yielding, *map(Variant, SIDES))
+        return (
+            Variant("that slips at once"),
+            Variant(WITH_FORCE),
+            yielding,
+            *(Variant(side, rare=True) for side in SIDES),
+        )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
@@ -103,7 +108,7 @@ class BearingStiffness(Cause):
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Both bearings alike, or one."""
-        return (Variant(), *map(Variant, SIDES))
+        return (Variant(), *(Variant(side, rare=True) for side in SIDES))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give the bearings the spring ``amount``."""
@@ -129,7 +134,7 @@ class RigidEnds(Cause):
 
         At twice the plausible size it points elsewhere than at a fifth: 4.8 mm scored 0.8 and removed 32.
         """
-        return tuple(Variant(side, trace=trace) for side in ("", *SIDES) for trace in (1.0, 10.0))
+        return tuple(Variant(side, trace=trace, rare=bool(side)) for side in ("", *SIDES) for trace in (1.0, 10.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Make ``amount`` of the cable at the ends stiff; at most a fifth of its length."""

@@ -64,6 +64,11 @@ class Suspicion:
         """Directions of a cause."""
         return np.flatnonzero(self.owner == cause)
 
+    @property
+    def usual(self) -> NDArray[np.int_]:
+        """Directions that are no rare forms."""
+        return np.flatnonzero([not term.variant.rare for term in self.terms])
+
     def best(self, cause: int) -> int | None:
         """Direction of a cause with the largest statistic; by ``|z|`` where none is admissible; None without forms."""
         own = self.of(cause)

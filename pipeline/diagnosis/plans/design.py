@@ -182,7 +182,7 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
     if not plan.displacements or min(plan.displacements) <= 0.0:
         raise ValueError(Message("misuse.no-step"))
     bench = planned_bench(plan, settings)
-    table = between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
+    table = _closeness(bench)
     others = [
         (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
     ]
@@ -279,7 +279,13 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
 def _table(plan: Plan, protocol: Protocol, settings: DiagnosisSettings) -> Array:
     """Cosines between causes if a protocol were added to the plan."""
     bench = _bench(plan, protocol.facts, settings)
-    return between_causes(cosines(bench.suspicion.scores.unit), bench.suspicion.owner, len(bench.suspicion.causes))
+    return _closeness(bench)
+
+
+def _closeness(bench: Workbench) -> Array:
+    """Cosines (c, c) of the causes in their usual forms."""
+    suspicion, usual = bench.suspicion, bench.suspicion.usual
+    return between_causes(cosines(suspicion.scores.unit[:, usual]), suspicion.owner[usual], len(suspicion.causes))
 
 
 def _cause_plan(
@@ -290,7 +296,7 @@ def _cause_plan(
     settings: DiagnosisSettings,
 ) -> CausePlan:
     suspicion, cause = bench.shown(index), bench.suspicion.causes[index]
-    own = suspicion.of(index)
+    own = np.intersect1d(suspicion.of(index), suspicion.usual)
     plausible = cause.plausible(bench.facts)
     if own.size == 0:
         return CausePlan(

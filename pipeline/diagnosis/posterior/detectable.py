@@ -60,7 +60,7 @@ def sigma_needed(
 
 
 def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float) -> dict[int, float]:
-    """Smallest amount of every form of a cause (direction -> amount) that is found with the given power.
+    """Smallest amount of every usual form of a cause (direction -> amount) that is found with the given power.
 
     By the trace of each form as it was computed; infinite where the data do not show it, or only at more than
     a rig can have. A trace computed at a large amount says little of the smallest one that is seen, unless it is known
@@ -71,7 +71,7 @@ def in_each_form(fitted: Fit, suspicion: Suspicion, cause: int, *, power: float)
     taken, volume = taken_by_rig(scores.unit[:, own], fitted, suspicion)
     for k, share in zip(map(int, own), map(float, taken), strict=True):
         variant, norm = terms[k].variant, float(scores.norm[k])
-        if variant.trace != 1.0 and variant.power == 1.0:
+        if variant.rare or (variant.trace != 1.0 and variant.power == 1.0):
             continue
         forms, causes = len(own), len(set(suspicion.owner.tolist()))
         rig = (share, volume)

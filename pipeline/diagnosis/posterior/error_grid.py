@@ -52,13 +52,12 @@ SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
 AS_RIGS_ARE = (0.0, 1.0)
 MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (1e-5, 1.0): 0.2, (5e-5, 1.0): 0.1}
-"""Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by
-several standard deviations of a hold are something else: no band of f_EI may take them for noise unseen; by how much
-few samples may belie their noise is no matter of belief, see `hold_sizes`. `MOVED`:
-scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
-together: one that is exact in all but one thing is rarer than one that nobody aligned, and where displacements scatter
-nobody knows their zero better. An exact one is a simulation;
-where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
+"""Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by several
+standard deviations of a hold are something else: no band of f_EI may take them for noise unseen; by how much few
+samples may belie their noise is no matter of belief, see `hold_sizes`. `MOVED`: scatter of the displacements (m), and
+whether the rig is exact (0) or off by its standard deviations (1), all of it together: one that is exact in all but one
+thing is rarer than one that nobody aligned, and where displacements scatter nobody knows their zero better. An exact
+one is a simulation; where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
 
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
