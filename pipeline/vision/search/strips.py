@@ -224,6 +224,8 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     if len(vu) < 3:
         return None
     graph, _ = pixel_graph(skeleton, connectivity=2)  # its nodes are in the order of ``vu``
+    # the oldest scipy that is allowed walks no graph whose indices have 64 bits
+    graph.indices, graph.indptr = graph.indices.astype(np.int32), graph.indptr.astype(np.int32)
     start = _farthest(dijkstra(graph, indices=[0])[0])
     reach, before = (of_start[0] for of_start in dijkstra(graph, indices=[start], return_predecessors=True))
     node = _farthest(reach)
