@@ -48,7 +48,8 @@ class NonlinearStiffness(Cause):
 
 
 WIRES = 6
-"""Elements of a round corner: its loop is then a parabola to a hundredth of its half width."""
+"""Elements of equal moment in a round corner: its loop is that of very many of them to 9 % of its half width. What that
+leaves is for further forms."""
 
 
 class Hysteresis(Cause):
