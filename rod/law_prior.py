@@ -183,18 +183,19 @@ def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ..
     inner, back, offset = solved @ solved.T, -solved @ (Q.T @ J[:, :p]), -solved @ (Q.T @ value)
     beside, left = J[:, :p] - Q @ (Q.T @ J[:, :p]), value - Q @ (Q.T @ value)
     schur, pull = beside.T @ beside, -beside.T @ left
-    ended = [_conditioned(schur, pull, unknowns[:p], one) for one in families]
+    ended = [conditioned(schur, pull[:, None], unknowns[:p], one) for one in families]
     # what all have in common: the misfit of the data and what the unknowns eliminated fill of it
     common = -0.5 * float(left @ left) - float(np.sum(np.log(np.abs(np.diag(R)))))
-    evidence = common + np.array([one.evidence for one in ended])
+    evidence = common + np.array([one.evidence[:, 0] for one in ended])
     top = float(evidence.max())
     weights = np.exp(evidence - top)
     log_evidence = top + float(np.log(weights.mean()))
     weights /= weights.sum()
-    move = np.sum([one.vectors @ (w @ one.moves) for one, w in zip(ended, weights, strict=True)], axis=0)
+    moves = [one.moves[..., 0] for one in ended]
+    move = np.sum([one.vectors @ (w @ m) for one, m, w in zip(ended, moves, weights, strict=True)], axis=0)
     covariance = np.zeros((p, p))
-    for one, w in zip(ended, weights, strict=True):
-        spread = one.moves @ one.vectors.T - move
+    for one, own, w in zip(ended, moves, weights, strict=True):
+        spread = own @ one.vectors.T - move
         covariance += (one.vectors * (w @ (1.0 / one.precisions))) @ one.vectors.T + (w[:, None] * spread).T @ spread
     shrinkage = np.eye(p) - covariance @ schur
     across = back @ covariance
@@ -208,10 +209,11 @@ def averaged(value: Array, J: Array, unknowns: Array, families: tuple[Family, ..
     )
 
 
-class _Conditioned(NamedTuple):
-    """One family given the data, in coordinates `vectors` (p, p) in which all its precisions are diagonal.
+class Conditioned(NamedTuple):
+    """One family given the data, in coordinates `vectors` (..., p, p) in which all its precisions are diagonal.
 
-    Precisions and moves are (t, p); the logarithm of the evidence (t,) lacks what all families have in common.
+    Precisions (..., t, p), moves (..., t, p, d); the logarithm of the evidence (..., t, d) lacks what all families have
+    in common.
     """
 
     vectors: Array
@@ -220,19 +222,32 @@ class _Conditioned(NamedTuple):
     evidence: Array
 
 
-def _conditioned(schur: Array, pull: Array, a: Array, one: Family) -> _Conditioned:
-    """Posterior for all tau at once: data and form are diagonal in one and the same coordinates."""
+def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned:
+    """Posterior of the coefficients for all tau at once: data and form are diagonal in one and the same coordinates.
+
+    Parameters
+    ----------
+    schur : (..., p, p)
+        Information of the data on the coefficients, all other unknowns eliminated.
+    pull : (..., p, d)
+        What it pulls at them with, for each of d data sets, at the coefficients ``a`` (p,).
+    a : (p,)
+    one : Family
+    """
     scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
     # where rounding is all that data and prior tell, it must not become a negative variance
-    scales = np.maximum(scales, scales.size * np.finfo(float).eps * scales[-1])
-    root = axes / np.sqrt(scales)
-    share, turned = np.linalg.eigh(root.T @ one.form @ root)
+    scales = np.maximum(scales, len(a) * np.finfo(float).eps * scales[..., -1:])
+    root = axes / np.sqrt(scales)[..., None, :]
+    share, turned = np.linalg.eigh(root.swapaxes(-1, -2) @ one.form @ root)
     vectors = root @ turned
-    share = np.clip(share, 0.0, 1.0)
-    precisions = (1.0 - share) + share / TAUS[:, None] ** 2
-    fixed, form = vectors.T @ (one.fixed @ a), vectors.T @ (one.form @ a)
-    toward = vectors.T @ pull - fixed - form / TAUS[:, None] ** 2
+    share, tau = np.clip(share, 0.0, 1.0)[..., None, :], TAUS[:, None]
+    precisions = (1.0 - share) + share / tau**2
+    turn = vectors.swapaxes(-1, -2)
+    fixed, form = turn @ (one.fixed @ a), turn @ (one.form @ a)
+    known = (fixed[..., None, :] + form[..., None, :] / tau**2)[..., None]
+    toward = (turn @ pull)[..., None, :, :] - known
     prior = a @ (one.fixed @ a) + (a @ (one.form @ a)) / TAUS**2
-    gained = np.sum(toward**2 / precisions, axis=1) - prior
-    log_det = np.sum(np.log(precisions), axis=1) + np.sum(np.log(scales))
-    return _Conditioned(vectors, precisions, toward / precisions, one.log_norms + 0.5 * (gained - log_det))
+    gained = np.sum(toward**2 / precisions[..., None], axis=-2) - prior[:, None]
+    log_det = np.sum(np.log(precisions), axis=-1) + np.sum(np.log(scales), axis=-1)[..., None]
+    evidence = (one.log_norms - 0.5 * log_det)[..., None] + 0.5 * gained
+    return Conditioned(vectors, precisions, toward / precisions[..., None], evidence)

@@ -67,6 +67,7 @@ INSIDE = {
     ],
     "pipeline.diagnosis.posterior": [
         ("explanation", "error_grid", "words"),
+        ("unknowns",),
         ("evidence", "hypotheses"),
         ("weigh", "detectable", "mixture"),
     ],

@@ -18,7 +18,7 @@ from scipy.optimize import isotonic_regression
 
 from rod.characteristic import Characteristic, ParametricCurve
 from rod.compliance_law import ComplianceLaw, LawBasis, moment_basis, refreshed
-from rod.law_prior import priors
+from rod.law_prior import TAUS, Family, priors
 from rod.stiffness_law import StiffnessLaw
 
 Array = NDArray[np.float64]
@@ -56,7 +56,11 @@ class Law(Protocol):
         """Change (size,) of the unknowns that makes the law so much stiffer."""
 
     def prior(self) -> Array:
-        """Rows (m, size) of unit variance about zero."""
+        """Rows (m, size) of unit variance about zero: what a fit holds the unknowns by."""
+
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """All that is known of the form: what fits are weighed by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,11 @@ class AnyLaw:
         kept = weight > 1e-9 * weight[-1]  # the level has no prior
         return np.asarray(np.sqrt(weight[kept])[:, None] * mode.T[kept])
 
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """All of `rod.law_prior`."""
+        return priors(self.basis)
+
 
 @dataclass(frozen=True, eq=False)
 class FewPoints:
@@ -133,6 +142,12 @@ class FewPoints:
     def prior(self) -> Array:
         """Nothing."""
         return np.zeros((0, self.size))
+
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """Nothing either."""
+        none = np.zeros((self.size, self.size))
+        return (Family(none, none, np.zeros(len(TAUS))),)
 
 
 LAYINGS = 2

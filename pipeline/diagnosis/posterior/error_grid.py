@@ -32,7 +32,7 @@ Notation of the products: G grid points, o own columns, k added ones.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -135,6 +135,10 @@ class Products:
     scales: Array
     sizes: NDArray[np.int_]
 
+    def at(self, kept: NDArray[np.int_]) -> Products:
+        """Those of some error models."""
+        return Products(*(getattr(self, field.name)[kept] for field in fields(self)))
+
 
 @dataclass(frozen=True, eq=False)
 class ErrorGrid:
@@ -200,19 +204,18 @@ class ErrorGrid:
                 log_det.append((held_det[:, b] + shape_det[:, a] + det).ravel())
                 share = (chance if len(kind.shapes) > 1 else 1.0) * kind.chance / len(a)
                 log_prior.append(np.repeat(np.log(np.array([*self.hold.values()]) * share), len(a)))
-                held_at = np.repeat(np.arange(len(self.hold)), len(a))
-                where = np.column_stack([held_at, np.tile(kind.pairs, (len(self.hold), 1))])
+                held = np.repeat(np.arange(len(self.hold)), len(a))
+                where = np.column_stack([held, np.tile(kind.pairs, (len(self.hold), 1))])
                 sizes.append(np.hstack([np.tile([slow, number], (len(where), 1)), where]))
         table, positions = np.concatenate(tables), np.concatenate(sizes)
-        grid = len(table)
         found = Products(
-            own=table[:, : own * own].reshape(grid, own, own),
-            cross=table[:, own * own : own * (own + count)].reshape(grid, own, count),
+            own=table[:, : own * own].reshape(len(table), own, own),
+            cross=table[:, own * own : own * (own + count)].reshape(len(table), own, count),
             square=table[:, own * (own + count) :],
             log_det=np.concatenate(log_det),
             log_prior=np.concatenate(log_prior),
             rest=np.array([not kind.noise for kind in self.kinds])[positions[:, 1]],
-            scales=np.zeros((grid, extra)),
+            scales=np.zeros((len(table), extra)),
             sizes=positions,
         )
         return _with_rig(found, self.displacements.shape[1], self.rig.shape[1])
@@ -327,11 +330,8 @@ def hold_sizes(observation: Observation) -> dict[float, float]:
 
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
     """Which of `SHAPES` are waves of a photo, and nothing else."""
-    scatter = (
-        np.median([np.median(photo.sections.section_std) for photo in observation.photos])
-        if observation.photos
-        else 0.0
-    )
+    seen = [np.median(photo.sections.section_std) for photo in observation.photos]
+    scatter = np.median(seen) if seen else 0.0
     size = facts.length * np.array(SHAPES)
     return np.asarray((size >= FAINTEST * scatter) & (size <= scatter) & (size > 0.0))
 

@@ -1,13 +1,16 @@
 """How probable the data are under a fitted model, and under that model with one more column: evidence of hypotheses.
 
-About a fit the model is linear: with whitened residual r, sensitivities J, rows of prior knowledge (r_p, J_p) and an
-error model C of `error_grid`, b = J' C^-1 r + J_p' r_p and H = J' C^-1 J + J_p' J_p,
+About a fit the model is linear: with whitened residual r, sensitivities J, rows of prior knowledge (r_p, J_p), an
+error model C of `error_grid` and a prior exp(n - a' P a / 2) of the law's coefficients a, one of `rod.law_prior`,
+b = J' C^-1 r + J_p' r_p - P a and H = J' C^-1 J + J_p' J_p + P,
 
-    log p = -1/2 (r' C^-1 r + r_p' r_p - b' H^-1 b) - 1/2 log|C| - 1/2 log|H| + (p / 2) log 2 pi,
+    log p = n - 1/2 (r' C^-1 r + r_p' r_p + a' P a - b' H^-1 b) - 1/2 log|C| - 1/2 log|H| + (p / 2) log 2 pi,
 
-flat in all that has no prior row: law and K0, which all hypotheses share, and amounts. An amount has beforehand a
-normal distribution about zero, of a size s times the plausible one, s anywhere from 0.003 to 10. With its estimate a
-and variance S (flat, from H) that multiplies p by
+flat in all that has no prior: the law's level and K0, which all hypotheses share, and amounts. The mean over all priors
+of the law and the sum over all error models count. Held to one prior, a law with an early knee is less likely than a
+smooth one beside a cause that is not there. An amount has beforehand a normal distribution about zero, of a size s
+times the plausible one, s anywhere from 0.003 to 10. With its estimate a and variance S (flat, from H) that multiplies
+p by
 
     mean over s of  N(a; 0, S + s^2 plausible^2) * 2 Phi(m / d)        m, d: mean and std of the amount given s,
 
@@ -22,14 +25,22 @@ Source: MacKay (1992), Bayesian interpolation, eqs. 2.4 and 2.5; the size of an 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.unknowns import (
+    LOG_2PI,
+    NOTHING,
+    Solved,
+    conditional,
+    log_sum,
+    mean_over_laws,
+    solved_for,
+)
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
 
@@ -38,10 +49,12 @@ Array = NDArray[np.float64]
 SIZES = np.geomspace(0.003, 10.0, 8)
 """Sizes s of an amount, in plausible ones: steps of a factor three, over which a normal density hardly changes."""
 
-ROUNDING, INVISIBLE = 1e-11, 1e-9
-"""Of the scale of an unknown, and of a column's square: what falls below is rounding."""
+INVISIBLE = 1e-9
+"""Of a column's square: what falls below is rounding."""
 
-LOG_2PI = float(np.log(2.0 * np.pi))
+FEW = 12.0
+"""Of log p: a prior of the law that is so much less likely than all together counts for nothing beside a further column
+either."""
 
 
 class Evidence(NamedTuple):
@@ -62,23 +75,6 @@ class WithColumn(NamedTuple):
 
     plain: Array
     rest: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """What the fit's own unknowns are for every error model.
-
-    ``flat`` (G, d): log p flat in the amounts. ``half`` (G, p, p): W with W' W = H^-1; ``pull`` (G, p, d): W b.
-    ``amounts``: those of the vector that no prior row states. ``move`` (G, d, a) of these and ``covariance`` (G, a, a).
-    """
-
-    products: Products
-    flat: Array
-    half: Array
-    pull: Array
-    amounts: list[int]
-    move: Array
-    covariance: Array
 
 
 def evidence(
@@ -106,13 +102,13 @@ def evidences(
         Whitened traces per unit of amount.
     """
     more = np.zeros((len(residuals), 0)) if columns is None else columns
-    solved = _solved(grid, fitted, more, residuals)
-    own = solved.flat + _amounts(fitted, solved)
-    added = own[..., None] + _column_gain(fitted, terms, solved)
+    solved = solved_for(grid, fitted, more, residuals)
+    by_law = solved.flat + _amounts(fitted, solved)
     prior, rest = solved.products.log_prior, solved.products.rest
-    posterior = own + prior[:, None]
+    posterior = mean_over_laws(by_law) + prior[:, None]
+    added = posterior[..., None] + _column_gain(fitted, terms, solved, by_law)
     plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
-    further = [_total(added[part] + prior[part, None, None]) for part in (~rest, rest)]
+    further = [_total(added[part]) for part in (~rest, rest)]
     weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
     found = []
     for k, one in enumerate(weight.T):
@@ -125,41 +121,41 @@ def evidences(
 
 def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
-    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
-    weight = np.where(solved.products.rest, solved.flat[:, 0] + solved.products.log_prior, -np.inf)
+    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    weight = np.where(solved.products.rest, mean_over_laws(solved.flat)[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
-    move = solved.half[best].T @ solved.pull[best, :, 0]
+    move = conditional(solved, solved.flat, np.array([best]))[0][0]
     moved = grid.beside[:data] @ (solved.products.scales[best] * move[size:])
     left = fitted.residual[:data] - fitted.jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)
 
 
-def log_sum(logs: Array) -> Array:
-    """Log of the sum of exponentials along the first axis, all finite: in a tenth of the time that scipy's takes."""
-    top = np.max(logs, axis=0)
-    return np.asarray(top + np.log(np.exp(logs - top).sum(axis=0)))
-
-
 class Moments(NamedTuple):
-    """What the error models say of a fit's own unknowns: how likely each is (G,), moves (G, p), covariances (G, p, p).
+    """What error models say of a fit's own unknowns: how likely each is (g,), moves (g, p), covariances (g, p, p).
 
-    ``rest`` (G,): whether an error model holds something else.
+    ``rest`` (g,): whether an error model holds something else. The weights of either kind sum to 1. The first are data
+    as wrong as they say.
     """
 
-    log_weight: Array
+    weight: Array
     move: Array
     covariance: Array
     rest: NDArray[np.bool_]
 
 
-def moments(grid: ErrorGrid, fitted: Fit) -> Moments:
-    """Mean and covariance of a fit's unknowns under every error model."""
-    solved = _solved(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
-    weight = (solved.flat + _amounts(fitted, solved))[:, 0] + solved.products.log_prior
-    own = solved.half[:, :, : fitted.extension.size]
-    turned = own.swapaxes(1, 2)
-    return Moments(weight, (turned @ solved.pull)[..., 0], turned @ own, solved.products.rest)
+def moments(grid: ErrorGrid, fitted: Fit, *, negligible: float) -> Moments:
+    """Mean and covariance of a fit's unknowns under every error model of a weight above ``negligible``."""
+    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    by_law, rest = solved.flat + _amounts(fitted, solved), solved.products.rest
+    log_weight = mean_over_laws(by_law)[:, 0] + solved.products.log_prior
+    weight = np.zeros(len(rest))
+    for part in (rest, ~rest):
+        weight[part] = np.exp(log_weight[part] - _total(log_weight[part]))
+    kept = np.union1d([0], np.flatnonzero(weight > negligible))
+    move, covariance = conditional(solved, by_law, kept)
+    size = fitted.extension.size
+    return Moments(weight[kept], move[:, :size], covariance[:, :size, :size], rest[kept])
 
 
 def _total(logs: Array) -> Array:
@@ -172,81 +168,26 @@ def _moved(scatter: Array, weight: Array) -> tuple[float, float]:
     return chance, float(np.sqrt(weight @ scatter**2 / chance)) if chance > 0.0 else 0.0
 
 
-def _solved(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> _Solved:
-    """The fit's unknowns, columns in the order residuals (N, d), J, displacements."""
-    data, several = len(grid.photos) + len(grid.forces), residuals.shape[1]
-    columns = np.hstack([residuals, fitted.jacobian])
-    places, mid, std = _places(fitted)
-    first = len(columns) - data
-    known = np.zeros((first + len(places), columns.shape[1]))
-    known[:first] = columns[data:]
-    for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=first):
-        known[row, :several], known[row, several + at] = (middle - fitted.vector[at]) / width, 1.0 / width
-    products = grid.products(columns[:data], known, more[:data])
-    H, b = products.own[:, several:, several:], products.own[:, several:, :several]
-    shown = np.einsum("gii->gi", H)
-    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    unit = 1.0 / scale
-    H = H * unit[:, :, None] * unit[:, None, :]
-    np.einsum("gii->gi", H)[:] += ROUNDING
-    amounts = _unknown(fitted)
-    root = np.asarray(np.linalg.cholesky(H), dtype=np.float64)
-    half = _inverse(root) * unit[:, None]
-    pull = half @ b
-    own = half[:, :, amounts]
-    log_det = 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
-    # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
-    normal = 0.5 * len(amounts) * LOG_2PI - float(np.sum(np.log(std))) + sum(_log_known(fitted))
-    squares = np.einsum("gdd->gd", products.own[:, :several, :several]) - np.sum(pull**2, axis=1)
-    flat = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
-    move, covariance = pull.swapaxes(1, 2) @ own, own.swapaxes(1, 2) @ own
-    return _Solved(products, flat, half, pull, amounts, move, covariance)
+def _amounts(fitted: Fit, solved: Solved) -> Array:
+    """Log of the factor (G, l, t, d) by which the prior of the fit's own amounts changes p.
 
-
-def _inverse(root: Array) -> Array:
-    """Inverses of lower triangular factors (g, n, n), row by row for all at once."""
-    solved = np.zeros_like(root)
-    for j in range(root.shape[1]):
-        solved[:, j, :j] = -(root[:, j, None, :j] @ solved[:, :j, :j])[:, 0]
-        solved[:, j, j] = 1.0
-        solved[:, j] /= root[:, j, j, None]
-    return solved
-
-
-def _unknown(fitted: Fit) -> list[int]:
-    """Positions in the vector of amounts that no prior row states."""
-    terms = zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True)
-    return [at for at, term in terms if not np.isfinite(term.variant.known)]
-
-
-def _places(fitted: Fit) -> tuple[list[int], list[float], list[float]]:
-    """Positions in the vector of places and widths that are tuned, the middle and the std of their range."""
-    at, mid, std = [], [], []
-    for first, term in zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True):
-        for j, name in enumerate(term.variant.tuned, start=first + 1):
-            low, high = term.variant.range(name)
-            at.append(j)
-            mid.append(0.5 * (low + high))
-            std.append((high - low) / np.sqrt(12.0))
-    return at, mid, std
-
-
-def _log_known(fitted: Fit) -> list[float]:
-    """Logarithms of the densities' heights of amounts that prior rows state already (waves along the cable)."""
-    facts = fitted.extension.facts
-    terms = [term for term in fitted.extension.terms if np.isfinite(term.variant.known)]
-    return [-float(np.log(term.variant.known * term.cause.plausible(facts))) for term in terms]
-
-
-def _amounts(fitted: Fit, solved: _Solved) -> Array:
-    """Log of the factor (G, d) by which the prior of the fit's own amounts changes p."""
+    Where p is nothing beside the largest it is left as it is.
+    """
     extension, total = fitted.extension, np.zeros(solved.flat.shape)
-    owner = [extension.terms[extension.amounts_at.index(at)].cause for at in solved.amounts]
-    value = fitted.vector[solved.amounts] + solved.move
+    at = [k + extension.base.law.size for k in solved.amounts]
+    owner = [extension.terms[extension.amounts_at.index(k)].cause for k in at]
+    if not owner:
+        return total
+    rest = solved.products.rest
+    best = np.max(solved.flat, axis=(1, 2), keepdims=True)
+    top = np.stack([np.max(best[part], axis=0) if part.any() else np.zeros(best.shape[1:]) for part in (~rest, rest)])
+    told = solved.flat > top[rest.astype(int)] - NOTHING
+    value = (fitted.vector[at] + solved.move)[told]
+    covariance = np.broadcast_to(solved.covariance[:, :, :, None], (*solved.move.shape, len(at)))[told]
     for cause in {cause.name: cause for cause in owner}.values():
-        at = [k for k, other in enumerate(owner) if other is cause]
-        covariance = solved.covariance[:, None, at][..., at]
-        total += _size_unknown(value[..., at], covariance, cause.plausible(extension.facts), cause.sign)
+        own = [k for k, other in enumerate(owner) if other is cause]
+        joint = covariance[:, own][..., own]
+        total[told] += _size_unknown(value[:, own], joint, cause.plausible(extension.facts), cause.sign)
     return total
 
 
@@ -269,17 +210,37 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
     return np.asarray(log_sum(np.moveaxis(log, -1, 0)) - np.log(len(SIZES)))
 
 
-def _column_gain(fitted: Fit, terms: Sequence[Term], solved: _Solved) -> Array:
-    """Log of the factor (G, d, k) by which each further column changes p."""
-    square, cross, several = solved.products.square, solved.products.cross, solved.flat.shape[1]
-    half = solved.half @ cross[:, several:]
-    precision = np.maximum(square - np.einsum("gik,gik->gk", half, half), INVISIBLE * square + 1e-300)[:, None]
-    amount = (cross[:, :several] - solved.pull.swapaxes(1, 2) @ half) / precision
-    facts, gains = fitted.extension.facts, np.zeros(amount.shape)
+def _column_gain(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
+    """Log of the factor (G, d, k) by which each further column changes p, over the priors of the law that matter."""
+    several, count = by_law.shape[-1], fitted.extension.base.law.size
+    square, cross = solved.products.square, solved.products.cross
+    half = solved.half @ cross[:, several + count :]
+    law = cross[:, several : several + count] - solved.across.swapaxes(1, 2) @ half
+    alone = square - np.einsum("gik,gik->gk", half, half)
+    pulled = cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
+    share = by_law - mean_over_laws(by_law)[:, None, None] - np.log(by_law[0, ..., 0].size)
+    total = np.full((several, *square.shape), -np.inf)
+    for one, weight in zip(solved.laws, share.transpose(1, 3, 0, 2), strict=True):
+        along = one.vectors.swapaxes(1, 2) @ law
+        left = alone[:, None] - (1.0 / one.precisions) @ along**2
+        precision = np.maximum(left, (INVISIBLE * square + 1e-300)[:, None])
+        for d in range(several):
+            told = weight[d] > -FEW
+            wide = 1.0 / precision[told]
+            amount = (pulled[:, None, d] - one.moves[..., d] @ along)[told] * wide
+            gain = np.full(precision.shape, -np.inf)
+            gain[told] = weight[d][told][:, None] + _gains(fitted, terms, amount, wide)
+            total[d] = np.logaddexp(total[d], np.logaddexp.reduce(gain, axis=1))
+    return total.swapaxes(0, 1)
+
+
+def _gains(fitted: Fit, terms: Sequence[Term], amount: Array, variance: Array) -> Array:
+    """`log_gain` (n, k) of columns (k,) from their flat estimates and variances (n, k)."""
+    found = np.zeros(amount.shape)
     for k, term in enumerate(terms):
-        plausible = term.cause.plausible(facts)
-        gains[..., k] = log_gain(amount[..., k], 1.0 / precision[..., k], plausible, term.cause.sign)
-    return gains
+        plausible = term.cause.plausible(fitted.extension.facts)
+        found[:, k] = log_gain(amount[:, k], variance[:, k], plausible, term.cause.sign)
+    return found
 
 
 def log_gain(amount: Array | float, variance: Array | float, plausible: float, sign: int) -> Array:

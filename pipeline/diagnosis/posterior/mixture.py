@@ -74,23 +74,24 @@ def widening(
     ``own``: the refit whose law, identified again, the curve is; it lies about the curve itself. Without one the curve
     is that of the base model without something else, fitted by way one.
     """
-    kappa, nearest = centre.kappa, own or base
-    here = stated(nearest, kappa)
-    offset = centre.values - here.values
+    nearest = own or base
+    # what was stated is the mean over all priors of the law for data as wrong as they say
+    here, as_told = stated(nearest, centre.kappa), moments(grid.plain, nearest, negligible=1.0)
+    offset = centre.values - here.values - here.rows @ as_told.move[0]
     shifts = {(id(nearest), False): offset} | ({} if own is None else {(id(own), True): offset})
     parts = [
         *_refits(grid, posterior, base, centre, shifts),
-        _unfitted(posterior, base, suspicion, centre, offset if own is None else np.zeros_like(offset)),
+        _unfitted(grid, posterior, base, suspicion, centre, offset if own is None else np.zeros_like(offset)),
     ]
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
     band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
-    # the curve's own band stands for what the same data, as exact as stated, leave unknown of its law
-    known = np.einsum("np,pq,nq->n", here.rows, nearest.covariance, here.rows)
+    # the curve's own band stands for what the same data leave unknown of its law
+    known = np.einsum("np,pq,nq->n", here.rows, as_told.covariance[0], here.rows)
     extra = np.sqrt(np.maximum(band**2 - known, 0.0))
     covariance = sum(_covariance(part) for part in parts)
-    return _told(kappa, extra, np.asarray(covariance) / weight.sum())
+    return _told(centre.kappa, extra, np.asarray(covariance) / weight.sum())
 
 
 def _refits(
@@ -107,23 +108,25 @@ def _refits(
             chance = chances.setdefault(id(fitted), (fitted, {}))[1]
             chance[one.something_else] = chance.get(one.something_else, 0.0) + one.probability
     for fitted, chance in chances.values():
-        here, found = stated(fitted, centre.kappa), moments(grid if True in chance else grid.plain, fitted)
+        here = stated(fitted, centre.kappa)
+        found = moments(grid if True in chance else grid.plain, fitted, negligible=NEGLIGIBLE)
         for rest, probability in chance.items():
             own = found.rest == rest
-            share = np.exp(found.log_weight[own] - logsumexp(found.log_weight[own]))
-            kept = np.flatnonzero(own)[share > NEGLIGIBLE]
-            root = here.rows @ factor_of(found.covariance[kept])
-            mean = here.values + shifts.get((id(fitted), rest), 0.0) - centre.values + found.move[kept] @ here.rows.T
-            yield _Parts(probability * share[share > NEGLIGIBLE], mean, root)
+            root = here.rows @ factor_of(found.covariance[own])
+            mean = here.values + shifts.get((id(fitted), rest), 0.0) - centre.values + found.move[own] @ here.rows.T
+            yield _Parts(probability * found.weight[own], mean, root)
 
 
-def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, shift: Array) -> _Parts:
+def _unfitted(
+    grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, shift: Array
+) -> _Parts:
     """Components of causes that the linear model alone weighed, each in its loudest form and any size beforehand."""
-    here, scores = stated(base, centre.kappa), suspicion.scores
-    size = np.linalg.norm(base.jacobian, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    pseudo = np.linalg.pinv(base.jacobian / size, rcond=1e-7) / size[:, None]
-    own = here.rows @ factor_of(base.covariance)
+    here, scores, known = stated(base, centre.kappa), suspicion.scores, moments(grid.plain, base, negligible=1.0)
+    unit = np.linalg.norm(base.jacobian, axis=0)
+    unit = np.where(unit > 0.0, unit, 1.0)
+    pseudo = np.linalg.pinv(base.jacobian / unit, rcond=1e-7) / unit[:, None]
+    own = here.rows @ factor_of(known.covariance[0])
+    about = here.values + here.rows @ known.move[0] + shift - centre.values
     weight, mean, root = [], [], []
     for one in posterior.believed:
         if one.found or len(one.causes) != 1 or one.something_else or one.probability < NEGLIGIBLE:
@@ -134,13 +137,13 @@ def _unfitted(posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Cen
         cause = suspicion.causes[one.causes[0]]
         along = -here.rows @ (pseudo @ suspicion.columns[:, best])
         flat, variance = float(scores.estimate[best]), float(scores.std[best]) ** 2
-        known = (SIZES * cause.plausible(base.extension.facts)) ** 2
-        amount, left = flat * known / (known + variance), variance * known / (known + variance)
-        log = -0.5 * (flat**2 / (known + variance) + np.log(known + variance))
+        size = (SIZES * cause.plausible(base.extension.facts)) ** 2
+        amount, left = flat * size / (size + variance), variance * size / (size + variance)
+        log = -0.5 * (flat**2 / (size + variance) + np.log(size + variance))
         log += log_ndtr(cause.sign * amount / np.sqrt(left)) if cause.sign else 0.0
         weight.append(one.probability * np.exp(log - logsumexp(log)))
-        mean.append(here.values + shift - centre.values + amount[:, None] * along)
-        root.append(np.dstack([np.broadcast_to(own, (len(known), *own.shape)), np.sqrt(left)[:, None] * along]))
+        mean.append(about + amount[:, None] * along)
+        root.append(np.dstack([np.broadcast_to(own, (len(size), *own.shape)), np.sqrt(left)[:, None] * along]))
     if not weight:
         return _Parts(np.zeros(0), np.zeros((0, len(centre.values))), np.zeros((0, len(centre.values), 1)))
     return _Parts(np.concatenate(weight), np.vstack(mean), np.vstack(root))

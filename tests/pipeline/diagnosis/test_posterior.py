@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.stats import multivariate_normal, norm
+from scipy.stats import norm
 
 from fixtures.continuum import Cable
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
@@ -20,6 +20,7 @@ from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
 from rod.inverse.noise import by_axes
+from rod.law_prior import TAUS
 
 
 @pytest.fixture(scope="module")
@@ -123,23 +124,40 @@ def test_several_residuals_of_one_model_are_weighed_as_each_alone(bench, grid):
 
 
 def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
-    """Two data sets under wide priors: the difference of evidences is that of dense normal log densities."""
-    rows, J = bench.observation.rows.count, bench.base.jacobian
+    """Two data sets under wide priors: the difference of evidences is that of dense normal log densities.
+
+    Those are averaged over all priors of the law by hand, and sums over all error models.
+    """
+    rows, J, base = bench.observation.rows.count, bench.base.jacobian, bench.base.extension.base
     one = replace(grid.plain, displacements=np.zeros((len(J), 0)), rig=np.zeros((len(J), 0)))
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
-    prior = J[rows:].T @ J[rows:] + weak.T @ weak
-    spread, found, dense = J[:rows] @ np.linalg.solve(prior, J[:rows].T), [], []
-    models = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), np.zeros((rows, 0)))
+    other = np.r_[rows : rows + base.known, rows + len(base.prior) : len(J)]
+    stated, size, precisions, norms = J[other].T @ J[other] + weak.T @ weak, base.law.size, [], []
+    for family in base.law.families:
+        for tau, norm_of in zip(TAUS, family.log_norms, strict=True):
+            precision = stated.copy()
+            precision[:size, :size] += family.form / tau**2 + family.fixed
+            precisions.append(precision)
+            norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1])
+    models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), np.zeros((rows, 0))), [], []
+    fitted = replace(bench.base, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
     for seed in (3, 4):
         drawn = np.random.default_rng(seed).standard_normal(rows)
         residual = np.r_[drawn, np.zeros(len(J) - rows + len(weak))]
-        found.append(evidence(one, replace(bench.base, residual=residual, jacobian=np.vstack([J, weak])))[0].plain)
-        logs = [
-            multivariate_normal(cov=covariance(one, sizes) + spread).logpdf(drawn) + chance
-            for sizes, chance in zip(models.sizes, models.log_prior, strict=True)
-        ]
+        found.append(evidence(one, replace(fitted, residual=residual))[0].plain)
+        logs = []
+        for precision, norm_of in zip(precisions, norms, strict=True):
+            spread = J[:rows] @ np.linalg.solve(precision, J[:rows].T)
+            for sizes, chance in zip(models.sizes, models.log_prior, strict=True):
+                logs.append(normal_log(drawn, covariance(one, sizes) + spread) + chance + norm_of)
         dense.append(np.logaddexp.reduce(logs))
     assert found[1] - found[0] == pytest.approx(dense[1] - dense[0], abs=1e-3)
+
+
+def normal_log(drawn, covariance):
+    """Log density of a normal distribution about zero, but for its factors of 2 pi."""
+    root = np.linalg.cholesky(covariance)
+    return -0.5 * np.sum(np.linalg.solve(root, drawn) ** 2) - np.sum(np.log(np.diag(root)))
 
 
 def believed(bench, grid, field, seed):
