@@ -63,7 +63,7 @@ INSIDE = {
     "pipeline.diagnosis.fits": [
         ("search", "extended", "maps"),
         ("workbench",),
-        ("identified_again", "heldout", "force_breaks", "outlier", "displacements", "ordinary"),
+        ("identified_again", "heldout", "force_breaks", "outlier", "ordinary"),
     ],
     "pipeline.diagnosis.posterior": [
         ("explanation", "error_grid", "words"),

@@ -122,12 +122,12 @@ def test_friction_on_loading_alone_is_part_of_the_law_and_said_to_be_unseen():
 
 
 @pytest.mark.parametrize(
-    ("name", "times"), [("bearing_friction", 1.5), ("displacement_offset", 1.5), ("displacement_offset", 2.0)]
+    ("name", "times"), [("bearing_friction", 2.5), ("displacement_offset", 1.5), ("displacement_offset", 2.0)]
 )
 def test_twins_of_three_loading_steps_are_one_class(name, times):
     """Without the way back and the force-free photo both shift K0: no other name for certain.
 
-    Twice the detectable friction is five times what rigs have, and a law beside another K0 takes all of that.
+    Half more friction than by the linear model is found is taken by a rougher law, in whose band the true one lies.
     """
     found = record(Trial("hidden", "three", 31, (name,), times))
     assert set(found["set"]) >= {"bearing_friction", "displacement_offset"} and not found["alien"]

@@ -1,7 +1,7 @@
 """One specimen: from a measured test to what the simulation gets wrong, named as far as the data allow.
 
 base model and scores -> faults of the data that a fitted model shows -> hypotheses refitted and weighed -> what is
-believed -> the same with displacements that scatter, where they do -> gain on held-out steps -> the part of the result.
+believed -> gain on held-out steps -> the part of the result.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits import ordinary
-from pipeline.diagnosis.fits.displacements import with_exact_displacements, with_scatter
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import Workbench, prepare
-from pipeline.diagnosis.posterior.explanation import explanation_of
 from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.presentation.findings import too_large
 from pipeline.diagnosis.presentation.part import present
@@ -29,7 +27,7 @@ from pipeline.faults import Faults, ForceCorrection
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.messages import Message
-from pipeline.records import Finding
+from pipeline.records import Finding, doubtful
 from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse import InverseOutcome
@@ -77,13 +75,13 @@ def diagnose(
             faults, bench = joined, again
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
-    faults, bench, conclusion = concluded(faults, bench, settings)
+    conclusion = conclude(bench)
     rig = _rig_off(bench, conclusion)
     part = present(bench, conclusion, settings, identified=known, shown=rig)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     large = too_large(bench, conclusion) if part.verdict == "unexplained" else ()
     off = () if rig is None else ordinary.told(rig)
-    return Diagnosed(part, (*faults.findings, *large, *off), faults)
+    return Diagnosed(part, (*faults.findings, *_scatter(bench, conclusion), *large, *off), faults)
 
 
 def _not_to_be_compared(faults: Faults, identification: Identification | None) -> Message | None:
@@ -100,40 +98,15 @@ def _not_to_be_compared(faults: Faults, identification: Identification | None) -
 
 
 def conclude(bench: Workbench) -> Conclusion:
-    """Refit suspects and pairs of them, and say what is believed; displacements are as exact as the log tells."""
+    """Refit suspects and pairs of them, and say what is believed."""
     return conclusion_of(bench, searched(bench))
 
 
-def concluded(faults: Faults, bench: Workbench, settings: DiagnosisSettings) -> tuple[Faults, Workbench, Conclusion]:
-    """The same with displacements known to their scatter only, where it is likelier that they scatter than not.
-
-    What is found then is held against the exact displacements once more: a search that had missed it took what it
-    leaves for scatter.
-    """
-    search = searched(bench)
-    first = conclusion_of(bench, search)
-    chance, std = _scatter(bench, first)
-    if (
-        first.unmodelled or chance < 0.5
-    ):  # scatter is among the error models: where something else is likelier, it is none
-        return faults, bench, first
-    scattered = with_scatter(faults, std)
-    again = prepare(scattered, settings)
-    if isinstance(again, Message):
-        return faults, bench, first
-    second = conclude(again)
-    if second.accepted is not None:
-        exact = with_exact_displacements(bench.observation, bench.base, second.accepted.fitted)
-        search.add([explanation_of(second.accepted.causes, bench.base, exact)] if exact else [])
-        first = conclusion_of(bench, search)
-        if not first.unmodelled and _scatter(bench, first)[0] < 0.5:
-            return faults, bench, first
-    return scattered, again, second
-
-
-def _scatter(bench: Workbench, conclusion: Conclusion) -> tuple[float, float]:
-    """Probability that displacements scatter beyond the log beside what was concluded, and by how much if so (m)."""
-    return weighed(conclusion.grid.plain, conclusion.fitted(bench)).own.moved
+def _scatter(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
+    """By how much displacements scatter beyond the log beside what was concluded, where it is likelier that they do."""
+    chance, std = weighed(conclusion.grid.plain, conclusion.fitted(bench)).own.moved
+    told = chance >= 0.5 and not conclusion.unmodelled
+    return (doubtful("log/displacement-scatter", std_m=std),) if told else ()
 
 
 def _rig_off(bench: Workbench, conclusion: Conclusion) -> Fit | None:

@@ -115,6 +115,11 @@ class Base:
         first = self.law.size + (not self.straight)
         return np.asarray(vector[first : first + len(AXES)]) if self.axes else np.zeros(len(AXES))
 
+    def beyond_log(self, facts: Facts, exact: float) -> NDArray[np.int_]:
+        """Positions in the vector of errors of displacements that the log tells to ``exact`` (m) or better."""
+        first = len(self.names) - 2 - len(self.moved)
+        return first + np.flatnonzero(facts.displacement_std[list(self.moved)] <= exact)
+
     def shift(self, vector: Array, steps: int) -> Array | float:
         """Errors (steps,) of the displacements, m; a plain zero where all are exact."""
         if not self.moved:
@@ -216,6 +221,7 @@ def start(
     points: int = 0,
     straight: bool = False,
     exact: float = 0.0,
+    scatter: float = 0.0,
     begin: tuple[float, float] | None = None,
     side: float | None = None,
 ) -> Base:
@@ -223,8 +229,8 @@ def start(
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
     The law is one of any form, or a spline of ``points``. With ``begin`` (N m^2, 1/m) given it is that constant EI and
-    K0, with ``side`` (1/m) the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or
-    better has no error of its own.
+    K0, with ``side`` (1/m) the law that photos show beside that K0. Displacements under load are held to ``scatter``
+    (m) beyond what the log tells of them; one that is known to ``exact`` (m) or better has no error of its own.
 
     Raises
     ------
@@ -248,7 +254,9 @@ def start(
         if shown is not None:
             law, coefficients, bend = shown
             seen = np.r_[coefficients, bend]
-    moved = tuple(np.flatnonzero(facts.displacement_std > exact).tolist())
+    std = facts.displacement_std.copy()
+    std[list(facts.pushed)] = np.hypot(std[list(facts.pushed)], scatter)
+    moved = tuple(np.flatnonzero(std > exact).tolist())
     return Base(
         law=law,
         seen=seen,
@@ -261,7 +269,7 @@ def start(
         axis_parallax_std=test.axis_parallax_std,
         camera_foot_std=test.camera_foot_std,
         moved=moved,
-        moved_std=facts.displacement_std[list(moved)],
+        moved_std=std[list(moved)],
         moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),
     )
 

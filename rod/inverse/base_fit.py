@@ -42,6 +42,7 @@ def base_fit(
     elements: int = ELEMENTS,
     functions: int = SHAPE_FUNCTIONS,
     calibrated: bool = True,
+    scatter: float = 0.0,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
 ) -> BaseFit:
@@ -60,6 +61,8 @@ def base_fit(
         Of the shapes that a photo is compared by.
     calibrated : bool
         Whether photos are as noisy as they show, or as they say.
+    scatter : m
+        What displacements are held to beyond what the log tells of them.
     without_photos, without_forces : sets of int
         Indices of steps whose photo or force is not to be trusted.
 
@@ -71,7 +74,7 @@ def base_fit(
     observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
 
     def begun(side: float | None = None) -> Base:
-        base = start(test, facts, exact=DISPLACEMENT_STD, begin=begin, side=side)
+        base = start(test, facts, exact=DISPLACEMENT_STD, scatter=scatter, begin=begin, side=side)
         return replace(base, elements=elements)
 
     valleys = [settled(observation, _first(observation, begun(), facts))]

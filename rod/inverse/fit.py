@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rod.inverse.extension import Extension
-from rod.inverse.observation import Observation
+from rod.inverse.observation import DISPLACEMENT_STD, Observation
 from rod.inverse.prediction import Model
 from rod.inverse.sensitivities import sensitivities, whole_residual
 from rod.inverse.simulation import Run, run
@@ -84,6 +84,17 @@ class Fit:
         _, weight, right = np.linalg.svd(self.jacobian / size, full_matrices=False)
         root = right.T / np.maximum(weight, 1e-8 * weight[0])
         return np.asarray((root @ root.T) / np.outer(size, size))
+
+    @property
+    def beyond_log(self) -> NDArray[np.int_]:
+        """Positions in the vector of errors of displacements that are as good as exact by the log."""
+        return self.extension.base.beyond_log(self.extension.facts, DISPLACEMENT_STD)
+
+    @property
+    def as_logged(self) -> tuple[Array, Array]:
+        """Residual (N,) and sensitivities (N, q), to first order, with displacements as exact as the log tells them."""
+        at = self.beyond_log
+        return self.residual + self.jacobian[:, at] @ self.vector[at], np.delete(self.jacobian, at, axis=1)
 
     @property
     def excess(self) -> Array:

@@ -35,6 +35,11 @@ REST_SLOPE = 1.0
 """Prior size of d log f / dxi at rest: a cable that bends alike to both sides has none."""
 
 
+SOFTER = (1.0, 1.5)
+"""Mean and standard deviation of how far log f falls from rest to the largest bend. Moments of real cables fall 4- to
+70-fold, by stick and slip; what hardens does so two- or threefold. A law that rises thousandfold from rest, beside a K0
+of the other sign, takes a zero of the displacement for its own."""
+
 FreeLaw = StiffnessLaw | ComplianceLaw
 Abscissa = Literal["bend", "moment"]
 
@@ -61,6 +66,9 @@ class Law(Protocol):
     @property
     def families(self) -> tuple[Family, ...]:
         """All that is known of the form: what fits are weighed by."""
+
+    def softening(self, unknowns: Array) -> tuple[float, Array]:
+        """Of unit variance about zero: how far the law falls from rest, and its derivative (size,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +118,13 @@ class AnyLaw:
         """All of `rod.law_prior`."""
         return priors(self.basis)
 
+    def softening(self, unknowns: Array) -> tuple[float, Array]:
+        """How far log f falls from rest to the largest bend, less `SOFTER`, over its spread; and its derivative."""
+        rest = float(self.basis.xi[2 * self.basis.rest])
+        ends = self.basis.spline(np.array([rest, float(rest < 0.5)]))
+        by = (ends[0] - ends[1]) * (1.0 if self.over == "bend" else -1.0) / SOFTER[1]
+        return float(by @ unknowns) - SOFTER[0] / SOFTER[1], by
+
 
 @dataclass(frozen=True, eq=False)
 class FewPoints:
@@ -148,6 +163,10 @@ class FewPoints:
         """Nothing either."""
         none = np.zeros((self.size, self.size))
         return (Family(none, none, np.zeros(len(TAUS))),)
+
+    def softening(self, unknowns: Array) -> tuple[float, Array]:
+        """Nothing."""
+        return 0.0, np.zeros(self.size)
 
 
 LAYINGS = 2

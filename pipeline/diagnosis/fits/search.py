@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score, span
+from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
@@ -106,7 +106,7 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
             terms.append(term)
             owner.append(index)
     table = np.column_stack(columns) if columns else np.zeros((len(fitted.residual), 0))
-    scores = score(fitted.residual, fitted.jacobian, table, visible=VISIBLE)
+    scores = score(*fitted.as_logged, table, visible=VISIBLE)
     sign = np.array([float(term.cause.sign) for term in terms])
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
@@ -115,19 +115,6 @@ def ordinary(suspicion: Suspicion) -> Array:
     """Whitened traces (N, r) of what every rig has a little of, each one standard deviation of it."""
     size = np.array([term.variant.ordinary for term in suspicion.terms])
     return np.asarray(suspicion.columns[:, size > 0.0] * size[size > 0.0])
-
-
-def taken_by_rig(unit: Array, fitted: Fit, suspicion: Suspicion) -> tuple[Array, float]:
-    """What a rig that is off by what every rig is takes of scores along directions (N, k): of their squares (k,).
-
-    ``unit`` are orthogonal to the sensitivities of the fit, as those of `Scores`. With it the log of how much better
-    the data know the rig than anybody did beforehand, which its evidence pays.
-    """
-    rig, basis = ordinary(suspicion), span(fitted.jacobian)
-    rig = rig - basis @ (basis.T @ rig)
-    along, known = unit.T @ rig, np.eye(rig.shape[1]) + rig.T @ rig
-    share = np.einsum("kr,rk->k", along, np.linalg.solve(known, along.T))
-    return np.asarray(share), 0.5 * float(np.linalg.slogdet(known)[1])
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:

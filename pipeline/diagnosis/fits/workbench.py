@@ -31,6 +31,12 @@ NULL_DRAWS = 20_000
 """Draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma."""
 
 
+SCATTER = 1e-5
+"""Of a displacement under load, m: a dial gauge or a spindle is read to so much, where photos tell the travel of a step
+to a micrometre. Fits hold displacements to that, so that a scatter is no misfit; whether they do scatter is weighed
+(`pipeline.diagnosis.posterior.error_grid`), and scores are those of displacements as the log tells them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Workbench:
     """Base model fitted and all causes scored.
@@ -99,6 +105,7 @@ def prepare(
     observation, fitted = base_fit(
         test,
         facts_of(test),
+        scatter=SCATTER,
         without_photos=faults.photos,
         without_forces=faults.forces,
     )

@@ -18,7 +18,8 @@ from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import Workbench, scored
 from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
-from pipeline.diagnosis.posterior.detectable import detectable_amount
+from pipeline.diagnosis.posterior.detectable import Detectable, detectable
+from pipeline.diagnosis.posterior.weigh import error_models
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.messages import DECIMAL, Message, ended, entry, word
 from pipeline.result import Curve
@@ -186,7 +187,9 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
     others = [
         (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
     ]
-    causes = [_cause_plan(bench, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
+    grid = error_models(bench.observation, bench.base, bench.suspicion)
+    found = detectable(grid, bench.observation, bench.base, bench.suspicion, power=settings.power)
+    causes = [_cause_plan(bench, found, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
     extent = curve(bench.base)
     relative = np.array(extent.tangent_std_Nm2) / np.array(extent.tangent_Nm2)
     bend = bench.base.extension.base.pre_curvature_index
@@ -290,6 +293,7 @@ def _closeness(bench: Workbench) -> Array:
 
 def _cause_plan(
     bench: Workbench,
+    found: Detectable,
     index: int,
     table: Array,
     others: list[tuple[Protocol, Array]],
@@ -304,7 +308,7 @@ def _cause_plan(
         )
     norm = suspicion.scores.norm[own]
     best = int(own[np.argmax(norm)])
-    smallest = detectable_amount(bench.observation, bench.base, bench.suspicion, index, power=settings.power)
+    smallest = found.smallest(index)
     twin, closeness = nearest(table)
     # what the law takes over on loading alone shows on the way back
     separated = Message("next.unload") if bench.in_law.of(index).size else None

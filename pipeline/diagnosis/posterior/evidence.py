@@ -36,6 +36,7 @@ from pipeline.diagnosis.posterior.unknowns import (
     LOG_2PI,
     NOTHING,
     Solved,
+    beside_fit,
     conditional,
     log_sum,
     mean_over_laws,
@@ -124,10 +125,11 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
     weight = np.where(solved.products.rest, mean_over_laws(solved.flat)[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
-    size, data = fitted.extension.size, len(grid.photos) + len(grid.forces)
+    data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
-    moved = grid.beside[:data] @ (solved.products.scales[best] * move[size:])
-    left = fitted.residual[:data] - fitted.jacobian[:data] @ move[:size] - moved
+    size, beside = jacobian.shape[1], beside_fit(grid, fitted).beside[:data]
+    moved = beside @ (solved.products.scales[best] * move[size:])
+    left = residual[:data] - jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)
 
 
@@ -135,7 +137,7 @@ class Moments(NamedTuple):
     """What error models say of a fit's own unknowns: how likely each is (g,), moves (g, p), covariances (g, p, p).
 
     ``rest`` (g,): whether an error model holds something else. The weights of either kind sum to 1. The first are data
-    as wrong as they say.
+    as wrong as they say. Errors of displacements beyond the log's are not among the moves.
     """
 
     weight: Array
@@ -153,9 +155,15 @@ def moments(grid: ErrorGrid, fitted: Fit, *, negligible: float) -> Moments:
     for part in (rest, ~rest):
         weight[part] = np.exp(log_weight[part] - _total(log_weight[part]))
     kept = np.union1d([0], np.flatnonzero(weight > negligible))
+    # a law that looks smooth, or bent, where something else is at work is not known to be: its priors stay as they were
+    by_law = np.where(rest[:, None, None, None], 0.0, by_law)
     move, covariance = conditional(solved, by_law, kept)
     size = fitted.extension.size
-    return Moments(weight[kept], move[:, :size], covariance[:, :size, :size], rest[kept])
+    own = np.delete(np.arange(size), fitted.beyond_log)
+    moves, covariances = np.zeros((len(kept), size)), np.zeros((len(kept), size, size))
+    moves[:, own] = move[:, : own.size]
+    covariances[:, own[:, None], own] = covariance[:, : own.size, : own.size]
+    return Moments(weight[kept], moves, covariances, rest[kept])
 
 
 def _total(logs: Array) -> Array:
@@ -174,16 +182,15 @@ def _amounts(fitted: Fit, solved: Solved) -> Array:
     Where p is nothing beside the largest it is left as it is.
     """
     extension, total = fitted.extension, np.zeros(solved.flat.shape)
-    at = [k + extension.base.law.size for k in solved.amounts]
-    owner = [extension.terms[extension.amounts_at.index(k)].cause for k in at]
+    owner = [extension.terms[extension.amounts_at.index(k)].cause for k in solved.amounts]
     if not owner:
         return total
     rest = solved.products.rest
     best = np.max(solved.flat, axis=(1, 2), keepdims=True)
     top = np.stack([np.max(best[part], axis=0) if part.any() else np.zeros(best.shape[1:]) for part in (~rest, rest)])
     told = solved.flat > top[rest.astype(int)] - NOTHING
-    value = (fitted.vector[at] + solved.move)[told]
-    covariance = np.broadcast_to(solved.covariance[:, :, :, None], (*solved.move.shape, len(at)))[told]
+    value = (fitted.vector[solved.amounts] + solved.move)[told]
+    covariance = np.broadcast_to(solved.covariance[:, :, :, None], (*solved.move.shape, len(owner)))[told]
     for cause in {cause.name: cause for cause in owner}.values():
         own = [k for k, other in enumerate(owner) if other is cause]
         joint = covariance[:, own][..., own]
@@ -212,18 +219,13 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
 
 def _column_gain(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
     """Log of the factor (G, d, k) by which each further column changes p, over the priors of the law that matter."""
-    several, count = by_law.shape[-1], fitted.extension.base.law.size
-    square, cross = solved.products.square, solved.products.cross
-    half = solved.half @ cross[:, several + count :]
-    law = cross[:, several : several + count] - solved.across.swapaxes(1, 2) @ half
-    alone = square - np.einsum("gik,gik->gk", half, half)
-    pulled = cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
+    several, (law, half) = by_law.shape[-1], _onto_law(solved)
+    pulled = solved.products.cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
     share = by_law - mean_over_laws(by_law)[:, None, None] - np.log(by_law[0, ..., 0].size)
-    total = np.full((several, *square.shape), -np.inf)
-    for one, weight in zip(solved.laws, share.transpose(1, 3, 0, 2), strict=True):
+    total = np.full((several, *solved.products.square.shape), -np.inf)
+    for number, weight in enumerate(share.transpose(1, 3, 0, 2)):
+        one, precision = solved.laws[number], told_of_columns(solved, number)
         along = one.vectors.swapaxes(1, 2) @ law
-        left = alone[:, None] - (1.0 / one.precisions) @ along**2
-        precision = np.maximum(left, (INVISIBLE * square + 1e-300)[:, None])
         for d in range(several):
             told = weight[d] > -FEW
             wide = 1.0 / precision[told]
@@ -232,6 +234,22 @@ def _column_gain(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Arr
             gain[told] = weight[d][told][:, None] + _gains(fitted, terms, amount, wide)
             total[d] = np.logaddexp(total[d], np.logaddexp.reduce(gain, axis=1))
     return total.swapaxes(0, 1)
+
+
+def told_of_columns(solved: Solved, number: int) -> Array:
+    """What the data tell of the amount of each column (G, t, k), 1 / S, by one family of the law's priors."""
+    one, (law, half), square = solved.laws[number], _onto_law(solved), solved.products.square
+    alone = square - np.einsum("gik,gik->gk", half, half)
+    left = alone[:, None] - (1.0 / one.precisions) @ (one.vectors.swapaxes(1, 2) @ law) ** 2
+    return np.asarray(np.maximum(left, (INVISIBLE * square + 1e-300)[:, None]))
+
+
+def _onto_law(solved: Solved) -> tuple[Array, Array]:
+    """Columns onto the law (G, p, k) and onto all other unknowns (G, r, k), the latter eliminated."""
+    cross, size = solved.products.cross, solved.across.shape[2]
+    first = cross.shape[1] - solved.half.shape[1]
+    half = solved.half @ cross[:, first:]
+    return cross[:, first - size : first] - solved.across.swapaxes(1, 2) @ half, half
 
 
 def _gains(fitted: Fit, terms: Sequence[Term], amount: Array, variance: Array) -> Array:

@@ -11,7 +11,7 @@ are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,8 @@ class Solved:
 
     The others are eliminated first: ``half`` (G, r, r), W with W' W the inverse of their information; ``across``
     (G, r, p) and ``pull`` (G, r, d), W times their products with the law's and with b. Then the law's by each family,
-    see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p flat in the amounts. ``amounts``: those of the others
-    that no prior row states, ``move`` (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
+    see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p flat in the amounts. ``amounts``: positions in the
+    vector of those that no prior row states, ``move`` (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
     """
 
     products: Products
@@ -55,14 +55,14 @@ class Solved:
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
     """The unknowns of a fit for residuals (N, d) in the place of its own; ``more`` (N, k): further columns."""
     several, size = residuals.shape[1], fitted.extension.base.law.size
-    products, normal = _products(grid, fitted, more, residuals)
+    products, normal = _products(beside_fit(grid, fitted), fitted, more, residuals)
     law = slice(several, several + size)
     half, log_det = _inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
     schur = products.own[:, law, law] - across.swapaxes(1, 2) @ across
     pulls = products.own[:, law, :several] - across.swapaxes(1, 2) @ pull
     squares = np.einsum("gdd->gd", products.own[:, :several, :several]) - np.sum(pull**2, axis=1)
-    amounts = [at - size for at in _unknown(fitted)]
+    amounts = _unknown(fitted)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
     normal += 0.5 * len(amounts) * LOG_2PI
     common = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
@@ -71,7 +71,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     a = fitted.vector[:size]
     laws = tuple(conditioned(schur[kept], pulls[kept], a, one) for one in fitted.extension.base.law.families)
     flat = common[:, None, None] + np.stack([one.evidence for one in laws], axis=1)
-    own = half[:, :, amounts].swapaxes(1, 2)
+    own = half[:, :, np.array(amounts, dtype=int) - size - len(fitted.beyond_log)].swapaxes(1, 2)
     alone, moves, covariances = (own @ pull).swapaxes(1, 2)[:, None], [], []
     for one in laws:
         along = own @ across @ one.vectors
@@ -81,19 +81,28 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
+def beside_fit(grid: ErrorGrid, fitted: Fit) -> ErrorGrid:
+    """The error models with a fit's own sensitivities to displacements that scatter beyond the log."""
+    return replace(grid, displacements=fitted.jacobian[: len(grid.rig), fitted.beyond_log])
+
+
 def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:
     """Columns in the order residuals, sensitivities, displacements and rig; and the logs of the heights of priors.
 
-    What the fit holds the form of its law by is one prior of many, and left out.
+    What the fit holds the form of its law by, and its displacements, is one prior of many, and left out.
     """
     data, several, base = len(grid.photos) + len(grid.forces), residuals.shape[1], fitted.extension.base
-    columns = np.hstack([residuals, fitted.jacobian])
+    beyond, (residual, jacobian) = fitted.beyond_log, fitted.as_logged
+    columns = np.hstack([residuals + (residual - fitted.residual)[:, None], jacobian])
     stated = np.delete(columns[data:], np.arange(base.known, len(base.prior)), axis=0)
     places, mid, std = _places(fitted)
-    known = np.zeros((len(stated) + len(places), columns.shape[1]))
+    known = np.zeros((len(stated) + len(places) + 1, columns.shape[1]))
     known[: len(stated)] = stated
+    falls, by = base.law.softening(fitted.vector[: base.law.size])
+    known[-1, :several], known[-1, several : several + base.law.size] = -falls, by
     for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=len(stated)):
-        known[row, :several], known[row, several + at] = (middle - fitted.vector[at]) / width, 1.0 / width
+        known[row, :several] = (middle - fitted.vector[at]) / width
+        known[row, several + at - len(beyond)] = 1.0 / width
     return grid.products(columns[:data], known, more[:data]), sum(_log_known(fitted)) - float(np.sum(np.log(std)))
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.fits.displacements import displacement_columns
 from pipeline.diagnosis.fits.search import Suspicion, ordinary
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.evidence import Evidence, evidence, evidences
@@ -23,8 +22,9 @@ Array = NDArray[np.float64]
 
 def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
     """All error models of a test, about its base model."""
-    displacements = displacement_columns(observation, base)
-    return error_grid(observation, base.extension.facts, displacements, ordinary(suspicion))
+    count = observation.rows.count
+    displacements, rig = base.jacobian[:count, base.beyond_log], ordinary(suspicion)[:count]
+    return error_grid(observation, base.extension.facts, displacements, rig)
 
 
 @dataclass(frozen=True, eq=False)

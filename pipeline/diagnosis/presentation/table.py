@@ -16,7 +16,7 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import stiffness_change, stiffness_change_linear
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.posterior.detectable import detectable_amount, in_any_form
+from pipeline.diagnosis.posterior.detectable import detectable
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.statistics.score import adjusted_p
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
@@ -37,6 +37,7 @@ def table(
     """One row for every cause, the loudest first; ``gain`` is that of the accepted explanation."""
     twin, closeness = nearest(_closeness(bench))
     refitted = {e.causes[0]: e for e in conclusion.singles}
+    found_from = detectable(conclusion.grid, bench.observation, bench.base, bench.suspicion, power=settings.power)
     rows = []
     for index, cause in enumerate(bench.suspicion.causes):
         suspicion = bench.shown(index)
@@ -46,9 +47,8 @@ def table(
             continue
         found = refitted.get(index)
         size = _as_scored(bench, suspicion, loudest) if found is None else _as_refitted(bench, found, loudest)
-        detectable = detectable_amount(bench.observation, bench.base, bench.suspicion, index, power=settings.power)
-        hides = bench.in_law.of(index).size > 0
-        whatever = np.inf if hides else in_any_form(bench.base, suspicion, index, power=settings.power)
+        least = found_from.smallest(index)
+        whatever = np.inf if bench.in_law.of(index).size else found_from.in_any_form(index)
         accepted_alone = conclusion.accepted is not None and conclusion.accepted.causes == (index,)
         rows.append(
             CauseRow(
@@ -58,7 +58,7 @@ def table(
                 estimate=_finite(size.estimate),
                 std=size.std if size.std < UNKNOWN * cause.plausible(bench.facts) else 0.0,
                 unit=cause.unit,
-                minimal_detectable=detectable if np.isfinite(detectable) else None,
+                minimal_detectable=least if np.isfinite(least) else None,
                 detectable_in_any_form=whatever if np.isfinite(whatever) else None,
                 surviving_fraction=float(scores.surviving[loudest]),
                 nearest_twin=bench.suspicion.causes[twin[index]].name if twin[index] >= 0 else "",

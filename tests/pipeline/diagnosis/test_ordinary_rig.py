@@ -3,6 +3,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
@@ -11,7 +12,9 @@ from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis.causes.camera import tilt_of
 from pipeline.diagnosis.diagnose import diagnose
-from pipeline.diagnosis.posterior.detectable import sigma_needed
+from pipeline.diagnosis.posterior.detectable import found_at
+from pipeline.diagnosis.posterior.error_grid import AS_RIGS_ARE, MOVED
+from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
@@ -58,8 +61,9 @@ def test_a_zero_that_is_lost_is_named_on_such_a_rig():
 def test_a_zero_is_named_from_a_few_times_that_of_every_rig(told):
     """However much better photos tell it: at 0.7 um it was found at no size, and said to be able to hide."""
     ordinary, usual = 2e-5, 2.6e-4
-    share = ordinary**2 / (ordinary**2 + told**2)
-    needed = sigma_needed(
-        usual / told, forms=2, causes=19, sign=0, power=0.9, rig=(share, 0.5 * math.log(1.0 + (ordinary / told) ** 2))
-    )
-    assert 2.0 * ordinary < needed * told < 6.0 * ordinary
+    # the rig exact, or off as rigs are, which its evidence pays; variances of the zero by both
+    known = np.array([told**2, told**2 + ordinary**2])
+    weight = np.array([MOVED[0.0, 0.0], MOVED[AS_RIGS_ARE] * told / math.hypot(told, ordinary)])
+    odds = math.log(SHARES[0][0] / SHARES[1][0] * 2 * 19)
+    needed = found_at(weight / weight.sum(), 1.0 / known, odds, 30.0 * usual, usual, 0)
+    assert 2.0 * ordinary < needed < 6.0 * ordinary

@@ -133,12 +133,16 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
     other = np.r_[rows : rows + base.known, rows + len(base.prior) : len(J)]
     stated, size, precisions, norms = J[other].T @ J[other] + weak.T @ weak, base.law.size, [], []
+    falls, by = base.law.softening(np.zeros(size))
+    stated[:size, :size] += np.outer(by, by)
+    toward, means = np.r_[-falls * by, np.zeros(len(stated) - size)], []
     for family in base.law.families:
         for tau, norm_of in zip(TAUS, family.log_norms, strict=True):
             precision = stated.copy()
             precision[:size, :size] += family.form / tau**2 + family.fixed
             precisions.append(precision)
-            norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1])
+            means.append(np.linalg.solve(precision, toward))
+            norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
     models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), np.zeros((rows, 0))), [], []
     fitted = replace(bench.base, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
     for seed in (3, 4):
@@ -146,10 +150,10 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
         residual = np.r_[drawn, np.zeros(len(J) - rows + len(weak))]
         found.append(evidence(one, replace(fitted, residual=residual))[0].plain)
         logs = []
-        for precision, norm_of in zip(precisions, norms, strict=True):
+        for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
             spread = J[:rows] @ np.linalg.solve(precision, J[:rows].T)
             for sizes, chance in zip(models.sizes, models.log_prior, strict=True):
-                logs.append(normal_log(drawn, covariance(one, sizes) + spread) + chance + norm_of)
+                logs.append(normal_log(drawn - J[:rows] @ mean, covariance(one, sizes) + spread) + chance + norm_of)
         dense.append(np.logaddexp.reduce(logs))
     assert found[1] - found[0] == pytest.approx(dense[1] - dense[0], abs=1e-3)
 
