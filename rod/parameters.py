@@ -126,11 +126,9 @@ class Directions:
     @cached_property
     def weights(self) -> Array:
         """Change of the joint weights with the edges, (q, n)."""
-        inner = 0.5 * self.edges[:, 1:-1]
-        weights = np.zeros_like(self.pre_curvature)
-        weights[:, 1:] = inner
-        weights[:, :-1] += inner
-        return weights
+        inner = 0.5 * self.edges
+        inner[:, [0, -1]] = 0.0
+        return np.asarray(inner[:, 1:] + inner[:, :-1])
 
     @cached_property
     def vertices(self) -> Array:

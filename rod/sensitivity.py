@@ -168,8 +168,7 @@ def _step(
     extent += system.softened(edge, dR[:, :, None])
     moment = balance.tangent * dK + given.moment
     x, y, theta, kappa, moment = rod.at_vertices(extent, dangles, dK, moment).transpose(0, 2, 1)
-    s, chord = moves.vertices[:, rod.shown].T, extent[0].sum(axis=-1)
-    made = Derivatives(moves.names, s, x, y, theta, kappa, moment, -dR[0], chord)
+    made = Derivatives(moves.names, moves.vertices[:, rod.shown].T, x, y, theta, kappa, moment, -dR[0], x[-1])
     return made, _advanced(step, balance, moves, past, dangles, dK)
 
 
@@ -279,7 +278,7 @@ def _residuals(
     if given.load is not None:
         gradient += balance.border[0] * given.load[0] + balance.border[1] * given.load[1]
         extent += system.softened(edge, given.load)
-    gap = -extent.sum(axis=2)
+    gap = -(extent @ np.ones(extent.shape[2]))  # a third of the time of a sum
     gap[0] += given.position
     if step.hold.force is not None:
         gradient += given.reaction[:, None] * balance.border[0]
