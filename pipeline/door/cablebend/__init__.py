@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         Characteristic,
         Equilibrium,
         Hold,
+        InternalFriction,
         Outcome,
         StickSlip,
         Support,
@@ -83,8 +84,8 @@ __all__ = [
     "trace_photo",
     "write",
 ]
-__all__ += ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
-__all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
+__all__ += ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "InternalFriction"]
+__all__ += ["Outcome", "StickSlip", "Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
 
 ROOMS = {
     "pipeline.compare": ("compare",),
