@@ -154,6 +154,28 @@ class BendingTest:
             return self.free.chord
         return self.length if self.zero == "length" else float(self.zero)
 
+    @cached_property
+    def kind(self) -> tuple[object, ...]:
+        """What two tests have in common of which one can become the other little by little."""
+        left, right, friction = self.left, self.right, self.friction
+        ends = left.kind, right.kind, left.angle is None, right.angle is None
+        given = self.grown is None, self.friction_by_step is None, 0 if friction is None else friction.stick.size
+        size = np.size(self.elements) if np.ndim(self.elements) else int(self.elements)
+        cable = self.law_stays, size, self.axial_stiffness, self.shear_stiffness
+        return *ends, *given, *cable, self.zero
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Everything that is one number of the test and not in its rod's geometry, by the name of its cause."""
+        found = {"displacement_offset": self.displacement_offset, "rig_compliance": self.compliance}
+        found |= {"load_x": self.load[0], "load_y": self.load[1], "length": self.length}
+        found |= {"plastic_set": self.plastic_rate, "set_threshold": self.set_threshold}
+        for side, end in (("left", self.left), ("right", self.right)):
+            found |= {f"end_moment_{side}": end.moment, f"clamp_angle_{side}": end.angle or 0.0}
+            found |= {f"bearing_stiffness_{side}": end.stiffness, f"bearing_friction_{side}": end.friction_moment}
+            found[f"stick_angle_{side}"] = end.stick_angle
+        return found
+
     def hold(self, control: Control, value: float) -> Hold:
         """What is imposed at a step."""
         if control == "displacements":

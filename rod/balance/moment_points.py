@@ -247,7 +247,7 @@ def _arc(row: Array, axis: Array, way: float) -> Array:
 def _between(s: Array, nodes: Array) -> csr_array:
     """Linear interpolation from values at increasing nodes (k,) to s (n,), constant beyond, as a matrix (n, k)."""
     at = np.clip(s, nodes[0], nodes[-1])
-    left = np.clip(np.searchsorted(nodes, at) - 1, 0, nodes.size - 2)
+    left = np.maximum(np.searchsorted(nodes, at) - 1, 0)
     share = (at - nodes[left]) / np.diff(nodes)[left]
     row = np.arange(s.size)
     weights, places = np.concatenate([1.0 - share, share]), np.concatenate([left, left + 1])
