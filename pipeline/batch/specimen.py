@@ -66,7 +66,7 @@ def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[Message]:
     from pipeline.report.files import write_atomic
     from pipeline.report.index import index_rows, write_rows
 
-    rows = index_rows(out, out, settings.report)
+    rows = index_rows(out, settings.report)
     write_rows(rows, out, settings.report)
     write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
     return [Message("cli.outlying", name=row.id, said=row.fault) for row in rows if row.outlying]

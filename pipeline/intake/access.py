@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.errors import InputError
@@ -99,9 +98,9 @@ def sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def outside(path: Path, name: str, line_of: Callable[[], int | None] | None = None) -> InputError:
+def outside(path: Path, name: str, line: int | None = None) -> InputError:
     """The error for a name that leads out of the specimen folder."""
-    return InputError(Message("file/outside", name=repr(name)), path=path, line=None if line_of is None else line_of())
+    return InputError(Message("file/outside", name=repr(name)), path=path, line=line)
 
 
 def unreadable(path: Path, error: OSError) -> InputError:

@@ -13,11 +13,11 @@ import pytest
 
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
-from pipeline.report.index import write_index
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.result.row import POINTS, as_entry, from_entry, index_row, thinned
 from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_index import write_index
 
 
 def named(result, name, kind="HV 35"):
