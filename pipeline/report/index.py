@@ -24,7 +24,7 @@ from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.files import write_atomic
-from pipeline.report.page import asset, band_width, environment, palette_css
+from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
@@ -136,7 +136,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     page = engine.get_template("index.html").render(
         words=words,
         rows=[_cells(row, unit, words) for row in rows[:BLOCK]],
-        unit=unit.symbol,
+        unit=unbroken(unit.symbol),
         count=words("index_count", total=len(rows), **count),
         unusable=words("index_unusable", count=unusable) if unusable else "",
         verdicts=sorted({_verdict(row) for row in rows}),

@@ -108,6 +108,11 @@ def test_folder_of_half_a_run_is_enough(batch, tmp_path):
     assert 'href="deep/a/report.html"' in page.read_text(encoding="utf-8")
 
 
+def test_no_head_of_a_column_breaks_within_a_unit(batch, tmp_path):
+    page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
+    assert page.count("[mN\N{NO-BREAK SPACE}m²]</button>") == 2
+
+
 def test_types_are_offered_in_the_order_in_which_people_count(full_result, tmp_path):
     page = write_index([named(full_result, kind, kind) for kind in ("HV 10", "HV 9")], tmp_path)[0].read_text("utf-8")
     assert page.index('<option value="HV 9">') < page.index('<option value="HV 10">')
