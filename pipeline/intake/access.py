@@ -15,7 +15,6 @@ from pathlib import Path
 from pipeline.errors import InputError
 from pipeline.messages import Message
 
-CHUNK_BYTES = 1 << 20
 LONGEST_PATH = 1000
 """Characters of a path written in a file; each folder in it is looked up, and no system opens one of a few thousand."""
 
@@ -81,21 +80,18 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces so that memory stays bounded.
+    """SHA-256 of a file, read in pieces.
 
     Raises
     ------
     InputError
         ``file/unreadable``.
     """
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while piece := stream.read(CHUNK_BYTES):
-                digest.update(piece)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(path, error) from error
-    return digest.hexdigest()
 
 
 def outside(path: Path, name: str, line: int | None = None) -> InputError:

@@ -52,7 +52,7 @@ class LogSpec:
     columns: dict[str, str | int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     separator: str | None = None
-    decimal: str | None = None
+    decimal: Literal[".", ","] | None = None
     encoding: str | None = None
     force_sign: Literal["compression", "tension"] | None = None
 

@@ -139,7 +139,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
         unit=unbroken(unit.symbol),
         count=words("index_count", total=len(rows), **count),
         unusable=words("index_unusable", count=unusable) if unusable else "",
-        verdicts=sorted({_verdict(row) for row in rows}),
+        verdicts=sorted(set(map(_verdict, rows))),
         types=sorted({row.type for row in rows if row.type}, key=natural_key),
         statuses=[state for state in (*STATUSES, "unusable") if state in shown],
         pooled=pooled,
@@ -212,16 +212,15 @@ def _data(
         "words": {name: words(f"index_{name}") for name in ("shown", "select")}
         | {name: words(name) for name in ("shape_alt", "pooled_single", "pooled_mean", "pooled_scatter")},
         "states": {state: words(f"status_{state}") for state in (*STATUSES, "unusable")},
-        "verdicts": {verdict: "–" if verdict == "none" else words(f"verdict_{verdict}") for verdict in _said(rows)},
+        "verdicts": {
+            verdict: "–" if verdict == "none" else words(f"verdict_{verdict}")
+            for verdict in sorted(set(map(_verdict, rows)))
+        },
         "pooled": [_figure(entry, unit) for entry in pooled if entry.alt],
     }
     yield _json(whole)[:-1] + ',"cells":'
     yield from _list_of(_json(_cells(row, unit, words)) for row in rows)
     yield "}"
-
-
-def _said(rows: list[IndexRow]) -> list[str]:
-    return sorted({_verdict(row) for row in rows})
 
 
 def _list_of(pieces: Iterable[str]) -> Iterator[str]:
