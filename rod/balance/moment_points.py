@@ -172,7 +172,7 @@ def moment_points(test: MeasuredTest) -> tuple[MomentPoints, ...]:
 
 def _points_of(step: MeasuredStep, shape: MeasuredShape, photo: Midline) -> MomentPoints:
     mounted = step.branch == "mounted"
-    chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0])) if step.chord is None else step.chord
+    chord = float(shape.x[-1]) if step.chord is None else step.chord
     cx, cy = step.picture_centre or (0.5 * chord, 0.0)
     places, free = _tied(shape, chord)
     s, curve, theta, kappa = places[:, 0], places[:, 1:3], places[:, 3], places[:, 4]
