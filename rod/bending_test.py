@@ -160,9 +160,8 @@ class BendingTest:
         left, right, friction = self.left, self.right, self.friction
         ends = left.kind, right.kind, left.angle is None, right.angle is None
         given = self.grown is None, self.friction_by_step is None, 0 if friction is None else friction.stick.size
-        size = np.size(self.elements) if np.ndim(self.elements) else int(self.elements)
-        cable = self.law_stays, size, self.axial_stiffness, self.shear_stiffness
-        return *ends, *given, *cable, self.zero
+        elements = tuple(np.atleast_1d(self.elements).tolist())
+        return *ends, *given, elements, self.law_stays, self.axial_stiffness, self.shear_stiffness, self.zero
 
     @cached_property
     def numbers(self) -> dict[str, float]:

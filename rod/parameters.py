@@ -190,8 +190,8 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if other.stiffness_profile is not test.stiffness_profile:
         before, after = (1.0 if p is None else p for p in (test.rod.section.profile, other.rod.section.profile))
         made.profile[column] = (after - before) / step
-    cuts = [(t.length, t.left.rigid_length, t.right.rigid_length) for t in (test, other)]
-    if cuts[0] != cuts[1] or other.elements is not test.elements:
+    lengths = [(t.length, t.left.rigid_length, t.right.rigid_length) for t in (test, other)]
+    if lengths[0] != lengths[1]:
         made.edges[column] = (other.rod.edges - test.rod.edges) / step
     if other.characteristic is not test.characteristic:
         made.laws.append((column, test.characteristic, other.characteristic, step))

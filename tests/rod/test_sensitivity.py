@@ -346,6 +346,8 @@ def test_force_gain_and_stiffness_scale_cannot_be_told_apart() -> None:
         (("length", BASIS), "only pre_curvature, stiffness_profile vary"),
         (("pre_curvature", BASIS[:-1]), "one value per joint"),
         (Toward(EVERYTHING, replace(EVERYTHING, friction=None), 1.0), "other elements"),
+        (Toward(EVERYTHING, replace(EVERYTHING, elements=XI[1:] + 1.0), 1.0), "other elements"),
+        (Toward(EVERYTHING, replace(EVERYTHING, elements=JOINTS), 1.0), "other elements"),
     ],
 )
 def test_nonsense_is_refused(nonsense: object, message: str) -> None:
