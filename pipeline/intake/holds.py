@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
+from pipeline.intake.holdforce import Hold, HoldForces, hold_forces
 from pipeline.intake.holdplace import HoldPlaces, hold_places
 from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
@@ -274,7 +274,7 @@ def _fit_findings(
     """What is no plain mean of a hold: how forces and their errors were found, displacements that scatter."""
     if fitted.degree:
         yield inferred("log/trend", file=name, degree=fitted.degree)
-    if fitted.source != FROM_SAMPLES:
+    if not fitted.sampled:
         share = settings.force_std_relative
         yield inferred("log/force-std", file=name, share=share, std_N=float(fitted.std[0]))
     if places.sigma > tolerance:  # by more than the difference that makes a new hold
