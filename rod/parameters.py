@@ -198,13 +198,10 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if test.friction is not None and other.friction is not None:
         made.slip[column] = (other.friction.slip - test.friction.slip)[:, 0] / step
         made.stick[column] = (other.friction.stick - test.friction.stick)[:, 0] / step
-    by_step = (
-        (made.grown, test.grown, other.grown),
-        (made.friction_by_step, test.friction_by_step, other.friction_by_step),
-    )
-    for changes, given, anew in by_step:
-        if given is not None and anew is not None and anew is not given:
-            changes[column] = (anew - given) / step
+    if test.grown is not None and other.grown is not None:
+        made.grown[column] = (other.grown - test.grown) / step
+    if test.friction_by_step is not None and other.friction_by_step is not None:
+        made.friction_by_step[column] = (other.friction_by_step - test.friction_by_step) / step
     for name, old in test.numbers.items():
         if (new := other.numbers[name]) != old:
             made.moved(name, column, (new - old) / step)
