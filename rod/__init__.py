@@ -42,7 +42,8 @@ The inverse problem on own arrays (displacements, forces, curvatures at the join
 True [5. 3. 2.] 2.0
 
 An equilibrium says in ``outcome`` how far to trust it, and ``outcome.advice`` what to do. Exported here: what these
-examples use, laws (`StickSlip`, `as_law`), supports (`Support`, `BEARING`), `solve` with `Hold` for single rods.
+examples use, laws (`StickSlip`, `as_law`, with wires that rub `InternalFriction`), supports (`Support`, `BEARING`),
+`solve` with `Hold` for single rods.
 
 Where to read on: `characteristic` (what f_EI is), `bending_test` (the experiment simulated), `inverse` and `balance`
 (the two ways from a measured test to f_EI), `path` (stability, jumps), `paper` (the source paper's own numbers).
@@ -64,10 +65,11 @@ if TYPE_CHECKING:
     from rod.paper_fit import Virtual
     from rod.paper_fit import paper_fit as fit_characteristic
     from rod.reduction import Hold
+    from rod.section import InternalFriction
     from rod.support import BEARING, CLAMP, FREE, Support
 
-__all__ = ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
-__all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
+__all__ = ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "InternalFriction"]
+__all__ += ["Outcome", "StickSlip", "Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
 
 _MODULES = {
     "rod.bending_test": ("BendingTest", "bend", "simulate"),
@@ -76,6 +78,7 @@ _MODULES = {
     "rod.laws": ("StickSlip", "as_law"),
     "rod.paper_fit": ("Virtual", "paper_fit"),
     "rod.reduction": ("Hold",),
+    "rod.section": ("InternalFriction",),
     "rod.support": ("BEARING", "CLAMP", "FREE", "Support"),
 }
 
@@ -88,3 +91,8 @@ def __getattr__(name: str) -> Any:
     module = next(module for module, names in _MODULES.items() if at_home in names)
     globals()[name] = value = getattr(import_module(module), at_home)
     return value
+
+
+def __dir__() -> list[str]:
+    """Names to complete."""
+    return __all__

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,7 @@ from rod.section import InternalFriction, Section
 from rod.support import BEARING, Support
 
 Control = Literal["displacements", "chords", "forces"]
+Zero = Literal["natural", "loaded", "length"]
 
 #: Table 1 of the paper: length (m), pre-curvature (1/m), step (m), knots (1/m) and ordinates (N m^2).
 TABLE_1 = {"length": 0.2, "pre_curvature": 2.0, "step": 5e-3}
@@ -100,7 +101,7 @@ class BendingTest:
     law_stays: bool = False
     set_threshold: float = 0.0
     grown: Array | None = None
-    zero: Literal["natural", "loaded", "length"] | float = "natural"
+    zero: Zero | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
     axial_stiffness: float | None = None
@@ -111,12 +112,16 @@ class BendingTest:
         for side, end in (("left", self.left), ("right", self.right)):
             if not isinstance(end, Support):
                 raise ValueError(f"{side}={end!r} is no support: give BEARING, CLAMP, FREE (right end) or Support()")
+        if not isinstance(self.friction, InternalFriction | None):
+            raise ValueError(f"friction={self.friction!r}: give InternalFriction(half_width, stick_curvature)")
+        if isinstance(self.zero, str) and self.zero not in get_args(Zero):
+            raise ValueError(f"zero={self.zero!r}: one of {', '.join(get_args(Zero))}, or a distance in m")
 
     @cached_property
     def rod(self) -> Rod:
         """The discrete rod of this test."""
         n = self.elements
-        relative = np.ones(n) if isinstance(n, int | np.integer) else np.asarray(n, float)
+        relative = np.ones(max(n, 0)) if isinstance(n, int | np.integer) else np.asarray(n, float)
         elements = relative / relative.sum()
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
@@ -148,6 +153,27 @@ class BendingTest:
         if self.zero == "loaded":
             return self.free.chord
         return self.length if self.zero == "length" else float(self.zero)
+
+    @cached_property
+    def kind(self) -> tuple[object, ...]:
+        """What two tests have in common of which one can become the other little by little."""
+        left, right, friction = self.left, self.right, self.friction
+        ends = left.kind, right.kind, left.angle is None, right.angle is None
+        given = self.grown is None, self.friction_by_step is None, 0 if friction is None else friction.stick.size
+        elements = tuple(np.atleast_1d(self.elements).tolist())
+        return *ends, *given, elements, self.law_stays, self.axial_stiffness, self.shear_stiffness, self.zero
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Everything that is one number of the test and not in its rod's geometry, by the name of its cause."""
+        found = {"displacement_offset": self.displacement_offset, "rig_compliance": self.compliance}
+        found |= {"load_x": self.load[0], "load_y": self.load[1], "length": self.length}
+        found |= {"plastic_set": self.plastic_rate, "set_threshold": self.set_threshold}
+        for side, end in (("left", self.left), ("right", self.right)):
+            found |= {f"end_moment_{side}": end.moment, f"clamp_angle_{side}": end.angle or 0.0}
+            found |= {f"bearing_stiffness_{side}": end.stiffness, f"bearing_friction_{side}": end.friction_moment}
+            found[f"stick_angle_{side}"] = end.stick_angle
+        return found
 
     def hold(self, control: Control, value: float) -> Hold:
         """What is imposed at a step."""
@@ -241,6 +267,8 @@ def simulate(
         raise ValueError("give exactly one of displacements, chords and forces")
     control = controls[0]
     values = np.atleast_1d(np.asarray(given[control], float))
+    if values.ndim != 1:
+        raise ValueError(f"{control} are one number a step; `bend` takes one, `simulate` those of all steps")
     if starts is not None and len(starts) != values.size:
         raise ValueError(f"{len(starts)} starts for {values.size} steps")
     memory, last, steps = test.rod.virgin, None, []

@@ -71,11 +71,11 @@ class Rod:
 
     def __post_init__(self) -> None:
         if self.elements.ndim != 1 or self.elements.size < 2 or np.any(self.elements <= 0.0):
-            raise ValueError("elements must be at least two positive relative lengths")
+            raise ValueError("elements must be a whole number, or so many positive relative lengths; at least two")
         if self.section.pre_curvature.shape != (self.elements.size + 1,):
             raise ValueError(f"the section needs one pre-curvature per joint, {self.elements.size + 1}")
         if not self.free_length > 0.0:
-            raise ValueError(f"rigid pieces leave nothing of the length {self.length} m")
+            raise ValueError(f"rigid pieces leave nothing of the length {self.length} m; it must be positive")
         if self.left.kind == "free":
             raise ValueError("only the right end can be free")
         if np.shape(self.load) != (2,) or not np.all(np.isfinite(self.load)):
@@ -153,7 +153,7 @@ class Rod:
     @cached_property
     def vertex_load(self) -> Array | None:
         """Dead load lumped to the n + 3 vertices, (n + 3, 2) N; None without load."""
-        if self.load == (0.0, 0.0):
+        if not any(self.load):
             return None
         half = 0.5 * np.concatenate(([0.0], self.edges)) + 0.5 * np.concatenate((self.edges, [0.0]))
         return np.asarray(half[:, None] * np.asarray(self.load))

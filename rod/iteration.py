@@ -25,11 +25,15 @@ import numpy as np
 
 from rod.characteristic import Array, Characteristic
 from rod.discretisation import Rod
-from rod.equilibrium import Branch, Equilibrium, Outcome, solve
+from rod.equilibrium import Equilibrium, Outcome, solve
 from rod.reduction import Hold
 from rod.section import Section
 
 Update = Literal["printed", "consistent"]
+
+#: Largest change of curvature against the largest curvature at which the shape counts as settled; and the ratio of
+#: tangent to secant, a quotient of sums, is known to some hundred roundings of 1e-16 each.
+SETTLED, ROUNDING = 1e-10, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +82,7 @@ def iterate(
     *,
     update: Update = "printed",
     damping: float | None = None,
-    tolerance: float = 1e-10,
     most: int = 300,
-    branch: Branch = "natural",
 ) -> Iteration:
     """Equilibrium by the iterative method.
 
@@ -92,11 +94,8 @@ def iterate(
     update : {"printed", "consistent"}
     damping : float or None
         Between 0 and 1; None: automatic, 1 for softening cables.
-    tolerance : relative
-        Largest change of curvature against the largest curvature at which the shape counts as settled.
     most : int
         Largest number of minimisations.
-    branch : {"natural", "opposite", "up", "down"}
 
     Raises
     ------
@@ -117,7 +116,7 @@ def iterate(
     here: Equilibrium | None = None
     while len(changes) + 1 < most:
         linear = Section(Characteristic.constant(1.0), section.pre_curvature, secant)
-        there = solve(replace(rigid, section=linear), hold, start=here, branch=branch)
+        there = solve(replace(rigid, section=linear), hold, start=here)
         steps += there.iterations
         K = rod.curvature(there.angles)
         if here is not None:
@@ -127,7 +126,7 @@ def iterate(
         if not there.good or np.any(target <= 0.0):
             outcome = Outcome.LIMIT_POINT if np.any(target <= 0.0) else there.outcome
             break
-        if changes and changes[-1] <= tolerance * np.abs(K).max():
+        if changes and changes[-1] <= SETTLED * np.abs(K).max():
             tangent = _slope(section, law, update, K)
             outcome = Outcome.CONVERGED if tangent.min() > 0.0 else Outcome.LIMIT_POINT
             break
@@ -151,10 +150,6 @@ def _slope(section: Section, law: Characteristic, update: Update, K: Array) -> A
     meant = law if update == "consistent" else replace(law, reading="secant")
     tangent = meant.tangent(K, section.pre_curvature)
     return tangent if section.profile is None else section.profile * tangent
-
-
-ROUNDING = 1e-12
-"""Relative: a ratio of tangent to secant is a quotient of sums, known to some hundred roundings of 1e-16 each."""
 
 
 def _damping(ratios: Array) -> float:

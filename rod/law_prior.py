@@ -71,12 +71,6 @@ def family(form: Array, fixed: Array) -> Family:
     return Family(form, fixed, 0.5 * (np.linalg.slogdet(held)[1] - np.log(scale)))
 
 
-def forms(squares: list[Array], *, smooth: bool) -> list[Array]:
-    """Rough form, and the smooth one if asked for, of the integrals (p, p) of g1^2, g2^2, g3^2."""
-    first, second, third = squares
-    return [second + first / REACH**2, third + second + first][: 1 + smooth]
-
-
 def integrals(spline: BSpline, rest: float | None = None) -> list[Array]:
     """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or over its logarithm from `rest` on."""
     edges = np.unique(spline.t if rest is None else np.append(spline.t, rest))
@@ -102,12 +96,10 @@ def _families(size: int, rest: float, *, smooth: bool) -> tuple[Family, ...]:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
     rise = np.asarray(spline(rest, 1))
-    return tuple(
-        family(form, np.outer(rise, rise) / slope**2)
-        for squares in (integrals(spline), integrals(spline, rest))
-        for slope in REST_SLOPES
-        for form in forms(squares, smooth=smooth)
-    )
+    squares = [integrals(spline), integrals(spline, rest)]
+    forms = [[g2 + g1 / REACH**2, g3 + g2 + g1][: 1 + smooth] for g1, g2, g3 in squares]  # rough, smooth
+    slopes = [np.outer(rise, rise) / slope**2 for slope in REST_SLOPES]
+    return tuple(family(form, slope) for over in forms for slope in slopes for form in over)
 
 
 def priors(basis: LawBasis, *, smooth: bool = True) -> tuple[Family, ...]:

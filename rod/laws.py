@@ -103,7 +103,8 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
             values = np.zeros(0)
         if values.ndim == 0 and 0.0 < values < np.inf:
             return Characteristic.constant(float(values))
-        if values.ndim != 2 or values.shape[1] != 2 or values.shape[0] < 2 or not np.all(np.diff(values[:, 0]) > 0.0):
+        rows = values.ndim == 2 and values.shape[1] == 2 and len(values) > 1 and bool(np.all(np.isfinite(values)))
+        if not rows or not np.all(np.diff(values[:, 0]) > 0.0):
             raise ValueError(
                 "a law is a positive number (EI, N m^2), a function of the bend, or rows of bend (1/m) and moment "
                 f"(N m), sorted by bend; got {str(given)[:60]}"
@@ -115,7 +116,7 @@ def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) 
     needed = "a law as a function takes an array of bends, as those of numpy do, and returns as many finite moments"
     try:
         moment = np.asarray(given(bend), float)
-    except TypeError as error:  # a function of `math` takes one bend
+    except (TypeError, ValueError) as error:  # a function of `math`, or with an `if`, takes one bend
         raise ValueError(needed) from error
     if moment.shape != bend.shape or not np.all(np.isfinite(moment)):
         raise ValueError(needed)

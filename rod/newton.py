@@ -121,8 +121,6 @@ def newton(system: System, start: Start) -> Trial:
                 break
             share *= 0.5
         angles, R, balance, norm = angles_new, R_new, tried, norm_new
-        if not isfinite(norm):
-            break
         if step <= STEP_TOLERANCE and norm <= RESIDUAL_TOLERANCE:
             return Trial(angles, R, balance, count, Outcome.CONVERGED, system.negatives(here))
     return Trial(angles, R, balance, count, Outcome.STALLED)

@@ -128,9 +128,9 @@ class Difference:
     share: float = float("nan")
 
 
-def table_one(reading: Reading, *, from_length: bool = False, elements: int = 400) -> TableOne:
+def table_one(reading: Reading, *, from_length: bool = False) -> TableOne:
     """Virtual experiment of Sec. 3.2; displacement from the natural chord, or from the length."""
-    test = table_1(reading, elements=elements)
+    test = table_1(reading, elements=400)
     chords = (test.length if from_length else test.zero_chord) - STEPS
     return TableOne(simulate(test, chords=chords))
 
@@ -147,21 +147,21 @@ def virtual_data(test: BendingTest, *, from_length: bool = False, elements: int 
     return Virtual(test.length, travel, np.array([step.force for step in steps]), curvatures)
 
 
-def virtual_inverse(reading: Reading = "secant") -> PaperFit:
+def virtual_inverse() -> PaperFit:
     """Inverse problem of Sec. 4 on Table 1's data, with its evolution."""
-    return paper_fit(virtual_data(table_1(reading)), TABLE_1_KNOTS, reading=reading)
+    return paper_fit(virtual_data(table_1("secant")), TABLE_1_KNOTS)
 
 
-def forced_straight(reading: Reading = "secant", *, curvatures: bool = True) -> PaperFit:
+def forced_straight(*, curvatures: bool = True) -> PaperFit:
     """The same fit with K0 = 0, which the cable does not have (Fig. 6): Eq. (7), or without curvatures Eq. (6)."""
-    data = virtual_data(table_1(reading), from_length=True)
+    data = virtual_data(table_1("secant"), from_length=True)
     data = data if curvatures else replace(data, curvatures=None)
-    return paper_fit(data, TABLE_1_KNOTS, reading=reading, zero="length", pre_curvature=0.0)
+    return paper_fit(data, TABLE_1_KNOTS, zero="length", pre_curvature=0.0)
 
 
-def iteration_costs(reading: Reading = "secant") -> tuple[IterationCost, ...]:
+def iteration_costs() -> tuple[IterationCost, ...]:
     """The printed iteration against the direct way on the steps of Table 1; a Newton step costs both the same."""
-    test, costs = table_1(reading), []
+    test, costs = table_1("secant"), []
     for displacement in STEPS:
         hold = test.hold("displacements", float(displacement))
         found = iterate(test.rod, hold, update="printed")
@@ -192,8 +192,7 @@ def disagreement() -> tuple[Difference, ...]:
 
 
 def _with_wave(reading: Reading, pre_curvature: Callable[[Array], Array]) -> BendingTest:
-    plain = table_1(reading, elements=400)
-    return BendingTest(plain.length, plain.characteristic, pre_curvature, elements=400)
+    return replace(table_1(reading, elements=400), pre_curvature=pre_curvature)
 
 
 def _difference(

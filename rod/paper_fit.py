@@ -22,7 +22,7 @@ Signs and units: chord frame, SI; displacement from the natural chord of the mou
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -106,10 +106,10 @@ class PaperFit:
     characteristic: Characteristic
     pre_curvature: float
     objective: float
-    history: tuple[PaperIteration, ...]
-    steps: tuple[Equilibrium, ...]
+    history: tuple[PaperIteration, ...] = field(repr=False)
+    steps: tuple[Equilibrium, ...] = field(repr=False)
     gradient: float
-    others: tuple[PaperFit, ...] = ()
+    others: tuple[PaperFit, ...] = field(default=(), repr=False)
 
     @property
     def converged(self) -> bool:

@@ -71,11 +71,6 @@ class InternalFriction:
         own = np.full((self.elements, 1), self.half_width / self.elements)
         return own if self.beside is None else np.vstack([own, self.beside.slip])
 
-    @cached_property
-    def own(self) -> Array:
-        """1 for the elements of this record, 0 for those beside, (count, 1)."""
-        return (np.arange(self.stick.size) < self.elements).astype(float)[:, None]
-
     @property
     def stiffness(self) -> float:
         """Stiffness of all elements while they stick, N m^2."""

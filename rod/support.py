@@ -15,6 +15,7 @@ minimisation; once the bearing has turned by ``stick_angle`` the moment is exact
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Literal, get_args
 
 Kind = Literal["bearing", "clamp", "free"]
@@ -59,6 +60,8 @@ class Support:
             raise ValueError(f"stick_angle must be positive, got {self.stick_angle}")
         if not self.rigid_length >= 0.0:
             raise ValueError(f"rigid_length must not be negative, got {self.rigid_length}")
+        if not all(map(isfinite, (self.angle or 0.0, self.stiffness, self.friction_moment, self.moment))):
+            raise ValueError(f"angle, stiffness, friction_moment and moment of a support are finite, got {self}")
 
     def moment_at(self, angle: float, rest: float, slip: float) -> tuple[float, float]:
         """Moment against turning (spring and friction, N m) and its derivative by the angle (N m/rad)."""

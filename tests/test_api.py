@@ -101,7 +101,8 @@ def test_type_checkers_see_what_the_door_offers():
     tree = ast.parse(Path(cablebend.__file__).read_text(encoding="utf-8"))
     (typed,) = [node for node in tree.body if isinstance(node, ast.If)]
     told = {(node.module, alias.name) for node in typed.body for alias in node.names}
-    assert told == {(module, name) for module, names in cablebend.ROOMS.items() for name in names}
+    offered = {(module, name) for module, names in cablebend.ROOMS.items() for name in names if module != "rod"}
+    assert told == offered | {("rod", "*")}
 
 
 def test_every_package_says_that_it_is_typed():

@@ -28,10 +28,11 @@ from pipeline.intake.photohints import read_hints
 from pipeline.intake.tomltable import read_toml
 from pipeline.messages import free_text
 from pipeline.report.document import write_report
-from pipeline.report.index import write_index, write_rows
+from pipeline.report.index import write_rows
 from pipeline.result.row import index_row
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
+from tests.pipeline.report.virtual_index import write_index
 from tests.pipeline.report.virtual_result import measured_result
 
 pytestmark = pytest.mark.browser

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.batch.orders import make_orders
-from pipeline.batch.specimen import Outcome, Stages, draw_again, stored_result
+from pipeline.batch.specimen import Outcome, Stages, draw_again
 from pipeline.batch.store import Store
 from pipeline.errors import InputError
 from pipeline.messages import Message
+from pipeline.result import read_result
 from pipeline.settings import Settings
 
 LOG_NAME = "cablebend.log"
@@ -132,7 +133,7 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
     with store.locked():
         for name in store.names():
             try:
-                result = stored_result(store, name)
+                result = read_result(store.out / name)
             except InputError as error:
                 store.forget_row(name)
                 yield name, Message("cli.unreadable", why=error.said)

@@ -66,7 +66,7 @@ def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[Message]:
     from pipeline.report.files import write_atomic
     from pipeline.report.index import index_rows, write_rows
 
-    rows = index_rows(out, out, settings.report)
+    rows = index_rows(out, settings.report)
     write_rows(rows, out, settings.report)
     write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
     return [Message("cli.outlying", name=row.id, said=row.fault) for row in rows if row.outlying]
@@ -165,7 +165,7 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
     if stored is not None and stored.get("fingerprint") == mark:
         with contextlib.suppress(OSError, ValueError, InputError):  # a stored result that is none is measured anew
             if order.settings.batch.reports and not stored.get("reports", True):
-                draw_again(store, order.name, stored_result(store, order.name), stages, order.settings)
+                draw_again(store, order.name, read_result(store.out / order.name), stages, order.settings)
             told = str(stored.get("headline", ""))
             usable = stored.get("state") != "unusable"
             return Outcome(order.name, stored["status"], told, True, time.monotonic() - started, usable=usable)
@@ -179,11 +179,6 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
         store.install(staged, order.name)
     usable, took = entry["state"] != "unusable", time.monotonic() - started
     return Outcome(order.name, result.status, entry["headline"], False, took, usable=usable)
-
-
-def stored_result(store: Store, name: str) -> Result:
-    """A stored result; raises `InputError` if its ``result.json`` cannot be read."""
-    return read_result(store.out / name / "result.json")
 
 
 def draw_again(store: Store, name: str, result: Result, stages: Stages, settings: Settings) -> None:

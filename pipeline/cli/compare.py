@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 from pipeline.cli.options import chosen_settings, language_option, settings_options
-from pipeline.cli.predict import echo_findings
+from pipeline.cli.predict import MISSING, echo_findings
 from pipeline.cli.speech import entry, say, told
 from pipeline.cli.spoken import Spoken
 
 if TYPE_CHECKING:
     from pipeline.compare import Comparison
-
-MISSING = 3
 
 
 @click.command(cls=Spoken)

@@ -16,7 +16,7 @@ from pipeline.errors import InputError
 from pipeline.messages import UNREADABLE, Message
 
 if TYPE_CHECKING:
-    from pipeline.batch import Store, Tally
+    from pipeline.batch import Tally
     from pipeline.settings import IntakeSettings
 
 
@@ -58,7 +58,10 @@ def run(
         )
     for sentence in tally.trouble:
         note(sentence)
-    entries = stored_entries(Store(out), tally)
+    store = Store(out)
+    # in the order of the folders, read one at a time
+    found_again = (tally.unstored.get(name) or store.entry(name) for name in tally.names)
+    entries = (stored for stored in found_again if stored is not None)
     if as_json:
         echo_json(entries, tally, out)
     else:
@@ -104,14 +107,6 @@ def exit_code(tally: Tally, refused: int = 0) -> int:
     if tally.measured == 0:
         return 3
     return 1 if tally.failed or tally.unusable or refused or tally.trouble else 0
-
-
-def stored_entries(store: Store, tally: Tally) -> Iterator[dict[str, Any]]:
-    """What became of each specimen of this run, in the order of the folders; read one at a time."""
-    for name in tally.names:
-        entry = tally.unstored.get(name) or store.entry(name)
-        if entry is not None:
-            yield entry
 
 
 def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:

@@ -10,13 +10,11 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.messages import Message
 
-CHUNK_BYTES = 1 << 20
 LONGEST_PATH = 1000
 """Characters of a path written in a file; each folder in it is looked up, and no system opens one of a few thousand."""
 
@@ -82,26 +80,23 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces so that memory stays bounded.
+    """SHA-256 of a file, read in pieces.
 
     Raises
     ------
     InputError
         ``file/unreadable``.
     """
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while piece := stream.read(CHUNK_BYTES):
-                digest.update(piece)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(path, error) from error
-    return digest.hexdigest()
 
 
-def outside(path: Path, name: str, line_of: Callable[[], int | None] | None = None) -> InputError:
+def outside(path: Path, name: str, line: int | None = None) -> InputError:
     """The error for a name that leads out of the specimen folder."""
-    return InputError(Message("file/outside", name=repr(name)), path=path, line=None if line_of is None else line_of())
+    return InputError(Message("file/outside", name=repr(name)), path=path, line=line)
 
 
 def unreadable(path: Path, error: OSError) -> InputError:

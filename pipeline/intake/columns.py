@@ -68,7 +68,6 @@ class Columns:
     """
 
     index: dict[str, int]
-    names: dict[str, str]
     factor: dict[str, float]
     separator: str
     header_line: int
@@ -191,7 +190,6 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
         units[role] = spec.units.get(role) or in_name or in_row
     return Columns(
         index=index,
-        names={role: header[place] for role, place in index.items()},
         factor={role: factor_of(role, unit, path, line) for role, unit in units.items()},
         separator=rows.separator,
         header_line=line,

@@ -215,29 +215,18 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
 
 def _log_path(folder: Path, asked: LogSpec, source: TomlFile, settings: IntakeSettings) -> tuple[Path, list[Finding]]:
     """The force log: the one named, else ``force.csv``, else the only text table in the folder."""
-    if asked.file is not None:
-        name = asked.file
-        path = inside(folder, name, allow_outside=settings.allow_outside)
-        if path is None:
-            raise outside(source.path, name, lambda: source.line_of("force_log", "file"))
-        if not os.path.lexists(path):
-            told = Message("folder/no-force-log.named", name=repr(name))
-            raise source.error(told, table="force_log", key="file")
-        return path, []
-    if os.path.lexists(folder / LOG_NAME):
-        path = inside(folder, LOG_NAME, allow_outside=settings.allow_outside)
-        if path is None:
-            raise outside(folder / LOG_NAME, LOG_NAME)
-        return path, []
-    names = candidate_logs(folder)
-    if not names:
+    names = [LOG_NAME] if os.path.lexists(folder / LOG_NAME) else candidate_logs(folder)
+    if asked.file is None and not names:
         raise _no_log(folder)
-    if len(names) > 1:
+    if asked.file is None and len(names) > 1:
         raise InputError(Message("folder/several-logs", names=names[:5], first=names[0]), path=folder)
-    path = inside(folder, names[0], allow_outside=settings.allow_outside)
+    name = asked.file or names[0]
+    path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
-        raise outside(folder / names[0], names[0])
-    return path, [inferred("log/file-inferred", file=names[0])]
+        raise outside(source.path if asked.file else folder / name, name, source.line_of("force_log", "file"))
+    if not os.path.lexists(path):
+        raise source.error(Message("folder/no-force-log.named", name=repr(name)), table="force_log", key="file")
+    return path, [] if name in (asked.file, LOG_NAME) else [inferred("log/file-inferred", file=name)]
 
 
 def _no_log(folder: Path) -> InputError:

@@ -25,11 +25,9 @@ from pipeline.settings.intake import IntakeSettings
 
 @dataclass(frozen=True)
 class ForceLog:
-    """A force log, read: its steps in the order of the test, how it was read, and what a reader must know."""
+    """A force log, read: its steps in the order of the test, and what a reader must know."""
 
     steps: tuple[LoadStep, ...]
-    columns: Columns
-    encoding: str
     findings: tuple[Finding, ...]
 
 
@@ -62,7 +60,7 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: 
     samples, columns = read_samples(rows, columns, spec, path=path, settings=settings, length=length)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
     check_response(steps, path=path, settings=settings)
-    return ForceLog(steps, columns, encoding, (*_reading(columns, encoding, path), *samples.findings, *findings))
+    return ForceLog(steps, (*_reading(columns, encoding, path), *samples.findings, *findings))
 
 
 def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:

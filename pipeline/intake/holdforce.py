@@ -21,8 +21,6 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.settings.intake import IntakeSettings
 
-FROM_SAMPLES = "samples"
-
 
 @dataclass(frozen=True)
 class Hold:
@@ -35,12 +33,12 @@ class Hold:
 
 @dataclass(frozen=True)
 class HoldForces:
-    """Force and standard deviation of each hold in N, the degree of the trend, and where the deviation comes from."""
+    """Force and standard deviation of each hold in N, the degree of the trend, whether samples tell the deviation."""
 
     force: tuple[float, ...]
     std: tuple[float, ...]
     degree: int
-    source: str
+    sampled: bool
 
 
 def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSettings) -> HoldForces:
@@ -69,14 +67,14 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
     freedom = sum(fit.freedom for fit in fits)
     if freedom == 0:
         sigma = max(settings.force_std_relative * largest, floor)
-        return HoldForces(tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, "share")
+        return HoldForces(tuple(fit.value for fit in fits), tuple(sigma for _ in fits), degree, sampled=False)
     inflation = math.sqrt(_inflation(fits))
     sigmas = [sigma * inflation for sigma in _sigmas(fits, floor)]
     bend = _left_over(holds, fits, sigmas, degree)
     std = tuple(
         math.hypot(sigma * fit.leverage, floor, fit.wander, bend) for sigma, fit in zip(sigmas, fits, strict=True)
     )
-    return HoldForces(tuple(fit.value for fit in fits), std, degree, FROM_SAMPLES)
+    return HoldForces(tuple(fit.value for fit in fits), std, degree, sampled=True)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.intake.holdforce import FROM_SAMPLES, Hold, HoldForces, hold_forces
+from pipeline.intake.holdforce import Hold, HoldForces, hold_forces
 from pipeline.intake.holdplace import HoldPlaces, hold_places
 from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
@@ -79,14 +79,13 @@ def load_steps(
     means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
     sign, signed = force_sign(means, np.array(positions), spec, name=name, settings=settings)
     forces = sign * samples.forces
-    fitted = hold_forces(
-        [_hold(samples, forces, run) for run in runs], resolution=samples.resolution, settings=settings
-    )
+    holds = [_hold(samples, forces, run) for run in runs]
+    fitted = hold_forces(holds, resolution=samples.resolution, settings=settings)
     if samples.branches is None:
         branches, directed = inferred_branches(positions, fitted.force, same, name=name, settings=settings)
     else:
         branches, directed = [samples.branches[run.first] for run in runs], []
-    steps = _steps(samples, runs, branches, places, forces, fitted)
+    steps = _steps(samples, runs, branches, places, holds, fitted)
     within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
     order = order_findings(steps, same, name=name)
     return steps, (
@@ -122,10 +121,11 @@ def _steps(
     runs: Sequence[Run],
     branches: Sequence[Branch],
     places: HoldPlaces,
-    forces: Array,
+    holds: Sequence[Hold],
     fitted: HoldForces,
 ) -> tuple[LoadStep, ...]:
-    """The record of each hold; ``forces`` (n,) N of all samples, positive in compression."""
+    """The record of each hold."""
+    timed = samples.times is not None
     return tuple(
         LoadStep(
             step=run.step,
@@ -133,15 +133,15 @@ def _steps(
             displacement_m=position,
             force_N=force,
             force_std_N=std,
-            photo_time_s=_photo_time(samples, run),
-            times_s=np.empty(0) if samples.times is None else samples.times[run.rows],
-            forces_N=forces[run.rows],
+            photo_time_s=hold.photo_time if timed else None,
+            times_s=hold.times if timed else np.empty(0),
+            forces_N=hold.forces,
             image=next((image for image in samples.images[run.rows] if image), None),
             line=samples.lines[run.first],
             displacement_std_m=scatter,
         )
-        for run, branch, position, scatter, force, std in zip(
-            runs, branches, places.place, places.std, fitted.force, fitted.std, strict=True
+        for run, branch, position, scatter, hold, force, std in zip(
+            runs, branches, places.place, places.std, holds, fitted.force, fitted.std, strict=True
         )
     )
 
@@ -233,11 +233,6 @@ def _rows_with_photo(samples: Samples, run: Run) -> list[int]:
     return [row for row in named if samples.images[row] == samples.images[named[0]]]
 
 
-def _photo_time(samples: Samples, run: Run) -> float | None:
-    rows = _rows_with_photo(samples, run)
-    return float(np.mean(samples.times[rows])) if rows and samples.times is not None else None
-
-
 def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
     """Forces of a run over time, or over the number of the sample where the log has no time."""
     rows = _rows_with_photo(samples, run)
@@ -279,7 +274,7 @@ def _fit_findings(
     """What is no plain mean of a hold: how forces and their errors were found, displacements that scatter."""
     if fitted.degree:
         yield inferred("log/trend", file=name, degree=fitted.degree)
-    if fitted.source != FROM_SAMPLES:
+    if not fitted.sampled:
         share = settings.force_std_relative
         yield inferred("log/force-std", file=name, share=share, std_N=float(fitted.std[0]))
     if places.sigma > tolerance:  # by more than the difference that makes a new hold

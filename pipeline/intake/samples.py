@@ -110,7 +110,7 @@ def read_samples(
         chain(force, displacement),
         path=path,
         separator=columns.separator,
-        decimal=_decimal(spec),
+        decimal=spec.decimal,
         others=lambda: read.others(_told(columns)),
         travels=displacement,
         farthest=length / columns.factor["displacement"],
@@ -120,15 +120,17 @@ def read_samples(
     branches = _branches(table["branch"], lines, path) if "branch" in table else None
     times, noted = _times(table["time"], kept, numbers, settings) if "time" in table else (None, [])
     images = _kept_images(table.get("image"), kept, len(lines))
+    forces = numbers.column("force", force, kept)  # refuses what is no number, and has no decimals
+    places = max(decimals(force[row], decimal) for row in kept)
     samples = Samples(
         lines=array("q", (lines[row] for row in kept)),
-        forces=numbers.column("force", force, kept),
+        forces=forces,
         displacements=numbers.column("displacement", displacement, kept),
         times=times,
         steps=tuple(steps[row] for row in kept) if any(steps) else None,
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
-        resolution=columns.factor["force"] * _last_digit(max(decimals(force[row], decimal) for row in kept)),
+        resolution=columns.factor["force"] * 10.0 ** -min(max(places, -300), 300),
         findings=(*_losses(path.name, lines, force, carried, read.summary), *noted),
     )
     return samples, columns
@@ -148,15 +150,6 @@ def _losses(
     if carried:
         findings.append(inferred("log/carried-down", file=name, count=carried))
     return findings
-
-
-def _last_digit(places: int) -> float:
-    """Value of one unit in the last of so many decimals."""
-    return float(10.0 ** -min(max(places, -300), 300))
-
-
-def _decimal(spec: LogSpec) -> Decimal | None:
-    return "," if spec.decimal == "," else "." if spec.decimal == "." else None
 
 
 def _told(columns: Columns) -> set[int]:

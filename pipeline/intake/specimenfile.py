@@ -52,7 +52,7 @@ class LogSpec:
     columns: dict[str, str | int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     separator: str | None = None
-    decimal: str | None = None
+    decimal: Literal[".", ","] | None = None
     encoding: str | None = None
     force_sign: Literal["compression", "tension"] | None = None
 
@@ -182,7 +182,7 @@ def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: In
         name = values["calibration"]
         calibration = inside(folder, name, allow_outside=settings.allow_outside)
         if calibration is None:
-            raise outside(source.path, name, lambda: source.line_of("camera", "calibration"))
+            raise outside(source.path, name, source.line_of("camera", "calibration"))
         if not is_folder(calibration):
             told = Message("camera/no-calibration-folder", name=repr(name))
             raise source.error(told, table="camera", key="calibration")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from pipeline.errors import InputError
@@ -78,7 +79,7 @@ def write_template(folder: Path, settings: IntakeSettings) -> Path:
         id=folder_name(folder),
         photos=len(photos),
         logs=f" and the table{'s' * (len(logs) > 1)} {', '.join(logs[:5])}" if logs else ", but no force log yet",
-        file=f"file = {_quoted(logs[0])}\n" if len(logs) == 1 else '# file = "force.csv"\n',
+        file=f"file = {json.dumps(logs[0], ensure_ascii=False)}\n" if len(logs) == 1 else '# file = "force.csv"\n',
     )
     try:
         with path.open("x", encoding="utf-8") as stream:
@@ -86,8 +87,3 @@ def write_template(folder: Path, settings: IntakeSettings) -> Path:
     except FileExistsError as error:
         raise InputError(Message("init/exists"), path=path) from error
     return path
-
-
-def _quoted(name: str) -> str:
-    """A TOML string."""
-    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'

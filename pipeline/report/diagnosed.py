@@ -53,9 +53,9 @@ class DiagnosisView:
 def diagnosis_view(
     result: Result, words: Words, settings: ReportSettings, *, figures: bool = True
 ) -> DiagnosisView | None:
-    """Everything the page says about the diagnosis, its figures only if asked for; None if there was none."""
+    """Everything the page says about the diagnosis, its figures only if asked for; None if there is none to be used."""
     part = result.diagnosis
-    if part is None:
+    if part is None or not result.answer.usable:
         return None
     following = part.next_experiment
     heads, rows = _table(part, words)
@@ -215,7 +215,7 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     if before is not None and after is not None and result.answer.method == "extended":
         drawn.update(_before_and_after(before, after, words, settings))
     pattern = part.leftover
-    if pattern is not None and part.verdict != "adequate" and pattern.probability >= LIKELY and pattern.shape_m:
+    if pattern is not None and part.verdict != "adequate" and pattern.probability >= LIKELY and any(pattern.shape_m):
         left = partial(maps.draw_leftover, s_m=pattern.s_m, shape_m=pattern.shape_m, words=words)
         told = {"title": words("leftover"), "description": words("fig_leftover_alt")}
         drawn["leftover"] = drawing("leftover", left, size=(400.0, 180.0), **told)

@@ -96,9 +96,11 @@ def _aside(result: Result, words: Words) -> str:
 
 
 def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> dict[str, Any]:
-    """Equivalent constant stiffness and smallest radius in words; empty where there is none."""
+    """Equivalent constant stiffness and smallest radius in words; empty where there is none to be used."""
     texts: dict[str, Any] = {}
     curve = result.answer.curve
+    if curve is not None and not result.answer.usable:
+        return texts
     constant = equivalent(curve, settings.equivalent_range_per_m) if curve else None
     if curve is not None and constant is not None:
         unit = stiffness_unit(result, words)

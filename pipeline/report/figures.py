@@ -33,11 +33,6 @@ def stiffness_unit(result: Result, words: Words) -> Unit:
     return suited((v for curve in _drawn(result) for v in curve.tangent), "N m²", decimal=words.decimal)
 
 
-def moment_unit(result: Result, words: Words) -> Unit:
-    """Unit of bending moment for all of a report."""
-    return suited((v for curve in _drawn(result) for v in curve.moment), "N m", decimal=words.decimal)
-
-
 def _drawn(result: Result) -> list[Visited]:
     """The curves but those that are set aside, which may be of any size."""
     return [curve for method, curve in trusted(result).items() if method not in set_aside(result)]
@@ -138,7 +133,8 @@ def _banded(
 
 def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
     """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
-    axes, parts, unit = plot_area(figure), trusted(result), moment_unit(result, words)
+    axes, parts = plot_area(figure), trusted(result)
+    unit = suited((v for curve in _drawn(result) for v in curve.moment), "N m", decimal=words.decimal)
     if result.balance and result.balance.points_kappa_per_m:
         count = len(result.balance.points_kappa_per_m)
         chosen = slice(None, None, max(1, count // 300))  # more points than that only fill the picture

@@ -88,9 +88,13 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     -------
     pandas.DataFrame
         Columns quantity, value, std, unit, note; each quantity once. A cause that was named stands under its name.
+        No rows where the numbers are not usable.
     """
     rows: list[tuple[str, float, float | None, str, str]] = []
+    columns = ["quantity", "value", "std", "unit", "note"]
     curve = result.answer.curve
+    if curve is not None and not result.answer.usable:
+        return pd.DataFrame(columns=columns)
     constant = equivalent(curve, bounds) if curve else None
     if curve is not None and constant is not None:
         note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
@@ -105,17 +109,18 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
         apart = "are without it" if result.answer.method == "extended" else "contain what it does"
         note = f"probability {cause.probability:.2g}; the numbers above {apart}"
         rows.append((cause.name, cause.estimate, cause.std, cause.unit.replace("^", ""), note))
-    return pd.DataFrame(rows, columns=["quantity", "value", "std", "unit", "note"])
+    return pd.DataFrame(rows, columns=columns)
 
 
 def beam_frame(result: Result) -> pd.DataFrame:
     """Moment over the bend away from rest, from zero on: the table a nonlinear beam element asks for.
 
-    ``measured`` is 0 for the side to which a straight cable was not bent, and which is taken to be alike.
+    ``measured`` is 0 for the side to which a straight cable was not bent, and which is taken to be alike. No rows where
+    the numbers are not usable.
     """
     curve = result.answer.curve
     names = ("bend_per_m", "moment_Nm", "moment_std_Nm", "measured")
-    if curve is None:
+    if curve is None or not result.answer.usable:
         return pd.DataFrame(columns=list(names))
     table = beam_table(curve)
     columns = (table.bend, table.moment, table.moment_std, table.measured.astype(int))

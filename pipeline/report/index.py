@@ -24,7 +24,7 @@ from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.files import write_atomic
-from pipeline.report.page import asset, band_width, environment, palette_css
+from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
@@ -44,35 +44,9 @@ HEAD, TAIL = 200, 40
 """Bytes of a ``result.json`` that tell whether it is one, and whole."""
 
 
-def write_index(
-    results: Iterable[Result] | Path, out: Path, settings: ReportSettings | None = None
-) -> tuple[Path, Path]:
-    """Write ``index.html`` and ``summary.csv`` over all results.
-
-    Parameters
-    ----------
-    results : iterable of Result, or Path
-        Results, each with its files in ``out/<id>``; or the folder to look for results in.
-    out : Path
-        Folder of the index.
-    settings : ReportSettings, optional
-
-    Returns
-    -------
-    (Path, Path)
-        index.html, summary.csv.
-    """
-    settings, out = settings or ReportSettings(), Path(out)
-    return write_rows(index_rows(results, out, settings), out, settings)
-
-
-def index_rows(results: Iterable[Result] | Path, out: Path, settings: ReportSettings) -> list[IndexRow]:
-    """Rows of all results; those whose stiffness cannot be that of their type are not usable; see `write_index`."""
-    if isinstance(results, str | Path):
-        rows = (_row_of(Path(results), name, out, settings) for name in result_folders(Path(results)))
-    else:
-        rows = (replace(index_row(r), report=_report(r, r.specimen.id, out, settings)) for r in results)
-    return without_outlying(list(rows))
+def index_rows(out: Path, settings: ReportSettings) -> list[IndexRow]:
+    """Rows of all results below a folder; those whose stiffness cannot be that of their type are not usable."""
+    return without_outlying([_row_of(name, out, settings) for name in result_folders(out)])
 
 
 def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tuple[Path, Path]:
@@ -97,9 +71,9 @@ def result_folders(folder: Path) -> list[str]:
     return sorted(found, key=natural_key)
 
 
-def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> IndexRow:
+def _row_of(name: str, out: Path, settings: ReportSettings) -> IndexRow:
     """Row of a stored result: as its entry has it, else from the result."""
-    place = folder / name
+    place = out / name
     try:
         with (place / "entry.json").open("rb") as file:
             row, entered = from_entry(json.load(file).get("row")), os.fstat(file.fileno()).st_mtime
@@ -112,7 +86,7 @@ def _row_of(folder: Path, name: str, out: Path, settings: ReportSettings) -> Ind
         result = read_result(place)
     except InputError as error:
         result = unreadable(name, error.said)
-    return replace(index_row(result), report=_report(result, name, out, settings))
+    return replace(index_row(result), report=report_of(result, name, out, settings))
 
 
 def _as_entered(path: Path, entered: float) -> bool:
@@ -135,7 +109,7 @@ def unreadable(name: str, why: Message) -> Result:
     )
 
 
-def _report(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
+def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
     """Path of a report relative to the index, empty if there is none (yet).
 
     A specimen that failed may have left none (its process died, its description could not be read): it is drawn here.
@@ -162,10 +136,10 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     page = engine.get_template("index.html").render(
         words=words,
         rows=[_cells(row, unit, words) for row in rows[:BLOCK]],
-        unit=unit.symbol,
+        unit=unbroken(unit.symbol),
         count=words("index_count", total=len(rows), **count),
         unusable=words("index_unusable", count=unusable) if unusable else "",
-        verdicts=sorted({_verdict(row) for row in rows}),
+        verdicts=sorted(set(map(_verdict, rows))),
         types=sorted({row.type for row in rows if row.type}, key=natural_key),
         statuses=[state for state in (*STATUSES, "unusable") if state in shown],
         pooled=pooled,
@@ -238,16 +212,15 @@ def _data(
         "words": {name: words(f"index_{name}") for name in ("shown", "select")}
         | {name: words(name) for name in ("shape_alt", "pooled_single", "pooled_mean", "pooled_scatter")},
         "states": {state: words(f"status_{state}") for state in (*STATUSES, "unusable")},
-        "verdicts": {verdict: "–" if verdict == "none" else words(f"verdict_{verdict}") for verdict in _said(rows)},
+        "verdicts": {
+            verdict: "–" if verdict == "none" else words(f"verdict_{verdict}")
+            for verdict in sorted(set(map(_verdict, rows)))
+        },
         "pooled": [_figure(entry, unit) for entry in pooled if entry.alt],
     }
     yield _json(whole)[:-1] + ',"cells":'
     yield from _list_of(_json(_cells(row, unit, words)) for row in rows)
     yield "}"
-
-
-def _said(rows: list[IndexRow]) -> list[str]:
-    return sorted({_verdict(row) for row in rows})
 
 
 def _list_of(pieces: Iterable[str]) -> Iterator[str]:

@@ -183,12 +183,12 @@ def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> 
     if curves(result):
         figures.draw_moment(sheet.part(270.0, left=0.52, advance=False), result, words, settings)
     sheet.y += 278.0
-    if any(photo.kappa_per_m for photo in result.photos):
+    curved, residuals = any(photo.kappa_per_m for photo in result.photos), maps.answer_map(result)
+    if curved:
         figures.draw_curvatures(sheet.part(230.0, right=0.5, advance=False), result, words)
-    residuals = maps.answer_map(result)
     if residuals is not None:
         maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, title=words("fig_map"))
-    sheet.y += 236.0
+    sheet.y += 236.0 if curved or residuals is not None else 0.0
     unit = figures.force_unit(result, words).symbol
     heads = [words("col_step"), words("col_branch"), words("col_displacement")]
     heads += [words(key, unit=unit) for key in ("col_force", "col_force_fit", "col_residual")] + [words("col_sigma")]

@@ -73,9 +73,8 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     part = result.inverse
     if part is None:
         return []
-    rows = [
-        (words("fit_outcome"), words.said(part.said).sentence if part.advice else part.outcome),
-    ]
+    without = f" ({words('fit_without')})" if result.answer.method == "extended" else ""
+    rows = [(words("fit_outcome"), (words.said(part.said).sentence if part.advice else part.outcome) + without)]
     if part.misfit is not None:
         misfit, force = part.misfit, force_unit(result, words)
         length = suited([misfit.shape_rmse_m], "m", decimal=words.decimal)

@@ -143,10 +143,9 @@ class Words:
         """A curvature as the end of a range, in 1/m: three digits, zeros kept."""
         return plain(value, 3, decimal=self.decimal, zeros=True)
 
-    def probability(self, value: float, *, name: str = "") -> str:
-        """A p value, with ``name`` as an equation; see `pipeline.rounding.p_value`."""
-        text = p_value(value, decimal=self.decimal)
-        return text.replace("p", name, 1) if name else text.removeprefix("p ").removeprefix("= ")
+    def probability(self, value: float) -> str:
+        """A p value; see `pipeline.rounding.p_value`."""
+        return p_value(value, decimal=self.decimal).removeprefix("p ").removeprefix("= ")
 
     def measured(self, value: float | None, std: float | None) -> str:
         """A measured number with its standard deviation."""

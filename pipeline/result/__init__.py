@@ -8,7 +8,7 @@ over.
 
 from __future__ import annotations
 
-from pipeline.result.answer import Answer, curves, leading, none_of_its_type, refuted, set_aside, trusted
+from pipeline.result.answer import Answer, curves, leading, none_of_its_type, set_aside, trusted
 from pipeline.result.diagnosed import (
     BlindSpot,
     CauseForm,
@@ -26,7 +26,6 @@ from pipeline.result.diagnosed import (
 from pipeline.result.files import from_json, read_result, schema, to_json
 from pipeline.result.parts import (
     AgreementPart,
-    AnswerPart,
     BalancePart,
     Curve,
     FindingPart,
@@ -47,7 +46,6 @@ from pipeline.result.whole import Result
 __all__ = [
     "AgreementPart",
     "Answer",
-    "AnswerPart",
     "BalancePart",
     "BlindSpot",
     "CauseForm",
@@ -80,7 +78,6 @@ __all__ = [
     "leading",
     "none_of_its_type",
     "read_result",
-    "refuted",
     "schema",
     "set_aside",
     "to_json",

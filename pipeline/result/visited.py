@@ -79,6 +79,11 @@ def html_table(caption: str, rows: Iterable[tuple[str, str]]) -> str:
     return f"<table><caption>{escape(caption)}</caption><tbody>{body}</tbody></table>"
 
 
+STORED = {"kappa": "kappa_per_m", "moment": "moment_Nm", "moment_std": "moment_std_Nm", "tangent": "tangent_Nm2"}
+STORED |= {"tangent_std": "tangent_std_Nm2", "secant": "secant_Nm2", "secant_std": "secant_std_Nm2"}
+"""What stands along a `Visited`, and its name in a `Curve`."""
+
+
 def visited(
     method: Method, curve: Curve | None, pre_curvature: tuple[float | None, float | None] = (None, None)
 ) -> Visited | None:
@@ -92,27 +97,18 @@ def visited(
     if keep.size < 2:
         return None
 
-    def kept(values: list[float] | list[list[float]]) -> Array:
-        return np.asarray(values, dtype=np.float64)[keep]
-
-    kappa, moment, moment_std, tangent = map(
-        kept, (curve.kappa_per_m, curve.moment_Nm, curve.moment_std_Nm, curve.tangent_Nm2)
-    )
+    along = {name: np.asarray(getattr(curve, stored), dtype=np.float64)[keep] for name, stored in STORED.items()}
+    kappa, moment, tangent = along["kappa"], along["moment"], along["tangent"]
     rest, rest_std = pre_curvature
     if rest is None or rest_std is None:
         nearest = int(np.argmin(np.abs(moment)))  # the error of zero moment there is that of the moment over f
         rest = float(kappa[nearest] - moment[nearest] / tangent[nearest])
-        rest_std = float(moment_std[nearest] / abs(tangent[nearest]))
+        rest_std = float(along["moment_std"][nearest] / abs(tangent[nearest]))
+    factor = np.asarray(curve.tangent_factor_Nm2, dtype=np.float64)[keep] if curve.tangent_factor_Nm2 else None
     return Visited(
         method=method,
-        kappa=kappa,
-        moment=moment,
-        moment_std=moment_std,
-        tangent=tangent,
-        tangent_std=kept(curve.tangent_std_Nm2),
-        secant=kept(curve.secant_Nm2),
-        secant_std=kept(curve.secant_std_Nm2),
-        factor=kept(curve.tangent_factor_Nm2) if curve.tangent_factor_Nm2 else np.zeros((keep.size, 0)),
+        **along,
+        factor=np.zeros((keep.size, 0)) if factor is None else factor,
         pre_curvature=rest,
         pre_curvature_std=rest_std,
         rest_factor=np.asarray(curve.pre_curvature_factor_per_m, dtype=np.float64),

@@ -172,7 +172,7 @@ def moment_points(test: MeasuredTest) -> tuple[MomentPoints, ...]:
 
 def _points_of(step: MeasuredStep, shape: MeasuredShape, photo: Midline) -> MomentPoints:
     mounted = step.branch == "mounted"
-    chord = float(np.hypot(shape.x[-1] - shape.x[0], shape.y[-1] - shape.y[0])) if step.chord is None else step.chord
+    chord = float(shape.x[-1]) if step.chord is None else step.chord
     cx, cy = step.picture_centre or (0.5 * chord, 0.0)
     places, free = _tied(shape, chord)
     s, curve, theta, kappa = places[:, 0], places[:, 1:3], places[:, 3], places[:, 4]
@@ -247,7 +247,7 @@ def _arc(row: Array, axis: Array, way: float) -> Array:
 def _between(s: Array, nodes: Array) -> csr_array:
     """Linear interpolation from values at increasing nodes (k,) to s (n,), constant beyond, as a matrix (n, k)."""
     at = np.clip(s, nodes[0], nodes[-1])
-    left = np.clip(np.searchsorted(nodes, at) - 1, 0, nodes.size - 2)
+    left = np.maximum(np.searchsorted(nodes, at) - 1, 0)
     share = (at - nodes[left]) / np.diff(nodes)[left]
     row = np.arange(s.size)
     weights, places = np.concatenate([1.0 - share, share]), np.concatenate([left, left + 1])

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from pipeline.batch.store import write_entry
 from pipeline.cli import main
-from pipeline.report.index import write_index
 from pipeline.report.tables import write_result
 from pipeline.result.row import as_entry, index_row
+from tests.pipeline.report.virtual_index import write_index
 from tests.pipeline.report.virtual_result import measured_result
 
 

@@ -94,6 +94,13 @@ def test_a_number_is_a_stiffness_and_a_curve_stays_itself():
         ({"law": 1.0, "chord": 0.1, "load": 3.0}, "load is two"),
         ({"law": 1.0, "chord": 0.1, "load": (0.0, np.nan)}, "load is two"),
         ({"law": 1.0, "chord": 0.1, "elements": 0}, "at least two"),
+        ({"law": 1.0, "chord": 0.1, "elements": -3}, "at least two"),
+        ({"law": 1.0, "chord": 0.1, "elements": 10.5}, "whole number"),
+        ({"law": 1.0, "displacement": [0.1, 0.2]}, "`simulate` those of all steps"),
+        ({"law": 1.0, "chord": 0.1, "friction": 1e-3}, "give InternalFriction"),
+        ({"law": 1.0, "displacement": 0.1, "zero": "unloaded"}, "one of natural, loaded, length, or a distance"),
+        ({"law": [(0.0, 0.0), (1.0, np.nan), (2.0, 1.0)], "chord": 0.1}, "rows of bend .* and moment"),
+        ({"law": lambda bend: bend if bend < 1.0 else 1.0, "chord": 0.1}, "as those of numpy do"),
         ({"law": lambda bend: math.tanh(bend), "chord": 0.1}, "as those of numpy do"),
         ({"law": lambda bend: bend[:3], "chord": 0.1}, "as many .* moments"),
         ({"law": lambda bend: bend * np.nan, "chord": 0.1}, "finite moments"),
@@ -103,6 +110,26 @@ def test_a_number_is_a_stiffness_and_a_curve_stays_itself():
 def test_mistakes_are_told_with_what_to_do(call, says):
     with pytest.raises(ValueError, match=says):
         bend(0.2, **call)
+
+
+def test_supports_without_finite_numbers_are_refused():
+    with pytest.raises(ValueError, match="of a support are finite"):
+        rod.Support(stiffness=np.nan)
+
+
+def test_a_load_may_be_an_array():
+    load = np.array([0.0, -1.0])
+    assert bend(0.2, 5e-3, chord=0.19, load=load).force == bend(0.2, 5e-3, chord=0.19, load=(0.0, -1.0)).force
+
+
+def test_names_are_completed_before_they_are_loaded():
+    assert set(dir(rod)) == set(rod.__all__)
+
+
+def test_a_fit_shows_its_result_and_not_its_history():
+    steps = np.array([5e-3, 10e-3, 15e-3])
+    forces = np.array([step.force for step in rod.simulate(BendingTest(0.2, 5e-3), steps)])
+    assert len(repr(rod.fit_characteristic(rod.Virtual(0.2, steps, forces, None), [0.0, 8.0]))) < 400
 
 
 def test_a_warm_start_is_taken():

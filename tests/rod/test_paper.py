@@ -53,6 +53,8 @@ def test_the_readings_make_most_of_the_disagreement_of_fig_7():
     assert sum(cause.share for cause in causes) == pytest.approx(1.0)
     assert max(causes, key=lambda cause: cause.share).cause == "secant against tangent"
     assert together.rms > 0.1
+    for cause in (*causes, together):
+        assert cause.rms == pytest.approx(np.linalg.norm(cause.balance / cause.inverse - 1.0) / np.sqrt(12))  # 12 bins
 
 
 def test_newton_on_the_nonlinear_energy_is_cheaper_than_the_iteration():

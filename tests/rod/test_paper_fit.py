@@ -89,7 +89,7 @@ def test_data_are_rows_of_one_step_each():
 
 
 @pytest.mark.parametrize("reading", ["secant", "tangent"])
-@pytest.mark.parametrize("start", [(0.03, 3.0), (0.1, 1.0), (0.1, 3.0), (0.01, 3.0)])
+@pytest.mark.parametrize("start", [(0.03, 3.0), (0.1, 1.0), (0.1, 3.0), (0.01, 3.0), (0.01, 0.0)])
 def test_starts_that_lead_nowhere_are_told_and_others_find_table_1(reading, start):
     """A method that stops has not converged for that; from these starts it stops anywhere."""
     fitted = paper_fit(virtual(reading), TABLE_1_KNOTS, reading=reading, start=start)

@@ -33,24 +33,7 @@ if TYPE_CHECKING:
     from pipeline.run import measure, write
     from pipeline.settings import Settings
     from pipeline.vision.single import trace_photo
-    from rod import (
-        BEARING,
-        CLAMP,
-        FREE,
-        BendingTest,
-        Characteristic,
-        Equilibrium,
-        Hold,
-        Outcome,
-        StickSlip,
-        Support,
-        Virtual,
-        as_law,
-        bend,
-        fit_characteristic,
-        simulate,
-        solve,
-    )
+    from rod import *  # noqa: F403  # all that it exports
     from rod.balance import balance
     from rod.inverse import estimate
 
@@ -83,8 +66,7 @@ __all__ = [
     "trace_photo",
     "write",
 ]
-__all__ += ["BEARING", "CLAMP", "FREE", "BendingTest", "Characteristic", "Equilibrium", "Hold", "Outcome", "StickSlip"]
-__all__ += ["Support", "Virtual", "as_law", "bend", "fit_characteristic", "simulate", "solve"]
+__all__ += rod.__all__
 
 ROOMS = {
     "pipeline.compare": ("compare",),

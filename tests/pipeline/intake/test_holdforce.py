@@ -6,7 +6,7 @@ Truth is the noise-free force of the simulated hold at the time of the photo.
 import numpy as np
 import pytest
 
-from pipeline.intake.holdforce import FROM_SAMPLES, Hold, hold_forces
+from pipeline.intake.holdforce import Hold, hold_forces
 from pipeline.settings.intake import IntakeSettings
 
 SETTINGS = IntakeSettings()
@@ -89,7 +89,7 @@ def test_single_samples_get_a_share_of_the_largest_force():
     singles = [Hold(np.array([float(n)]), np.array([float(n)]), None) for n in range(4)]
     found = hold_forces(singles, resolution=1e-4, settings=SETTINGS)
     assert found.std == pytest.approx([0.003 * 3.0] * 4)
-    assert found.source != FROM_SAMPLES
+    assert not found.sampled
 
 
 def test_unknown_moment_costs_the_run_of_the_trend():

@@ -1,12 +1,14 @@
 """One folder that cannot be read, whatever is wrong with it, is one entry with its sentence; the others are read."""
 
 import ctypes
+import importlib
 import json
 import os
 import subprocess
 import sys
 import time
 
+import cloudpickle
 import pytest
 from click.testing import CliRunner
 
@@ -88,7 +90,15 @@ def test_check_as_an_ordinary_user_reads_what_it_can(specimen_folder, tmp_path):
     assert "(permission denied)" in rows[1]["findings"][0]["message"]
 
 
-def test_check_has_a_time_limit(specimen_folder, tmp_path):
+def test_check_has_a_time_limit(specimen_folder, tmp_path, monkeypatch, request):
+    def slow(folder, settings):  # on any machine
+        time.sleep(60.0)
+        raise RuntimeError("nobody ended it")
+
+    module = importlib.import_module("pipeline.cli.check")
+    monkeypatch.setattr(module, "checked", slow)
+    cloudpickle.register_pickle_by_value(module)  # so that the workers have it
+    request.addfinalizer(lambda: cloudpickle.unregister_pickle_by_value(module))
     for name in ("one", "two"):
         specimen_folder(name=f"batch/{name}")
     done = CliRunner().invoke(main, ["check", str(tmp_path / "batch"), "--json", "--timeout", "0.0001"])

@@ -12,7 +12,7 @@ from pipeline.report.canvas import page_colours
 from pipeline.report.document import report_html, write_report
 from pipeline.report.page import unbroken
 from pipeline.report.pdf import pdf_bytes
-from pipeline.report.provenance import nuisance_rows
+from pipeline.report.provenance import fit_rows, nuisance_rows
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.settings import ReportSettings
@@ -165,6 +165,19 @@ def test_every_verdict_has_its_sections(diagnosed, verdict):
     assert ('id="force-rest"' in page) == found
     assert ("Turn the cable end for end" in text) == (verdict != "adequate")
     assert ("cannot be told apart here from bearing friction" in text) == (verdict == "class")
+
+
+def test_what_is_left_in_the_forces_alone_has_no_pattern_along_the_cable(diagnosed):
+    result = diagnosed("unexplained")
+    left = result.diagnosis.leftover
+    left = left.model_copy(update={"shape_m": [0.0] * len(left.s_m)})
+    page = report_html(result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"leftover": left})}))
+    assert 'id="leftover"' not in page and "A hump at mid-span" in Page(page).text
+
+
+@pytest.mark.parametrize(("verdict", "without"), [("named", True), ("adequate", False)])
+def test_the_fit_says_which_model_it_is_of(diagnosed, verdict, without):
+    assert ("without the cause that was found" in dict(fit_rows(diagnosed(verdict), Words()))["outcome"]) == without
 
 
 @pytest.mark.parametrize(("probability", "told"), [(0.1, " 10 %."), (1e-6, " < 0,1 %."), (0.99, "")])

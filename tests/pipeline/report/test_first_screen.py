@@ -8,6 +8,7 @@ from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.document import report_html
 from pipeline.report.evidence import main_figure, pointer_data
 from pipeline.report.figures import steps_of_answer
+from pipeline.report.frames import beam_frame, simulation_frame
 from pipeline.report.maps import photos_of_answer
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
@@ -49,10 +50,14 @@ def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):
         "Do the two ways agree?",
         ">Pre-curvature K0</span>",
         ">measured</span>",
+        'id="diagnosis"',
+        'id="use"',
     )
     good, bad = report_html(result), report_html(wrong)
     assert all(said in good for said in concluded) and not any(said in bad for said in concluded)
     assert '<span class="chip bad">not usable</span>' in bad
+    for frame in (simulation_frame, beam_frame):  # nor goes anything into a simulation
+        assert len(frame(result)) > 0 == len(frame(wrong)) and list(frame(wrong)) == list(frame(result))
 
 
 def test_what_was_found_hides_no_more(diagnosed):

@@ -13,11 +13,11 @@ import pytest
 
 from pipeline.batch.store import write_entry
 from pipeline.messages import Message
-from pipeline.report.index import write_index
 from pipeline.report.tables import write_result
 from pipeline.result import FindingPart, PhotoPart
 from pipeline.result.row import POINTS, as_entry, from_entry, index_row, thinned
 from pipeline.settings import ReportSettings
+from tests.pipeline.report.virtual_index import write_index
 
 
 def named(result, name, kind="HV 35"):
@@ -106,6 +106,11 @@ def test_folder_of_half_a_run_is_enough(batch, tmp_path):
     assert list(table.id) == ["broken", "a", "b"]
     assert "cannot be read" in table.reason[0]
     assert 'href="deep/a/report.html"' in page.read_text(encoding="utf-8")
+
+
+def test_no_head_of_a_column_breaks_within_a_unit(batch, tmp_path):
+    page = write_index(batch, tmp_path)[0].read_text(encoding="utf-8")
+    assert page.count("[mN\N{NO-BREAK SPACE}m²]</button>") == 2
 
 
 def test_types_are_offered_in_the_order_in_which_people_count(full_result, tmp_path):

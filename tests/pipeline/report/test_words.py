@@ -58,7 +58,7 @@ def test_unknown_key_is_not_passed_over():
 
 def test_tails_of_probability_are_not_claimed():
     assert Words().probability(1e-30) == "< 0.0001"
-    assert Words("de").probability(0.432, name="p") == "p = 0,43"
+    assert Words("de").probability(0.432) == "0,43"
 
 
 def test_a_specimen_is_called_as_it_is_written():
