@@ -144,7 +144,10 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
     models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), np.zeros((rows, 0))), [], []
-    fitted = replace(bench.base, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
+    # displacements of a log that states what they scatter have priors of their own
+    facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
+    extension = replace(bench.base.extension, facts=facts)
+    fitted = replace(bench.base, extension=extension, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
     for seed in (3, 4):
         drawn = np.random.default_rng(seed).standard_normal(rows)
         residual = np.r_[drawn, np.zeros(len(J) - rows + len(weak))]
