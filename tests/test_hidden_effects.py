@@ -97,11 +97,21 @@ def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol
         seen = outlook(protocol)[name]
         if not seen.possible(seen.amount(name, times)):
             beyond.add((protocol, name))
-        elif (protocol, name) not in FAR:
+        elif (protocol, name) not in FAR and (protocol, name, times) not in LARGE:
             found = answers(protocol, expected(protocol, name, seen.amount(name, times)), draws=DRAWS, rng=rng)
             shares[name] = np.mean([one.found and name in one.names for one in found])
     assert beyond <= BEYOND
     assert np.mean(list(shares.values())) > target - by_chance(target, DRAWS * len(shares)), shares
+
+
+LARGE = {("three", "rig_compliance", 4.0), ("three", "stiffness_drift", 4.0)}
+"""Amounts beside which a base model ends with another K0 or a rougher law, about which no linear model tells them."""
+
+
+@pytest.mark.parametrize(("protocol", "name", "times"), sorted(LARGE))
+def test_what_the_linear_model_does_not_tell_is_found_by_refits(protocol, name, times):
+    found = record(Trial("hidden", protocol, 31, (name,), times))
+    assert name in found["set"] and not found["alien"]
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)

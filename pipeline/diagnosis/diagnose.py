@@ -76,12 +76,11 @@ def diagnose(
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
     conclusion = conclude(bench)
-    rig = _rig_off(bench, conclusion)
-    part = present(bench, conclusion, settings, identified=known, shown=rig)
+    beside = _beside(bench, conclusion)
+    part = present(bench, conclusion, settings, identified=known, shown=beside.shown)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
     large = too_large(bench, conclusion) if part.verdict == "unexplained" else ()
-    off = () if rig is None else ordinary.told(rig)
-    return Diagnosed(part, (*faults.findings, *_scatter(bench, conclusion), *large, *off), faults)
+    return Diagnosed(part, (*faults.findings, *beside.findings, *large), faults)
 
 
 def _not_to_be_compared(faults: Faults, identification: Identification | None) -> Message | None:
@@ -102,19 +101,31 @@ def conclude(bench: Workbench) -> Conclusion:
     return conclusion_of(bench, searched(bench))
 
 
-def _scatter(bench: Workbench, conclusion: Conclusion) -> tuple[Finding, ...]:
-    """By how much displacements scatter beyond the log beside what was concluded, where it is likelier that they do."""
-    chance, std = weighed(conclusion.grid.plain, conclusion.fitted(bench)).own.moved
-    told = chance >= 0.5 and not conclusion.unmodelled
-    return (doubtful("log/displacement-scatter", std_m=std),) if told else ()
+class _Beside(NamedTuple):
+    """What is believed of displacements and rig beside what was concluded.
+
+    ``shown``: the model that was concluded, fitted with that; None where it is the model itself. ``findings``: what is
+    told of both.
+    """
+
+    shown: Fit | None
+    findings: tuple[Finding, ...]
 
 
-def _rig_off(bench: Workbench, conclusion: Conclusion) -> Fit | None:
-    """What was concluded beside a rig as far off as every rig is, where that is likelier than an exact one."""
-    fitted = conclusion.fitted(bench)
-    if conclusion.unmodelled or weighed(conclusion.grid.plain, fitted).own.rig < 0.5:
-        return None
-    return ordinary.beside_ordinary_rig(bench.observation, fitted, bench.suspicion)
+def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
+    """The model that was concluded with displacements that scatter and a rig as rigs are where that is likelier."""
+    fitted, findings = conclusion.fitted(bench), list[Finding]()
+    if conclusion.unmodelled:
+        return _Beside(None, ())
+    own = weighed(conclusion.grid.plain, fitted).own
+    chance, std = own.moved
+    if chance >= 0.5:
+        findings.append(doubtful("log/displacement-scatter", std_m=std))
+    exact = None if chance >= 0.5 or conclusion.accepted is None else ordinary.as_exact(bench.observation, fitted)
+    if own.rig < 0.5:
+        return _Beside(exact, tuple(findings))
+    rig = ordinary.beside_ordinary_rig(bench.observation, exact or fitted, bench.suspicion)
+    return _Beside(rig or exact, (*findings, *(() if rig is None else ordinary.told(rig))))
 
 
 def _told(correction: ForceCorrection) -> ForceCorrectionPart:

@@ -173,8 +173,3 @@ def adjusted_p(statistic: Array, maxima: Array) -> Array:
     rank = np.searchsorted(maxima, statistic, side="left")
     simulated = (maxima.size - rank + 1.0) / (maxima.size + 1.0)
     return np.where(maxima.size - rank >= 50, simulated, np.minimum(tail, simulated))
-
-
-def sigma_needed(limit: float, *, power: float) -> float:
-    """Size of an effect in sigma that exceeds the family-wise limit with the given power."""
-    return limit + float(special.ndtri(power))

@@ -9,7 +9,6 @@ from pipeline.diagnosis.statistics.score import (
     null_maxima,
     score,
     scores_of_noise,
-    sigma_needed,
     threshold,
 )
 
@@ -76,7 +75,7 @@ def test_effect_of_the_detectable_size_is_detected_with_the_stated_power(problem
     jacobian, columns = problem
     unit = score(np.zeros(80), jacobian, columns).unit
     limit = threshold(null_maxima(unit, np.zeros(5), draws=20000, rng=np.random.default_rng(10)), 0.01)
-    shift = sigma_needed(limit, power=0.9) * unit[:, 0]
+    shift = (limit + stats.norm.ppf(0.9)) * unit[:, 0]
     z = (np.random.default_rng(11).standard_normal((20000, 80)) + shift) @ unit[:, :1]
     assert np.mean(np.abs(z) > limit) == pytest.approx(0.9, abs=0.01)
 
