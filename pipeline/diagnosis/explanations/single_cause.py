@@ -17,7 +17,7 @@ from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
-from rod.inverse.fit import FITS, Fit
+from rod.inverse.fit import FITS, Fit, fit_from
 from rod.inverse.observation import Observation
 
 
@@ -121,13 +121,15 @@ def _fit_form(
 ) -> Fit | None:
     """Fit with one form in the model, its place and width tuned along unless that stalls.
 
-    Where the trace has kinks (slip), a form that is tuned may stall; the form as it is scored does not.
+    Where the trace has kinks (slip), a form that is tuned may stall; the form as it is scored does not. One whose place
+    went to the end of its range comes back from there when it is gone on with.
     """
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
     held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
-    return held if held is not None and cost(held) < cost(found) else found
+    further = fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)
+    return min((one for one in (found, held, further) if one is not None and one.run.prediction is not None), key=cost)
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
