@@ -136,8 +136,8 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
 class Moments(NamedTuple):
     """What error models say of a fit's own unknowns: how likely each is (g,), moves (g, p), covariances (g, p, p).
 
-    ``rest`` (g,): whether an error model holds something else. The weights of either kind sum to 1. The first are data
-    as wrong as they say. Errors of displacements beyond the log's are not among the moves.
+    ``rest`` (g,): whether an error model holds something else. The weights of either kind sum to 1. The first error
+    model takes data for as wrong as they say. Errors of displacements beyond the log's are not among the moves.
     """
 
     weight: Array

@@ -89,7 +89,8 @@ def beside_fit(grid: ErrorGrid, fitted: Fit) -> ErrorGrid:
 def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:
     """Columns in the order residuals, sensitivities, displacements and rig; and the logs of the heights of priors.
 
-    What the fit holds the form of its law by, and its displacements, is one prior of many, and left out.
+    What the fit holds the form of its law by, and its displacements, is one prior of many, and left out. How far a law
+    falls from rest is known besides (`rod.inverse.laws.SOFTER`).
     """
     data, several, base = len(grid.photos) + len(grid.forces), residuals.shape[1], fitted.extension.base
     beyond, (residual, jacobian) = fitted.beyond_log, fitted.as_logged
