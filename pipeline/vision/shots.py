@@ -140,13 +140,17 @@ def _find_as_on(
     """
     if isinstance(near.found, Rejected):
         return shot.found
-    scale = np.nan if calibration is None else calibration.scale.px_per_m
-    travel = (shot.step.displacement_m - near.step.displacement_m) * scale
     cable = _expected(specimen, calibration, shot.step.displacement_m - first)
-    seen = expected_covers(near.found, specimen.rig.moving_bearing, travel)
-    cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
+    cable = _near(specimen, cable, near.found, shot.step.displacement_m - near.step.displacement_m, calibration)
     again = _find_again(specimen, shot, cable, settings, near=near.found)
     return again if isinstance(again, RoughCable) else shot.found
+
+
+def _near(specimen: Specimen, cable: Cable, near: RoughCable, travel: float, calibration: Calibration | None) -> Cable:
+    """What is known of the cable, with the covers that a neighbour photo, ``travel`` (m) before, lets expect."""
+    scale = np.nan if calibration is None else calibration.scale.px_per_m
+    seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
+    return replace(cable, bearings=replace(cable.bearings, seen=seen))
 
 
 def _find_again(
@@ -207,10 +211,7 @@ def _find_all(
         if cover_px is not None:
             cable = replace(cable, bearings=BearingHints(cover_px=cover_px))
         if near is not None:
-            travel = np.nan if calibration is None else step.displacement_m - last.displacement_m
-            scale = 1.0 if calibration is None else calibration.scale.px_per_m
-            seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
-            cable = replace(cable, bearings=replace(cable.bearings, seen=seen))
+            cable = _near(specimen, cable, near, step.displacement_m - last.displacement_m, calibration)
         found = _find(specimen, photo, cable, near)
         if isinstance(found, RoughCable):
             near, last = found, step

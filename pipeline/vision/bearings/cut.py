@@ -24,6 +24,7 @@ _BACK_RADII = 4.0  # radii; a stub beyond a pin is no longer, and more of it is 
 _LEAST_RUN_RADII = 1.0  # radii; a cover hides the sheath for two, bands and print for less
 _HOLLOW = 2.0  # ratio of the variances about the straight line and about the arc from which it is an arc
 _LOOSE_PX = 0.3  # px; usual error of an edge along one row
+_MOST_SPREAD_PX = 1.0  # px; rows that miss an arc by more lie on none: on the border of a band aslant by 3 px
 
 
 def cover_by_cut(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
@@ -85,8 +86,8 @@ def _arc(relief: Array, along: Array, rows: Array, about: float, radius: Radius)
     fit = least_squares(misses, start, loss="soft_l1")
     straight = place - np.polynomial.polynomial.polyval(row, np.polynomial.polynomial.polyfit(row, place, 1))
     spread = _LOOSE_PX * scatter(fit.fun, 0.0)
-    ahead = fit.x[0] > np.median(place)
-    if not ahead or abs(fit.x[1]) > 0.3 * radius.px or scatter(straight, 0.0) ** 2 < _HOLLOW * spread**2:
+    hollow = fit.x[0] > np.median(place) and scatter(straight, 0.0) ** 2 > _HOLLOW * spread**2
+    if not hollow or spread > _MOST_SPREAD_PX:
         return None
     # neighbouring rows share pixels: those of one pixel count once
     shared = max(1.0, _ROWS / float(np.ptp(rows)))

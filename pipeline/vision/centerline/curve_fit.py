@@ -16,14 +16,14 @@ covariance; the reasons for a spline of the curvature are measured in the tests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve
-from pipeline.vision.centerline.smoothing import Problem, Smooth, Witness
+from pipeline.vision.centerline.smoothing import Problem, Smooth
 from pipeline.vision.median import median, scatter
 from rod.measurement import slow_covariance
 
@@ -91,7 +91,6 @@ def fit_curve(
     correlation_length: float | None = None,
     iterations: int = 8,
     bias_share: float = 0.5,
-    witness: Witness | None = None,
 ) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
 
@@ -110,9 +109,6 @@ def fit_curve(
     bias_share : float
         Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
-    witness : Witness, optional
-        Other data whose errors last as long along s as those of the points. It widens the bands and leaves the curve
-        as its own points have it: held to the longer errors, it would follow its bends too little.
     """
     found = _settle(
         points,
@@ -125,10 +121,6 @@ def fit_curve(
         iterations=iterations,
     )
     smooth = found.problem.smooth(found.length, bias_share=bias_share)
-    if witness is not None and correlation_length is None:
-        told = found.problem.correlation_length(longest, witness)
-        lasting = found.problem.smooth(told, bias_share=bias_share)
-        smooth = replace(smooth, root=lasting.root, sigma=lasting.sigma, correlation_length=told)
     curve = found.before.moved(smooth.estimate - found.before.parameters)
     s, residual = _step_to_foot(curve, points, curve.foot(points, found.s, steps=1))
     return CurveFit(curve, smooth, points, std, s, residual, found.weight)

@@ -44,6 +44,11 @@ _LEAST_STEP_SIGMAS = 3.0
 """Standard deviations of an edge's step; a lesser one is none: on paper that hid 12 diameters, edges of noise along the
 search's straight bridge moved the midline by 30 px.
 """
+_USUAL_RAMP = 0.07
+"""Of the step in one blur; a ramp so steep must explain as much of the pixels as their scatter is, else it is taken for
+halo, grid and texture: of thin cables, whose few pixels do not tell them apart, free ramps moved the midline by a third
+more.
+"""
 _PROFILE_WINDOWS = 16  # along the cable; in each, blur and shading of the edges are found: light turns slowly
 
 
@@ -76,9 +81,11 @@ class Profiles:
     place, blur, level, step, inside, outside : (2, k)
         t0 and w in px; a and A in grey; b_in / A and b_out / A in 1/px.
     shift : (2, k) px
-        Place with ramps less the place by the plain error function.
+        Place with ramps as they fit best, less the place by the plain error function.
     noise : (2, k) grey
         Scatter of pixels about the profile.
+    held : float
+        Share of the shift that is not in ``place``, for ramps were held.
     """
 
     s: Array
@@ -90,6 +97,7 @@ class Profiles:
     outside: Array
     shift: Array
     noise: Array
+    held: float
 
     def at(self, s: Array, name: str) -> Array:
         """A quantity by name at ``s``, linear between windows: ``(2, n)``."""
@@ -148,7 +156,7 @@ def _shaded(
 
 
 def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) -> tuple[Profiles, Profiles | None]:
-    """Profiles in windows of neighbouring sections: with ramps, and for ``thin`` cables by the plain error function.
+    """Profiles in windows of neighbouring sections: with ramps, and for ``thin`` cables with ramps that are held.
 
     Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take
     them for the sheath.
@@ -170,6 +178,7 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
         # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
         usual = _running_median(np.column_stack([start[:, 1], linear]))
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
+        cost = (_scatter(residual[:, ::4]) / np.maximum(_USUAL_RAMP * np.abs(usual[:, 2]), 1e-9)) ** 2
         # every fourth pixel tells the usual scatter to a percent
         limit = np.maximum(_PIXEL_OUTLIER * median(_scatter(residual[:, ::4])), _PLAIN_STEP * usual[:, 2:3])
         keep = residual < limit
@@ -177,8 +186,8 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
         keep |= (keep.mean(axis=1) < _LEAST_PIXEL_SHARE)[:, None]
         pooled = _pool(offset, value, cell, keep, (2 * count, bins))
     full, full_linear = _variable_projection(pooled, start, ramps=True)
-    plain, plain_linear = _variable_projection(pooled, full, ramps=False)
-    shift = (full[:, 0] - plain[:, 0]).reshape(2, count)
+    plain, _ = _variable_projection(pooled, full, ramps=False)
+    shift = full[:, 0] - plain[:, 0]
 
     def profiles(used: Array, linear: Array) -> Profiles:
         step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
@@ -193,11 +202,13 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
             step=by_side[2],
             inside=by_side[3],
             outside=by_side[4],
-            shift=shift,
+            shift=shift.reshape(2, count),
             noise=noise.reshape(2, count),
+            held=min(1.0, float(np.linalg.norm(full[:, 0] - used[:, 0]) / (np.linalg.norm(shift) + 1e-12))),
         )
 
-    return profiles(full, full_linear), profiles(plain, plain_linear) if thin else None
+    held = _variable_projection(pooled, full, ramps=True, cost=cost) if thin else None
+    return profiles(full, full_linear), None if held is None else profiles(*held)
 
 
 def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:
@@ -242,11 +253,14 @@ def _pool(
     return _Pooled(by_offset / filled, by_value / filled, count)
 
 
-def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple[Array, Array]:
+def _variable_projection(
+    pooled: _Pooled, start: Array, *, ramps: bool, cost: Array | float = 0.0
+) -> tuple[Array, Array]:
     """Place and blur ``(k, 2)``, and level, step and ramps ``(k, 4)``, of pooled profiles, all windows at once.
 
     Gauss-Newton on place and blur alone: the other four are solved for exactly at each step (Golub and Pereyra, in
-    Kaufman's form). Steps are bounded to a part of the blur.
+    Kaufman's form). Steps are bounded to a part of the blur. ``cost`` is the mean square misfit of the pixels that a
+    ramp of 1 in a blur counts for.
     """
     place, blur = start[:, 0].copy(), start[:, 1].copy()
     offset, root = pooled.offset, np.sqrt(pooled.count)[:, None, :]
@@ -257,7 +271,7 @@ def _variable_projection(pooled: _Pooled, start: Array, *, ramps: bool) -> tuple
     linear = np.zeros((len(place), 4))
     # A weak prior on the ramps, a thousandth of the data's weight: it decides only where blur and ramp look the same.
     prior = np.zeros((len(place), 4))
-    prior[:, 2:] = (1e-3 * total / 12.0 * (span / 2.0) ** 2)[:, None]
+    prior[:, 2:] = (total * (1e-3 / 12.0 * (span / 2.0) ** 2 + cost * start[:, 1] ** 2))[:, None]
     prior += 1e-9 * total[:, None]
     size = 4 if ramps else 2
     for _ in range(25):

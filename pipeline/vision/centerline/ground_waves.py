@@ -31,7 +31,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
 
-SLOW_WIDTH_ORDER = 5  # of the polynomial of s that the width may follow by light, lens and distance of the camera
+_SLOW_WIDTH_ORDER = 5  # of the polynomial of s that the width may follow by light, lens and distance of the camera
 _HIGHEST = 30
 """Degree of the finest polynomial: waves of a fifteenth of the length, which a curve through the points can follow."""
 
@@ -113,7 +113,7 @@ def seen_waves(photos: Sequence[HalfWidths]) -> Waves:
     told = [photo for photo in photos if len(photo.s) >= 3 * _HIGHEST]
     if not told:
         return Waves()
-    coarsest = SLOW_WIDTH_ORDER + 1
+    coarsest = _SLOW_WIDTH_ORDER + 1
     found = np.array([_components(photo)[:, coarsest:] for photo in told])  # (photos, 2, k)
     counts = np.array([len(photo.s) for photo in told], float)
     # of the waves' variances: nothing, then all up to what would be the whole of the widths' own

@@ -26,8 +26,8 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
-from pipeline.vision.centerline.ground_waves import SLOW_WIDTH_ORDER, HalfWidths, Waves, edge_waves
-from pipeline.vision.centerline.midline import LEAST_SECTIONS, Sections
+from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
+from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
 from pipeline.vision.centerline.refusal import (
     beside_axis,
@@ -36,8 +36,7 @@ from pipeline.vision.centerline.refusal import (
     refusal,
     refusal_of_band,
 )
-from pipeline.vision.centerline.smoothing import Witness
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import ChordFrame, PlaneMap, chord_frame
@@ -197,26 +196,7 @@ def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | 
         s=s,
         length=float(s[-1] + after),
         diameter=median(width),
-        witness=_half_widths(s, sections.balance, width, std),
     )
-
-
-def _half_widths(s: Array, balance: Array, width: Array, std: Array) -> Witness | None:
-    """What half the width of the cable, which is constant, varies along it: errors of the edges without its bend.
-
-    The errors ``a`` and ``b`` of the two edges move the midline by ``(a + b) / 2`` and half the width by
-    ``(a - b) / 2``, which last as long along s: on lines of the ground that cross the edges slowly, on grain or text.
-    Millimetre paper nearly parallel to a cable moved its midline by 0.25 px in waves of 80 px, which passed for its
-    bend. Sections that live on one edge tell nothing.
-    """
-    two = balance > _LEAST_BALANCE
-    if np.count_nonzero(two) < LEAST_SECTIONS:
-        return None
-    s, width = s[two], width[two]
-    slow = np.polynomial.legendre.legvander(2.0 * (s - s[0]) / (s[-1] - s[0]) - 1.0, SLOW_WIDTH_ORDER)
-    off = 0.5 * (width - median(width))
-    spread = scatter(off, 0.0)
-    return Witness(data=np.clip(off, -4.0 * spread, 4.0 * spread), std=std[two], position=s, slow=slow)
 
 
 def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:
@@ -242,13 +222,14 @@ def centerline_of(
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
     waves : Waves, optional
-        That ground and sheath make in its midline, see `pipeline.vision.centerline.ground_waves`.
+        That ground and sheath make in its midline, told by all photos of its series; else by its own widths, see
+        `pipeline.vision.centerline.ground_waves`.
     """
     rough, sections, chord, width = followed.rough, followed.sections, followed.chord, followed.width
     middle, scatter = middle_width(width)
     misses = feet_of_axes(followed.fit, chord)[1]
     metres = median(width / sections.width)
-    waves = waves or Waves()
+    waves = seen_waves([followed.half_widths()]) if waves is None else waves
     errors = slow_errors(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
     fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told)
     feet = feet_of_axes(fit, chord)[0]

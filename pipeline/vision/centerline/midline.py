@@ -12,8 +12,8 @@ measured where both are sure. Edges as sure as a cable is round are averaged, wh
 What the light does to both edges of a section alike (same direction on the photo) moves the midline slowly along s,
 and no averaging removes it. Its size is judged by what is seen on the photo itself:
 
-- how far the midline moves when ramps of shading and shadow are left out of the edge model: by all of that where they
-  are left out, by a fifth where they are fitted, for a model that has them is off by what they lack;
+- how far the midline moves when ramps of shading and shadow are left out of the edge model: by all of that as far as
+  they are held, by a fifth as far as they are fitted, for a model that has them is off by what they lack;
 - the difference of the two edges' blur: an edge that is broader than the other by more than the lens explains is
   shading or penumbra, and its place is open by half of that;
 - measured width against diameter: what is missing is missing at one edge if the two have different contrast, at both
@@ -58,10 +58,10 @@ _WIDTH_DEPARTURE = 0.08
 """Relative; a stretch whose width is farther from the usual one is left out: a cable's is constant within 5 %."""
 _EDGE_OUTLIER = 6.0  # robust standard deviations from the neighbouring edges; the other edge takes over
 _LONGEST_SIDE_PX = 12.0  # px; more sheath or ground than this adds texture, not knowledge of the edge
-_SMALL_RADIUS_PX = 15.0  # px; thinner cables leave little room for shading: plain error function, see ramps_worth
+_SMALL_RADIUS_PX = 15.0  # px; thinner cables leave little room for shading: ramps are held, see ramps_worth
 _RAMPS_WORTH = 1.5
-"""Ratio of the widths' errors by the plain error function to those with ramps, above which a thin cable's edges get
-ramps all the same: they double the scatter, which a ratio near 1 does not repay.
+"""Ratio of the widths' errors by held ramps to those by free ones, above which a thin cable's edges get free ramps all
+the same: they double the scatter, which a ratio near 1 does not repay.
 """
 _WIDTH_PLAY = 0.04
 """Of the width; so much it may be off the expected one throughout: scales and diameters are known to some percent, and
@@ -145,9 +145,8 @@ def measure_sections(
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    thin = half_width < _SMALL_RADIUS_PX
-    shaded, plain = fit_profiles(pixels, s, blur=max(blur, 0.5), thin=thin)
-    profiles = plain if plain is not None and _serves(plain, shaded, half_width, diameter) else shaded
+    free, held = fit_profiles(pixels, s, blur=max(blur, 0.5), thin=half_width < _SMALL_RADIUS_PX)
+    profiles = held if held is not None and _serves(held, free, half_width, diameter) else free
     edges = fit_edges(pixels, s, profiles)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
@@ -189,8 +188,8 @@ def measure_sections(
     )
 
 
-def _serves(plain: Profiles, shaded: Profiles, half_width: float, diameter: float | None) -> bool:
-    """True unless widths by the plain error function are far less constant, or less like the cable's, than by ramps."""
+def _serves(held: Profiles, shaded: Profiles, half_width: float, diameter: float | None) -> bool:
+    """True unless widths by ramps that are held are far less constant, or less like the cable's, than by free ones."""
 
     def unlike(profiles: Profiles) -> float:
         # of most windows: one that fell on a cover's shadow says nothing of the others, and sections pass over it
@@ -200,7 +199,7 @@ def _serves(plain: Profiles, shaded: Profiles, half_width: float, diameter: floa
         spread = scatter(width, middle)
         return float(np.hypot(spread, max(off - _WIDTH_PLAY * 2.0 * half_width, 0.0)))
 
-    return unlike(plain) <= _RAMPS_WORTH * unlike(shaded)
+    return unlike(held) <= _RAMPS_WORTH * unlike(shaded)
 
 
 def _of_usual_width(width: Array) -> NDArray[np.bool_]:
@@ -259,7 +258,7 @@ def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diamet
     shift, blur = profiles.at(s, "shift"), profiles.at(s, "blur")
     # Both edges count by the width, in which their errors are too: what is constant along s moves the midpoint by
     # half the difference, however they are weighted.
-    share = _FITTED if profiles.inside.any() or profiles.outside.any() else 1.0
+    share = float(np.hypot(profiles.held, _FITTED * (1.0 - profiles.held)))
     common = float(np.average(shift.sum(axis=0), weights=1.0 / doubt.sum(axis=0)))
     by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
     by_blur = 0.5 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))

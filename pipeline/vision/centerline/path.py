@@ -12,7 +12,6 @@ from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, search_edges
 from pipeline.vision.centerline.midline import LEAST_SECTIONS, Cover, Sections, free_of_covers, measure_sections
-from pipeline.vision.centerline.smoothing import Witness
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import Bearing, RoughCable
@@ -54,7 +53,6 @@ def fit_along(
     s: Array,
     length: float,
     diameter: float,
-    witness: Witness | None = None,
 ) -> CurveFit:
     """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
 
@@ -68,8 +66,6 @@ def fit_along(
         About the arc lengths of the points from the left axis.
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
-    witness : Witness, optional
-        Other data whose errors last as long along s as those of the points.
     """
     most = max(_MIN_INTERVALS, round(length / (_KNOT_SPACING_DIAMETERS * diameter)))
     intervals = min(most, max(_FIRST_INTERVALS, round(length / (_PATH_KNOT_DIAMETERS * diameter))))
@@ -88,7 +84,6 @@ def fit_along(
             correlation_length=correlation_length,
             iterations=iterations,
             bias_share=_BIAS_SHARE,
-            witness=witness,
         )
 
     while intervals < most:  # long cables only

@@ -9,9 +9,6 @@ singular vectors of its upper block Q1: the generalised singular values of the p
 O(p). Squared normal equations, which lose half the digits, are never formed; ``Q1' Q1`` is, for the columns of the
 whole are orthonormal, so that its eigenvalues keep an absolute error of one rounding.
 
-Errors that last as long as a bend of the curve cannot be told from one by the points alone: other data with errors of
-the same l and without the curve, the `Witness`, enter its likelihood.
-
 The restricted likelihood over ``log mu`` is kept whole: estimate and covariance are averaged over it, so that a weight
 that the data leave open widens the bands.
 
@@ -77,29 +74,6 @@ def whiten(rows: Array, std: Array, gaps: Array, length: float) -> Array:
 def _correlations(gaps: Array, length: float) -> Array:
     # Capped: two sections at the same place would be taken for one, and their difference for infinitely certain.
     return np.asarray(np.minimum(np.exp(-np.maximum(gaps, 0.0) / length), 0.999))
-
-
-@dataclass(frozen=True)
-class Witness:
-    """Data ``(m,)`` at ``position`` ``(m,)`` whose errors last as long along s as those of a problem.
-
-    What they hold besides is slow: a combination of the columns of ``slow`` ``(m, k)``. ``std`` ``(m,)`` is the
-    relative size of the errors; their scale is their own.
-    """
-
-    data: Array
-    std: Array
-    position: Array
-    slow: Array
-
-    def criterion(self, length: float) -> float:
-        """Restricted likelihood of a correlation length, -2 log."""
-        gaps = np.diff(self.position)
-        columns = whiten(np.column_stack([self.slow, self.data]), self.std, gaps, length)
-        triangle = np.abs(np.diag(np.linalg.qr(columns, mode="r")))
-        value = 2.0 * (len(columns) - self.slow.shape[1]) * np.log(max(triangle[-1], 1e-300))
-        value += 2.0 * np.log(triangle[:-1]).sum() + np.log1p(-(_correlations(gaps, length) ** 2)).sum()
-        return float(value)
 
 
 @dataclass(frozen=True)
@@ -236,12 +210,8 @@ class Problem:
         """Distances of neighbours, ``(n - 1,)``."""
         return np.diff(self.position)
 
-    def correlation_length(self, longest: float, witness: Witness | None = None) -> float:
-        """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``.
-
-        A ``witness`` tells of errors that last as long as a bend of the curve, which it does not follow. It makes the
-        length longer only: what it lacks, such as a highlight that moves the points for a stretch, they tell alone.
-        """
+    def correlation_length(self, longest: float) -> float:
+        """Likeliest correlation length, from a fifth of the distance of neighbours (none) up to ``longest``."""
         gap = median(self.gaps)
         shortest = 0.2 * gap
         # Even in Fisher's z of neighbours, by which likelihoods of correlations are nearly parabolas.
@@ -250,11 +220,7 @@ class Problem:
         lengths = -gap / np.log(np.tanh(tried))
         diagonals = [self._diagonal(float(length)) for length in lengths]
         alone = np.array([diagonal.criterion(diagonal.weights())[0].min() for diagonal in diagonals])
-        found = _lowest(tried, alone)
-        if witness is not None:
-            told = np.array([witness.criterion(float(length)) for length in lengths])
-            found = max(found, _lowest(tried, alone + told))
-        return float(-gap / np.log(np.tanh(found)))
+        return float(-gap / np.log(np.tanh(_lowest(tried, alone))))
 
     def estimate(self, correlation_length: float) -> Array:
         """Estimate ``(p,)`` at the likeliest weight of the penalty."""

@@ -113,10 +113,13 @@ def chords_px(found: list[RoughCable]) -> Array:
     return np.array([np.hypot(*np.subtract(cable.right.center_px, cable.left.center_px)) for cable in found])
 
 
-def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float) -> Scale | None:
-    """Regression of the chord in px on the displacement: each metre of travel shortens the chord by one.
+def _by_travel(
+    found: list[RoughCable], displacements: Array, parallax_std: float, plane: PlaneMap | None = None
+) -> Scale | None:
+    """Regression of the chord on the displacement: each metre of travel shortens it by one.
 
-    None without travel, and of axes that a person gave: those on later photos are where log and scale put them.
+    In px/m, or with chords on a ``plane`` in units of its scale. None without travel, and of axes that a person gave:
+    those on later photos are where log and scale put them.
     """
     if any(axis.kind == "given" for cable in found for axis in (cable.left, cable.right)):
         return None
@@ -125,35 +128,31 @@ def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: floa
     if known.sum() < 2 or not np.ptp(travel) > 0:
         return None
     chords = chords_px(found)[known]
-    slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
+    slope = _shortening(chords, travel)
     axis_std = np.array([np.hypot(cable.left.std_px, cable.right.std_px) for cable in found])[known]
     residual = chords - chords.mean() + slope * travel
     free = len(chords) - 2
     spread = max(float(np.median(axis_std)), float(np.sqrt(residual @ residual / free)) if free > 0 else 0.0)
-    std = spread / float(np.sqrt(travel @ travel))
     if slope <= 0:
         return None
-    std_relative = float(np.hypot(std / slope, parallax_std))
+    std_relative = float(np.hypot(spread / float(np.sqrt(travel @ travel)) / slope, parallax_std))
+    if plane is not None:
+        ends = [plane.to_plane(np.array([cable.left.center_px, cable.right.center_px])) for cable in found]
+        slope = _shortening(np.array([np.hypot(*(right - left)) for left, right in ends])[known], travel)
     return Scale(slope, std_relative, Message("scale.travel"))
 
 
-def cover_radii_px(found: list[RoughCable]) -> Array:
-    """Radii ``(k,)`` of all covers that were measured, px."""
-    return np.array([radius for radius, _ in _radii(found)])
-
-
-def _radii(found: list[RoughCable]) -> list[tuple[float, float]]:
-    """Radius and its standard deviation, px, of each cover that was measured."""
-    axes = [axis for cable in found for axis in (cable.left, cable.right)]
-    return [(axis.radius_px, axis.radius_std_px or 0.0) for axis in axes if axis.radius_px is not None]
+def _shortening(chords: Array, travel: Array) -> float:
+    return -float(travel @ (chords - chords.mean())) / float(travel @ travel)
 
 
 def _by_covers(found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings) -> Scale | None:
-    radii = cover_radii_px(found)
-    if specimen.rig.marker_diameter_m is None or not len(radii):
+    covers = [axis for cable in found for axis in (cable.left, cable.right) if axis.radius_px is not None]
+    if specimen.rig.marker_diameter_m is None or not covers:
         return None
+    radii = np.array([cover.radius_px for cover in covers])
     # what light does to the rims is common to all photos: it does not show in their scatter
-    rims = float(np.median([std / radius for radius, std in _radii(found)]))
+    rims = float(np.median(np.array([cover.radius_std_px or 0.0 for cover in covers]) / radii))
     scatter = float(np.std(radii) / np.mean(radii))
     parallax_std = axis_parallax_std(specimen, found, settings)
     std = math.hypot(_COVER_DIAMETER_STD, parallax_std, scatter, rims)
@@ -173,7 +172,7 @@ def in_plane_of_cable(
     """
     parallax_std, misfits = axis_parallax_std(specimen, found, settings), []
     for one in planes:
-        travel = _by_travel_on_plane(one, found, displacements, parallax_std)
+        travel = _by_travel(found, displacements, parallax_std, one.plane)
         seen = (travel, _by_length(one, found, specimen, settings))
         misfits.append(sum(((s.px_per_m - 1.0) / _std(s, one.scale)) ** 2 for s in seen if s is not None))
     chance = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
@@ -198,7 +197,7 @@ def check_scale(
     """
     found_by = calibration.scale
     parallax_std = axis_parallax_std(specimen, found, settings)
-    travel = _by_travel_on_plane(calibration, found, displacements, parallax_std)
+    travel = _by_travel(found, displacements, parallax_std, calibration.plane)
     covers = _by_covers(found, specimen, settings)
     if covers is not None:  # in units of the scale used
         covers = replace(covers, px_per_m=covers.px_per_m / _local_scale(calibration, found))
@@ -249,21 +248,6 @@ def _by_length(
 def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
     axes = np.array([axis.center_px for cable in found for axis in (cable.left, cable.right)])
     return float(np.median(calibration.plane.local_scale(axes))) if len(axes) else calibration.scale.px_per_m
-
-
-def _by_travel_on_plane(
-    calibration: Calibration, found: list[RoughCable], displacements: Array, parallax_std: float
-) -> Scale | None:
-    """As `_by_travel`, with chords in m: the slope is then the ratio of true scale to the scale used."""
-    estimate = _by_travel(found, displacements, parallax_std)
-    known = np.isfinite(displacements)
-    if estimate is None:
-        return None
-    ends = [calibration.plane.to_plane(np.array([cable.left.center_px, cable.right.center_px])) for cable in found]
-    chords = np.array([np.hypot(*(right - left)) for left, right in ends])[known]
-    travel = displacements[known] - displacements[known].mean()
-    slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
-    return Scale(slope, estimate.std_relative, estimate.source)
 
 
 def with_doubt_of_plane(line: Centerline, calibration: Calibration) -> Centerline:

@@ -10,7 +10,6 @@ from scipy.special import fresnel
 
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.smoothing import Witness
 
 LENGTH = 0.2
 
@@ -39,10 +38,10 @@ def noisy(kappa, rng, *, std, correlation, count=240, hidden=0.006, length=LENGT
     return s, points + std * e[:, None] * np.column_stack([-np.sin(theta(s)), np.cos(theta(s))])
 
 
-def fit(s, points, *, intervals=26, order=3, length=LENGTH, std=1e-5, witness=None) -> CurveFit:
+def fit(s, points, *, intervals=26, order=3, length=LENGTH, std=1e-5) -> CurveFit:
     frame = make_frame(0.0, length, intervals=intervals, order=order)
     start, stds = initial_curve(points, s, frame), np.full(len(s), std)
-    return fit_curve(points, stds, start=start, s=s, order=order, longest=0.01, witness=witness)
+    return fit_curve(points, stds, start=start, s=s, order=order, longest=0.01)
 
 
 def bow(s):
@@ -150,19 +149,6 @@ def test_correlated_noise_is_estimated_and_bands_are_true():
     assert_allclose(np.median(sigma), 3e-6, rtol=0.05)
     # the length of one curve scatters by a fifth, the median by 4 %: three of those
     assert_allclose(np.median(length), 0.0015, rtol=0.12)
-
-
-def test_errors_that_a_witness_shows_to_last_widen_the_band_and_leave_the_curve():
-    """On an outline that waves a curve held to the waves' length follows the cable's bends too little."""
-    rng = np.random.default_rng(4)
-    s, points = noisy(bow, rng, std=3e-6, correlation=0.0015)
-    waves = 1e-5 * np.sin(2.0 * np.pi * s / 0.03) + 1e-6 * rng.standard_normal(len(s))
-    told = fit(s, points, witness=Witness(waves, np.ones(len(s)), s, np.ones((len(s), 1))))
-    alone, at = fit(s, points), np.linspace(0.02, LENGTH - 0.02, 41)
-    assert_allclose(told.curve.curvature(at), alone.curve.curvature(at), rtol=1e-9)
-    wide, narrow = (np.linalg.norm(f.curve.bases(at)[2] @ f.smooth.root, axis=1) for f in (told, alone))
-    assert told.smooth.correlation_length > 2.0 * alone.smooth.correlation_length
-    assert np.median(wide) > 1.2 * np.median(narrow)
 
 
 def test_white_noise_bands_are_too_narrow_for_correlated_errors():

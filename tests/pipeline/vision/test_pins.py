@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.vision.bearings.covers import find_cover
+from pipeline.vision.bearings.cut import cover_by_cut
 from pipeline.vision.bearings.rim import Radius
 from pipeline.vision.photo import Photo
 from pipeline.vision.search.ends import CableEnd
@@ -44,3 +45,16 @@ def test_pin_of_the_grounds_own_grey_is_found_by_the_hollow_in_which_it_cuts_the
     found = find_cover(photo, CableEnd(end, outward), Radius(radius, 0.01), 2.0 * half)
     assert found is not None
     assert np.hypot(*np.subtract(found.center, pin)) < 2.0 * found.std < 1.5
+
+
+@pytest.mark.parametrize("jagged", [0.0, 3.0])
+def test_border_that_lies_on_no_arc_is_no_cover(jagged: float) -> None:
+    """The border of a white band aslant was taken for a cover's rim, whose middle it told to 3 px; a rim is an arc."""
+    v, u = np.mgrid[:300, :900].astype(float)
+    aside, radius = v - 150.0, 88.0
+    border = 500.0 - np.sqrt(radius**2 - np.clip(aside, -80.0, 80.0) ** 2) + jagged * np.sign(np.sin(aside / 4.0))
+    grey = np.where((np.abs(aside) < 30.0) & ((u < border) | (u > border + 2.0 * radius)), 40.0, 150.0)
+    grey += np.random.default_rng(0).normal(0.0, 2.0, grey.shape)
+    photo = Photo("a", np.rint(grey).clip(0, 255).astype(np.uint8), 8)
+    end = CableEnd(np.array([412.0, 150.0]), np.array([1.0, 0.0]))
+    assert (cover_by_cut(photo, end, Radius(radius, 0.01), 60.0) is None) == (jagged > 0.0)

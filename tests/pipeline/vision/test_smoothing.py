@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.interpolate import BSpline
-from scipy.linalg import block_diag, null_space
+from scipy.linalg import block_diag
 
-from pipeline.vision.centerline.smoothing import Problem, Witness, whiten
+from pipeline.vision.centerline.smoothing import Problem, whiten
 
 N, P = 60, 9
 
@@ -81,49 +80,6 @@ def errors(rng, position, length: float):
     """Gaussian errors of unit variance and correlation exp(-ds / length), by the root of the full matrix."""
     V = np.exp(-np.abs(position[:, None] - position) / length)
     return np.linalg.cholesky(V + 1e-12 * np.eye(len(position))) @ rng.standard_normal(len(position))
-
-
-def test_witness_has_the_likelihood_of_the_dense_form():
-    rng = np.random.default_rng(4)
-    s = np.sort(rng.uniform(0.0, 10.0, N))
-    witness = Witness(errors(rng, s, 0.6), rng.uniform(0.5, 2.0, N), s, np.vander(s / 10.0, 3))
-
-    def dense(length: float) -> float:
-        V = np.exp(-np.abs(s[:, None] - s) / length) * np.outer(witness.std, witness.std)
-        contrast = null_space(witness.slow.T).T  # the restricted likelihood is that of all contrasts free of the slow
-        C, free = contrast @ V @ contrast.T, len(contrast)
-        z = contrast @ witness.data
-        return free * np.log(z @ np.linalg.solve(C, z)) + np.linalg.slogdet(C)[1]
-
-    lengths = np.array([0.1, 0.5, 2.0])
-    found, exact = (np.array([f(length) for length in lengths]) for f in (witness.criterion, dense))
-    assert_allclose(np.diff(found), np.diff(exact), rtol=1e-8)
-
-
-def test_witness_keeps_errors_from_passing_for_the_curve():
-    """Errors that last three spacings under a curve of half as many parameters as points: 100 trials.
-
-    The points alone read their length right on the mean, but one in eight less than half as long: there the curve
-    follows the errors, and its bands are too narrow. That is what a witness is for. It may make the length longer only,
-    which costs part of what twice the data could give (0.71): over 1000 trials the error of log l goes from 0.59 to
-    0.46, that of lengths read too short from 0.47 to 0.18, those below half from 13 to 1 %.
-    """
-    rng, s = np.random.default_rng(5), np.linspace(0.0, 10.0, N)
-    design = BSpline.design_matrix(s, np.r_[[0.0] * 3, np.linspace(0.0, 10.0, N // 2 - 2), [10.0] * 3], 3).toarray()
-    off = []
-    for _ in range(100):
-        data = errors(rng, s, 0.5)
-        task = Problem(design, data, np.diff(np.eye(design.shape[1] - 2), 2, axis=0), 4, np.ones(N), s)
-        witness = Witness(0.3 * errors(rng, s, 0.5), np.ones(N), s, np.vander(s / 10.0, 3))
-        off.append([np.log(task.correlation_length(5.0, told) / 0.5) for told in (None, witness)])
-    off = np.array(off)
-    assert abs(off[:, 0].mean()) < 3.0 * off[:, 0].std() / np.sqrt(len(off))
-    alone, told = np.sqrt(np.mean(off**2, axis=0))
-    assert told < 0.5  # a correlation length is known to the root of 2 l / range, a third, at best
-    assert told < 0.9 * alone
-    short_alone, short_told = np.sqrt(np.mean(np.minimum(off, 0.0) ** 2, axis=0))
-    assert short_told < 0.5 * short_alone
-    assert np.mean(off[:, 1] < -np.log(2.0)) < 0.05
 
 
 def test_covariance_is_that_of_all_weights():
