@@ -221,7 +221,6 @@ def start(
     points: int = 0,
     straight: bool = False,
     exact: float = 0.0,
-    scatter: float = 0.0,
     begin: tuple[float, float] | None = None,
     side: float | None = None,
 ) -> Base:
@@ -229,8 +228,8 @@ def start(
 
     ``K = K0 + P y / EI`` over all photos needs no simulation and no guess, and is within a factor two for any cable.
     The law is one of any form, or a spline of ``points``. With ``begin`` (N m^2, 1/m) given it is that constant EI and
-    K0, with ``side`` (1/m) the law that photos show beside that K0. Displacements under load are held to ``scatter``
-    (m) beyond what the log tells of them; one that is known to ``exact`` (m) or better has no error of its own.
+    K0, with ``side`` (1/m) the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or
+    better has no error of its own.
 
     Raises
     ------
@@ -254,9 +253,7 @@ def start(
         if shown is not None:
             law, coefficients, bend = shown
             seen = np.r_[coefficients, bend]
-    std = facts.displacement_std.copy()
-    std[list(facts.pushed)] = np.hypot(std[list(facts.pushed)], scatter)
-    moved = tuple(np.flatnonzero(std > exact).tolist())
+    moved = tuple(np.flatnonzero(facts.displacement_std > exact).tolist())
     return Base(
         law=law,
         seen=seen,
@@ -269,7 +266,7 @@ def start(
         axis_parallax_std=test.axis_parallax_std,
         camera_foot_std=test.camera_foot_std,
         moved=moved,
-        moved_std=std[list(moved)],
+        moved_std=facts.displacement_std[list(moved)],
         moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),
     )
 

@@ -42,7 +42,6 @@ def base_fit(
     elements: int = ELEMENTS,
     functions: int = SHAPE_FUNCTIONS,
     calibrated: bool = True,
-    scatter: float = 0.0,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
 ) -> BaseFit:
@@ -61,8 +60,6 @@ def base_fit(
         Of the shapes that a photo is compared by.
     calibrated : bool
         Whether photos are as noisy as they show, or as they say.
-    scatter : m
-        What displacements are held to beyond what the log tells of them.
     without_photos, without_forces : sets of int
         Indices of steps whose photo or force is not to be trusted.
 
@@ -74,7 +71,7 @@ def base_fit(
     observation = observe(test, functions=functions, without_photos=without_photos, without_forces=without_forces)
 
     def begun(side: float | None = None) -> Base:
-        base = start(test, facts, exact=DISPLACEMENT_STD, scatter=scatter, begin=begin, side=side)
+        base = start(test, facts, exact=DISPLACEMENT_STD, begin=begin, side=side)
         return replace(base, elements=elements)
 
     valleys = [settled(observation, _first(observation, begun(), facts))]
@@ -174,6 +171,23 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
     basis = refreshed(rise, known, float(visited.min()), float(visited.max()), size=size)
     extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis, over)))
     return extension, np.r_[basis.projected(rise), fitted.vector[count:]]
+
+
+def held_to(observation: Observation, fitted: Fit, scatter: float) -> Fit:
+    """A base model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
+
+    Valleys are compared before: beside errors of displacements of its own each fits nearly as well.
+    """
+    extension, facts = fitted.extension, fitted.extension.facts
+    base, pushed, std = extension.base, list(facts.pushed), facts.displacement_std.copy()
+    std[pushed] = np.hypot(std[pushed], scatter)
+    moved, first = np.flatnonzero(std > DISPLACEMENT_STD), len(base.names) - 2 - len(base.moved)
+    errors = np.zeros(len(std))
+    errors[list(base.moved)] = fitted.vector[first:-2]
+    loose = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved])
+    start = np.r_[fitted.vector[:first], errors[moved], fitted.vector[-2:]]
+    found = fit_from(observation, replace(extension, base=loose), start, fitted)
+    return fitted if found.run.prediction is None else found
 
 
 def law_of(fitted: Fit) -> FreeLaw:

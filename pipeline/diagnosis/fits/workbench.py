@@ -19,7 +19,7 @@ from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.base_fit import base_fit
+from rod.inverse.base_fit import base_fit, held_to
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
 from rod.inverse.prediction import Facts, facts_of
@@ -105,14 +105,13 @@ def prepare(
     observation, fitted = base_fit(
         test,
         facts_of(test),
-        scatter=SCATTER,
         without_photos=faults.photos,
         without_forces=faults.forces,
     )
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
         return ended(fitted.run.failed)
-    return scored(test, observation, fitted, causes, settings)
+    return scored(test, observation, held_to(observation, fitted, SCATTER), causes, settings)
 
 
 def scored(

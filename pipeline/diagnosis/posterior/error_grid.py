@@ -369,7 +369,7 @@ def _shown(observation: Observation, facts: Facts, photos: NDArray[np.int_], for
         own = facts.length * photo.whiten[:, 1:] @ forms(photo.sections.s / facts.length)
         for k, row in zip(np.flatnonzero(step == photo.step), own, strict=True):
             parts[k] = row
-    return np.array(parts).reshape(len(photos), -1)
+    return np.array(parts).reshape(len(photos), forms(np.zeros(1)).shape[1])
 
 
 def _of_photos(
@@ -378,7 +378,7 @@ def _of_photos(
     """Directions of photo rows, whitened by ``root``, along which forms ``shown`` (n, j) lie, and their variances."""
     values, orders = np.linalg.eigh(over_steps)
     at_step = (orders * np.sqrt(np.maximum(values, 0.0)))[observation.rows.step[photos]]
-    factor = (at_step[:, :, None] * shown[:, None, :]).reshape(len(photos), -1)
+    factor = (at_step[:, :, None] * shown[:, None, :]).reshape(len(photos), values.size * shown.shape[1])
     if observation.common is not None:
         factor = observation.common.whitened(factor)
     turn, size, _ = np.linalg.svd(root @ factor, full_matrices=False)
