@@ -104,7 +104,7 @@ def test_true_cause_is_in_the_set_at_multiples_of_its_detectable_amount(protocol
     assert np.mean(list(shares.values())) > target - by_chance(target, DRAWS * len(shares)), shares
 
 
-LARGE = {("three", "rig_compliance", 4.0), ("three", "stiffness_drift", 4.0)}
+LARGE = {("three", name, 4.0) for name in ("rig_compliance", "stiffness_drift", "force_drift")}
 """Amounts beside which a base model ends with another K0 or a rougher law, about which no linear model tells them."""
 
 
