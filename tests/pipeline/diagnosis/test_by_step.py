@@ -104,11 +104,15 @@ def half_sine(u):
 
 @pytest.mark.parametrize(("protocol", "profile"), [("loop", half_sine), ("six", np.ones_like)])
 def test_a_set_that_goes_with_the_largest_bend_anywhere(protocol, profile):
-    part, covered = found(Cable(set_rate=0.05, set_from=3.0, set_profile=profile), protocol, 23)
-    assert part.causes[0].name == "plastic_set", part.headline
-    form = part.causes[0].forms[0]
-    assert form.label == ("in a half sine along the cable" if profile is half_sine else "alike all along the cable")
-    assert part.causes[0].estimate == pytest.approx(0.05, abs=4.0 * part.causes[0].std) and covered > 0.9
+    inside = []
+    for seed in (23, 24):
+        part, covered = found(Cable(set_rate=0.05, set_from=3.0, set_profile=profile), protocol, seed)
+        assert part.causes[0].name == "plastic_set", part.headline
+        form = part.causes[0].forms[0]
+        assert form.label == ("in a half sine along the cable" if profile is half_sine else "alike all along the cable")
+        assert part.causes[0].estimate == pytest.approx(0.05, abs=4.0 * part.causes[0].std)
+        inside.append(covered)
+    assert np.mean(inside) > 0.9  # of one smooth error a tenth of the range is by chance outside
 
 
 def test_a_set_where_the_cable_bends_is_part_of_the_law_on_loading():
