@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.special import logsumexp, ndtri
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction
@@ -34,8 +35,8 @@ LOUDEST = 40.0
 POSSIBLE = 30.0
 """Plausible sizes: no rig has more of a cause."""
 
-DRAWS, BINS, HALVINGS = 16, 24, 40
-"""Of noise, over which log weights are means; of what the data tell of an amount; and of the interval of the amount."""
+DRAWS, BINS = 16, 24
+"""Of noise, over which log weights are means; and of what the data tell of an amount."""
 
 LINEAR = (0.02, 3.0)
 """Amounts within these multiples of where a trace was computed are taken as proportional."""
@@ -161,10 +162,4 @@ def found_at(weight: Array, told: Array, odds: float, most: float, plausible: fl
         gain = log_gain(np.full(told.shape, amount), 1.0 / told, plausible, sign)
         return float(logsumexp(left + gain) - logsumexp(left)) - odds
 
-    low, high = 0.0, most
-    if gained(most) < 0.0:
-        return np.inf
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if gained(middle) < 0.0 else (low, middle)
-    return high
+    return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most))
