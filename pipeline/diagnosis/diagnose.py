@@ -31,6 +31,7 @@ from pipeline.records import Finding, doubtful
 from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse import InverseOutcome
+from rod.inverse.base_fit import held_to
 from rod.inverse.fit import Fit
 from rod.inverse.observation import CHORD_STD
 from rod.measurement import MeasuredTest
@@ -121,7 +122,7 @@ def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
     chance, std = own.moved
     if chance >= 0.5:
         findings.append(doubtful("log/displacement-scatter", std_m=std))
-    exact = None if chance >= 0.5 or conclusion.accepted is None else ordinary.as_exact(bench.observation, fitted)
+    exact = None if chance >= 0.5 or conclusion.accepted is None else held_to(bench.observation, fitted, 0.0)
     if own.rig < 0.5:
         return _Beside(exact, tuple(findings))
     rig = ordinary.beside_ordinary_rig(bench.observation, exact or fitted, bench.suspicion)

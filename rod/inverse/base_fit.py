@@ -174,19 +174,19 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
 
 
 def held_to(observation: Observation, fitted: Fit, scatter: float) -> Fit:
-    """A base model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
+    """A model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
 
-    Valleys are compared before: beside errors of displacements of its own each fits nearly as well.
+    Valleys of K0 are compared before: beside errors of displacements of its own each fits nearly as well.
     """
     extension, facts = fitted.extension, fitted.extension.facts
     base, pushed, std = extension.base, list(facts.pushed), facts.displacement_std.copy()
     std[pushed] = np.hypot(std[pushed], scatter)
-    moved, first = np.flatnonzero(std > DISPLACEMENT_STD), len(base.names) - 2 - len(base.moved)
-    errors = np.zeros(len(std))
-    errors[list(base.moved)] = fitted.vector[first:-2]
-    loose = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved])
-    start = np.r_[fitted.vector[:first], errors[moved], fitted.vector[-2:]]
-    found = fit_from(observation, replace(extension, base=loose), start, fitted)
+    moved, last = np.flatnonzero(std > DISPLACEMENT_STD), len(base.names) - 2
+    first, errors = last - len(base.moved), np.zeros(len(std))
+    errors[list(base.moved)] = fitted.vector[first:last]
+    other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved])
+    start = np.r_[fitted.vector[:first], errors[moved], fitted.vector[last:]]
+    found = fit_from(observation, replace(extension, base=other), start, fitted)
     return fitted if found.run.prediction is None else found
 
 

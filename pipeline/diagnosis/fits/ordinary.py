@@ -16,7 +16,6 @@ import numpy as np
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.messages import Message, word
 from pipeline.records import Finding, inferred
-from rod.inverse.base import EXACT
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit, fit_from
 from rod.inverse.observation import Observation
@@ -34,15 +33,6 @@ def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspic
     wider = replace(extension, terms=(*extension.terms, *terms))
     found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
     return None if found.run.prediction is None else found
-
-
-def as_exact(observation: Observation, fitted: Fit) -> Fit:
-    """A model fitted with displacements as exact as the log tells them; as it is where that has no equilibrium."""
-    extension, at = fitted.extension, fitted.beyond_log
-    base, vector, std = extension.base, fitted.vector.copy(), extension.base.moved_std.copy()
-    std[at - (len(base.names) - 2 - len(base.moved))], vector[at] = EXACT * base.length, 0.0
-    found = fit_from(observation, replace(extension, base=replace(base, moved_std=std)), vector, fitted)
-    return fitted if found.run.prediction is None else found
 
 
 SEEN = 2.0
