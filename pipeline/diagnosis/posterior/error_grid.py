@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
+from pipeline.diagnosis.fits.workbench import SCATTER
 from rod.inverse.common_errors import shared_light
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation
@@ -51,7 +52,7 @@ Forms = Callable[[Array], Array]
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
 AS_RIGS_ARE = (0.0, 1.0)
-MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (1e-5, 1.0): 0.2, (5e-5, 1.0): 0.1}
+MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (SCATTER, 1.0): 0.2, (5.0 * SCATTER, 1.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by several
 standard deviations of a hold are something else: no band of f_EI may take them for noise unseen; by how much few
 samples may belie their noise is no matter of belief, see `hold_sizes`. `MOVED`: scatter of the displacements (m), and
@@ -331,8 +332,7 @@ def hold_sizes(observation: Observation) -> dict[float, float]:
 def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
     """Which of `SHAPES` are waves of a photo, and nothing else."""
     seen = [np.median(photo.sections.section_std) for photo in observation.photos]
-    scatter = np.median(seen) if seen else 0.0
-    size = facts.length * np.array(SHAPES)
+    scatter, size = np.median(seen) if seen else 0.0, facts.length * np.array(SHAPES)
     return np.asarray((size >= FAINTEST * scatter) & (size <= scatter) & (size > 0.0))
 
 
