@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.diagnosis.explanations.candidates import candidates
+from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
 from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
+from pipeline.diagnosis.explanations.pair_fits import together
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits import ordinary
@@ -21,8 +22,6 @@ from pipeline.diagnosis.fits.workbench import Workbench, prepare
 from pipeline.diagnosis.posterior.weigh import weighed
 from pipeline.diagnosis.presentation.findings import too_large
 from pipeline.diagnosis.presentation.part import present
-from pipeline.diagnosis.statistics.pairs import pair_gains
-from pipeline.diagnosis.statistics.twins import cosines
 from pipeline.faults import Faults, ForceCorrection
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
@@ -151,36 +150,39 @@ def _stands_still(test: MeasuredTest) -> bool:
 
 
 def _data_at_fault(bench: Workbench) -> Faults | None:
-    """A break in the forces, or one item, that removes more than any cause or pair can; None below the threshold."""
+    """A break in the forces, or one item, that explains more than causes do; None below the threshold of the score."""
     if bench.largest <= bench.limit:
         return None
-    scores = bench.suspicion.scores
-    pairs = pair_gains(
-        scores.z,
-        cosines(scores.unit),
-        bench.suspicion.sign,
-        bench.suspicion.owner,
+    for found in (force_break(bench), _item_at_fault(bench)):
+        if found is not None and not _causes_leave(bench, found[1] + FAULT**2):
+            return found[0]
+    return None
+
+
+def _causes_leave(bench: Workbench, most: float) -> bool:
+    """Whether a cause or a pair of causes leaves at most that chi-square once it is refitted.
+
+    Scores are linear ones: about a base model that is far off they promise more than a cause can do, or less.
+    """
+    suspicion = bench.suspicion
+    single = (
+        refit_one(bench.observation, bench.base, suspicion, cause, rival=most)
+        for cause in candidates(suspicion)[:REFITTED]
     )
-    by_cause = max(bench.largest**2, float(pairs.max(initial=0.0)))
-    return force_break(bench, by_cause=by_cause) or _item_at_fault(bench, by_cause=by_cause)
+    if any(one is not None and one.fitted.chi2 <= most for one in single):
+        return True
+    hidden = hidden_pair(suspicion)
+    return bool(hidden) and any(pair.fitted.chi2 <= most for pair in together(bench, hidden))
 
 
-def _item_at_fault(bench: Workbench, *, by_cause: float) -> Faults | None:
-    """One photo or force whose absence brings the rest to the noise, and removes more than any cause or pair can."""
+def _item_at_fault(bench: Workbench) -> tuple[Faults, float] | None:
+    """One photo or force whose absence brings the rest to the noise, and the chi-square left with noise instead."""
     item = worst_item(bench.observation, bench.base)
     if item is None or item.gain - item.rows < FAULT**2:
         return None
     freedom = len(bench.base.residual) - bench.base.extension.size - item.rows
     fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * item.gain
-    least = item.gain - item.rows - FAULT**2
-    if not fits or by_cause >= least:
-        return None
-    # scores are linear ones: about a base model that is far off, a cause explains more than they promise
-    for cause in candidates(bench.suspicion)[:REFITTED]:
-        one = refit_one(bench.observation, bench.base, bench.suspicion, cause)
-        if one is not None and one.gain >= least:
-            return None
-    return outlier_fault(bench.test, item)
+    return (outlier_fault(bench.test, item), item.rest + item.rows) if fits else None
 
 
 def _nothing_to_compare(reason: Message) -> DiagnosisPart:

@@ -10,10 +10,11 @@ the parameters v of the model, with all that the photos know of them, each of th
     sign         F_i = +-c p_i with the signs as measured
     one force    F_i = c p_i but for one step
 
-A break is a fault of the data if it brings all forces to their noise, where neither a cause, nor a pair of causes, nor
-one bad force does nearly as well. One step before or after it would be one bad force. A factor of nearly nothing is a
-load cell that died: its forces are left out, they are no measurement that could be corrected. Friction, relaxation and
-drift change forces step by step and differ with the bow: none of them keeps one factor, or one offset, on each side.
+A break is a fault of the data if it brings all forces to their noise, where one bad force does not nearly as well, nor
+a cause, nor a pair of causes (`pipeline.diagnosis.diagnose`). One step before or after it would be one bad force. A
+factor of nearly nothing is a load cell that died: its forces are left out, they are no measurement that could be
+corrected. Friction, relaxation and drift change forces step by step and differ with the bow: none of them keeps one
+factor, or one offset, on each side.
 
 Codes: ``force/factor``, ``force/zero-moved``, ``force/sign``, ``force/dead``.
 """
@@ -91,10 +92,10 @@ class Break:
         return self.kind == "factor" and (abs(self.amount) < max(DEAD, NO_FACTOR * self.std))
 
 
-def force_break(bench: Workbench, *, by_cause: float) -> Faults | None:
+def force_break(bench: Workbench) -> tuple[Faults, float] | None:
     """The break in the forces that explains what the base model misfits, with the forces corrected; None without one.
 
-    ``by_cause`` is the chi-square that a cause or a pair of causes removes.
+    Second: the chi-square it leaves.
     """
     told = _Told.by_photos(bench)
     if told is None:
@@ -103,7 +104,7 @@ def force_break(bench: Workbench, *, by_cause: float) -> Faults | None:
     found = [_break(told, trial, whole) for trial in (*told.signs(), *told.breaks())]
     fault = FAULT**2
     best = max(found, key=lambda one: one.gain, default=None)
-    if best is None or best.gain < by_cause + fault:
+    if best is None:
         return None
     turned = next((one for one in found if one.kind == "sign" and one.gain > best.gain - fault), None)
     if turned is None and best.gain < whole.rest - single.rest + fault:
@@ -115,7 +116,7 @@ def force_break(bench: Workbench, *, by_cause: float) -> Faults | None:
     others = (one for one in found if one.steps == best.steps and one.kind not in ("sign", best.kind))
     other = None if turned else next((one for one in others if one.rest < best.rest + UNTOLD), None)
     dead = next((one for one in (best, other) if one is not None and one.dead), None)
-    return _as_fault(bench.test, best, other) if dead is None else _without_dead(bench.test, dead)
+    return (_as_fault(bench.test, best, other) if dead is None else _without_dead(bench.test, dead)), best.rest
 
 
 class _Trial(NamedTuple):

@@ -133,7 +133,7 @@ def test_what_a_correction_may_be_off_by_is_what_it_is_off_by(kind):
         slope, jump = (0.5, 0.0) if kind == "factor" else (1.0, 0.4 * top)
         changed = spoiled(test, lambda i, force, a=slope, b=jump: a * force + b if i >= 4 else force)
         # what causes could do about it has no part in its size, and to score all of them takes half of the time
-        found = force_break(prepare(faults_of_input(changed), SETTINGS, causes=DRIFT), by_cause=0.0)
+        found, _ = force_break(prepare(faults_of_input(changed), SETTINGS, causes=DRIFT))
         (correction,), (errors,) = found.corrections, found.test.common_force_errors
         assert tuple(errors) == correction.steps == (4, 5, 6)
         off = [found.test.steps[i].force - test.steps[i].force for i in errors]

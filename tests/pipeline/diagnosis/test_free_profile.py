@@ -51,13 +51,18 @@ def benched(cable, protocol, name, seed):
     ],
 )
 def test_a_profile_of_no_form_is_found_to_the_noise_and_f_comes_back(name, cable, protocol):
-    """Three spots left many times the noise of the first three, and put f_EI 2 to 31 % off."""
-    bench = benched(cable, protocol, name, seed=60400)
-    found = refit_one(bench.observation, bench.base, bench.suspicion, 0)
-    assert found.fitted.reduced_chi2 < FITS
-    again = identified_again(bench.observation, found.fitted)
-    law = curve(again.fitted, covariance=again.covariance, other=again.other)
-    assert f_error(law, cable)[0] < 0.02
+    """Three spots left many times the noise of the first three, and put f_EI 2 to 31 % off.
+
+    What noise alone does to f_EI beside waves is 1.5 %, and half a per cent more or less from seed to seed.
+    """
+    errors = []
+    for seed in (60400, 60401):
+        bench = benched(cable, protocol, name, seed=seed)
+        found = refit_one(bench.observation, bench.base, bench.suspicion, 0)
+        assert found.fitted.reduced_chi2 < FITS
+        again = identified_again(bench.observation, found.fitted)
+        errors.append(f_error(curve(again.fitted, covariance=again.covariance, other=again.other), cable)[0])
+    assert np.mean(errors) < 0.02
     extension, vector = found.fitted.extension, found.fitted.vector
     uniform, varying = extension.base_model(vector), extension.model(vector)
     shape = deviation(uniform, varying, bench.suspicion.causes[0])
