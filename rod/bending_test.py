@@ -7,7 +7,7 @@ order and carries the memory of friction and set from one to the next.
 What is imposed at a step, one of three:
 
 * ``displacements`` d (m): the axes are commanded to the distance zero - (d + displacement_offset); the rig yields, so
-  the chord reaching the cable is longer by compliance * P;
+  the chord reaching the cable is longer by what the rig yields under P;
 * ``chords`` (m): the distance of the axes as measured, e.g. on the photo; offset and compliance do not enter;
 * ``forces`` P (N): the bearing is loaded, not moved.
 
@@ -66,8 +66,8 @@ class BendingTest:
         Distributed dead load along x and y of the chord frame.
     friction_by_step : (steps,) N m or None
         Added to the Coulomb moment of both bearings step by step; the last one stays.
-    compliance : m/N
-        Of the rig.
+    compliance, stiffening : m/N, 1/N
+        Of the rig, see `rod.reduction.Hold`.
     friction : InternalFriction or None
     plastic_rate : 1/m per 1/m
         Growth of K0 with the largest curvature reached.
@@ -96,6 +96,7 @@ class BendingTest:
     load: tuple[float, float] = (0.0, 0.0)
     friction_by_step: Array | None = None
     compliance: float = 0.0
+    stiffening: float = 0.0
     friction: InternalFriction | None = None
     plastic_rate: float = 0.0
     law_stays: bool = False
@@ -159,7 +160,8 @@ class BendingTest:
         """What two tests have in common of which one can become the other little by little."""
         left, right, friction = self.left, self.right, self.friction
         ends = left.kind, right.kind, left.angle is None, right.angle is None
-        given = self.grown is None, self.friction_by_step is None, 0 if friction is None else friction.stick.size
+        rubbing = () if friction is None else (friction.stick.size, *friction.smooth)
+        given = self.grown is None, self.friction_by_step is None, rubbing
         elements = tuple(np.atleast_1d(self.elements).tolist())
         return *ends, *given, elements, self.law_stays, self.axial_stiffness, self.shear_stiffness, self.zero
 
@@ -167,6 +169,7 @@ class BendingTest:
     def numbers(self) -> dict[str, float]:
         """Everything that is one number of the test and not in its rod's geometry, by the name of its cause."""
         found = {"displacement_offset": self.displacement_offset, "rig_compliance": self.compliance}
+        found["rig_stiffening"] = self.stiffening
         found |= {"load_x": self.load[0], "load_y": self.load[1], "length": self.length}
         found |= {"plastic_set": self.plastic_rate, "set_threshold": self.set_threshold}
         for side, end in (("left", self.left), ("right", self.right)):
@@ -179,7 +182,7 @@ class BendingTest:
         """What is imposed at a step."""
         if control == "displacements":
             chord = self.zero_chord - (value + self.displacement_offset)
-            return Hold(chord=chord, compliance=self.compliance, from_zero=True)
+            return Hold(chord=chord, compliance=self.compliance, stiffening=self.stiffening, from_zero=True)
         return Hold(chord=value) if control == "chords" else Hold(force=value)
 
 

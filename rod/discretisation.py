@@ -194,9 +194,8 @@ class Rod:
     @cached_property
     def virgin(self) -> Memory:
         """Memory of the mounted cable."""
-        relaxed, reached = self.section.virgin()
         angles = self.mounted.angles
-        return Memory(relaxed, reached, float(angles[0]), float(angles[-1]))
+        return Memory(*self.section.virgin(), float(angles[0]), float(angles[-1]))
 
     @cached_property
     def _levers(self) -> Array:
@@ -232,10 +231,8 @@ class Rod:
 
     def advanced(self, angles: Array, K: Array, memory: Memory) -> Memory:
         """Memory after a step that ended with these angles and the curvatures of them."""
-        relaxed, reached = self.section.advanced(K, memory)
         return Memory(
-            relaxed,
-            reached,
+            *self.section.advanced(K, memory),
             self.left.advanced(float(angles[0]), memory.left_angle),
             self.right.advanced(float(angles[-1]), memory.right_angle),
             memory.step + 1,

@@ -9,7 +9,7 @@ with t = (cos alpha, sin alpha) and n = (-sin alpha, cos alpha); stationary in t
 chain ends at the right axis). Its Hessian is tridiagonal in alpha, bordered by R, and well conditioned for any EA:
 
     [ H    B ]   H_ii = sum of dm/dK / w + h (f.t + ...),  B = d(gradient)/dR,
-    [ B^T -S ]   S = sum h rot C^-1 rot^T (+ rig compliance).
+    [ B^T -S ]   S = sum h rot C^-1 rot^T (+ slope of what the rig yields).
 
 A state is a minimum of Eq. (4) under the imposed positions exactly if this matrix has as many negative eigenvalues as
 there are imposed position components (Haynsworth; the positions r alone are always a minimum).
@@ -48,8 +48,8 @@ class Hold:
         Instead of the chord: P, compression positive; the right axis slides on the x axis.
     tip : (2,) N or None
         Instead of both: dead force on a free end (cantilever).
-    compliance : m/N
-        Of the rig: the chord reaching the cable is chord + compliance * P.
+    compliance, stiffening : m/N, 1/N
+        Of the rig: the chord reaching the cable is chord + compliance P / (1 + stiffening |P|).
     from_zero : bool
         The chord was commanded as a displacement from the zero position, so it moves when that does.
     """
@@ -58,6 +58,7 @@ class Hold:
     force: float | None = None
     tip: tuple[float, float] | None = None
     compliance: float = 0.0
+    stiffening: float = 0.0
     from_zero: bool = False
 
     def __post_init__(self) -> None:
@@ -66,13 +67,20 @@ class Hold:
             raise ValueError("exactly one of chord, force and tip must be given")
         if np.shape(given[0]) != (() if self.tip is None else (2,)) or not np.all(np.isfinite(given[0])):
             raise ValueError(f"chord and force are finite numbers, tip is two of them; got {given[0]}")
-        if not self.compliance >= 0.0:
-            raise ValueError(f"compliance must not be negative, got {self.compliance}")
+        if not (self.compliance >= 0.0 and self.stiffening >= 0.0):
+            raise ValueError(
+                f"compliance and stiffening must not be negative, got {self.compliance} and {self.stiffening}"
+            )
 
     @property
     def imposed(self) -> tuple[bool, bool]:
         """Whether the x and the y position of the right axis are imposed."""
         return self.chord is not None, self.tip is None
+
+    def yielded(self, along: float) -> tuple[float, float]:
+        """What the rig yields under a reaction along the chord, m, and its derivative, m/N; in the direction of it."""
+        softer = 1.0 + self.stiffening * abs(along)
+        return self.compliance * along / softer, self.compliance / softer**2
 
     def reaction(self, R: Array) -> Array:
         """The reaction R (2,) N with the components that are prescribed by force put in."""
@@ -92,7 +100,7 @@ class Balance(NamedTuple):
     """Residuals and Hessian of Lambda at one state; see the module for the symbols.
 
     ``gradient`` (n + 2,) N m; ``diagonal`` (n + 2,) and ``off`` (n + 1,) N m/rad; ``border`` (2, n + 2) m; ``softness``
-    (2, 2) m/N without compliance; ``gap`` (2,) m: imposed minus actual position, 0 if not imposed; ``K``, ``m``,
+    (2, 2) m/N with the rig's; ``gap`` (2,) m: imposed minus actual position, 0 if not imposed; ``K``, ``m``,
     ``tangent`` (n + 1,); ``edge`` directions and forces of the edges.
     """
 
@@ -197,7 +205,7 @@ class System:
         off, border = -stiffness, self.border(edge)
         gap = self._gap(edge, R)
         self._hold_ends(angles, gradient, diagonal, off, border)
-        return Balance(gradient, diagonal, off, border, self._softness(edge), gap, K, m, tangent, edge)
+        return Balance(gradient, diagonal, off, border, self._softness(edge, R), gap, K, m, tangent, edge)
 
     def _gap(self, edge: EdgeState, R: Array) -> Array:
         """Imposed minus actual position of the right axis, (2,) m; 0 where it is not imposed."""
@@ -210,7 +218,7 @@ class System:
             (along, across), (rise, run) = (self._axial * force).tolist(), (edge.direction @ self._edges).tolist()
             x, y = along + run, across + rise
         hold = self.hold
-        lacking = 0.0 if hold.chord is None else hold.chord - hold.compliance * float(R[0]) - x
+        lacking = 0.0 if hold.chord is None else hold.chord - hold.yielded(float(R[0]))[0] - x
         return np.array((lacking, -y if hold.tip is None else 0.0))
 
     def directions(self, edge: EdgeState) -> Array:
@@ -244,10 +252,12 @@ class System:
         along, across = self._axial * (cos * force[0] + sin * force[1]), self._shear * (cos * force[1] - sin * force[0])
         return np.array((h * (cos * along - sin * across), h * (sin * along + cos * across)))
 
-    def _softness(self, edge: EdgeState) -> Array:
+    def _softness(self, edge: EdgeState, R: Array) -> Array:
         if self._difference == 0.0:
-            return self._even_softness
-        return np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
+            cable = self._even_softness
+        else:
+            cable = np.asarray(self.softened(edge, np.eye(2)[:, :, None]).sum(axis=2))
+        return cable + np.diag((self.hold.yielded(float(R[0]))[1], 0.0)) if self.hold.compliance else cable
 
     def _hold_ends(self, angles: Array, gradient: Array, diagonal: Array, off: Array, border: Array) -> None:
         """Supports: springs, friction and moments on the end angles; a clamped angle keeps its value."""
@@ -345,8 +355,6 @@ class System:
         schur, low = product[:, : k + 1], product[:, k + 1 :]
         low[:k] += gap[imposed]
         schur[:k, :k] -= balance.softness[imposed, imposed]
-        if self.hold.compliance:
-            schur[0, 0] -= self.hold.compliance
         schur[k, k] += self._spring
         return Eliminated(balance, solved, schur * self._scales, low, definite)
 

@@ -2,10 +2,12 @@
 
 From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and tangent dm/dK (N m^2):
 
-    m = profile * m_law(K; set) + sum_e M_e clip((K - z_e) / c_e, -1, 1)
+    m = profile * m_law(K; set) + sum_e M_e q_e,   q_e = clip((K - z_e) / c_e, -1, 1)
 
 * Internal friction (wires that rub): parallel elasto-plastic elements (Prandtl-Ishlinskii). Element e sticks over a
   curvature change c_e and slips at the moment M_e; z_e is its relaxed curvature, its memory. At the start z_e = K0.
+* An element that gives way gradually (Dahl): from K', where the step before ended, q_e = w - (w - q_e') exp(-|K - K'| /
+  c_e), w the sign of K - K'. With z_e = K - c_e q_e its memory is one and the same.
 * Plastic set p = rate * (max(reached, K - K0) - threshold), where ``reached`` is the largest excess K - K0 so far, the
   threshold at least: the cable is free of moment at K0 + p. The law m_law(K, K0) moves along with its rest,
   m_law(K - p, K0), as that of a cable that has been bent to another shape; or it stays at its curvature
@@ -16,7 +18,8 @@ From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and t
 Within one displacement step the response is a function of K alone with the memory of the step's start: an increment is
 a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
 
-Source: constitutive extension of Eq. (5) of the paper; Prandtl-Ishlinskii model as in plasticity text books.
+Source: constitutive extension of Eq. (5) of the paper; Prandtl-Ishlinskii model as in plasticity text books; Dahl
+(1976), Solid friction damping of mechanical vibrations, eq. 4 with exponent 1.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rod.characteristic import Array, MomentCurve
 
@@ -46,6 +50,8 @@ class InternalFriction:
     elements : int
         Elements slip one after the other at stick_curvature * (1..elements) / elements: one is a sharp stick-slip,
         several a rounded loop. Three follow a smooth loop to a few per cent.
+    gradual : bool
+        Whether all give way gradually, as Dahl's, each with its stick_curvature as the decay of what still sticks.
     beside : InternalFriction or None
         Further elements acting in parallel: a loop of any form is a sum of such groups.
     """
@@ -53,6 +59,7 @@ class InternalFriction:
     half_width: float
     stick_curvature: float
     elements: int = 3
+    gradual: bool = False
     beside: InternalFriction | None = None
 
     def __post_init__(self) -> None:
@@ -71,10 +78,40 @@ class InternalFriction:
         own = np.full((self.elements, 1), self.half_width / self.elements)
         return own if self.beside is None else np.vstack([own, self.beside.slip])
 
+    @cached_property
+    def smooth(self) -> NDArray[np.int_]:
+        """Positions (k,) of the elements that give way gradually."""
+        own = np.arange(self.elements if self.gradual else 0)
+        return own if self.beside is None else np.append(own, self.elements + self.beside.smooth)
+
     @property
     def stiffness(self) -> float:
         """Stiffness of all elements while they stick, N m^2."""
         return float(np.sum(self.slip / self.stick))
+
+    def share(self, K: Array, memory: Memory) -> tuple[Array, Array]:
+        """Share q_e (e, n) of its slip moment that an element carries, and its derivative by ``K`` (n,) times c_e."""
+        u = (K - memory.relaxed) / self.stick
+        q, by_K = np.clip(u, -1.0, 1.0), (np.abs(u) < 1.0).astype(float)
+        if (k := self.smooth).size:
+            way, left, before = self._moved(K, memory)
+            q[k], by_K[k] = way - (way - before) * left, (1.0 - way * before) * left
+        return q, by_K
+
+    def by_memory(self, K: Array, memory: Memory) -> tuple[Array, Array, Array]:
+        """Derivatives (e, n) of q_e by the relaxed curvature, the last one, and c_e, times c_e each."""
+        q, by_K = self.share(K, memory)
+        by_relaxed, by_last, by_stick = -by_K, np.zeros_like(q), -by_K * q
+        if (k := self.smooth).size:
+            _, left, before = self._moved(K, memory)
+            by_relaxed[k], by_last[k] = -left, left - by_K[k]
+            by_stick[k] = -before * left - by_K[k] * (K - memory.last) / self.stick[k]
+        return by_relaxed, by_last, by_stick
+
+    def _moved(self, K: Array, memory: Memory) -> tuple[Array, Array, Array]:
+        """Of elements that give way gradually: sign of the way (n,), what still sticks and q before it (k, n)."""
+        stick, way = self.stick[self.smooth], np.where(memory.last > K, -1.0, 1.0)
+        return way, np.exp(-np.abs(K - memory.last) / stick), (memory.last - memory.relaxed[self.smooth]) / stick
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +122,8 @@ class Memory:
     ----------
     relaxed : (elements, n) 1/m
         Curvature at which each friction element is free of moment; (0, n) without friction.
+    last : (n,) 1/m
+        Curvature at the end of the step before.
     reached : (n,) 1/m
         Largest excess curvature K - K0 so far, not below zero.
     left_angle, right_angle : rad
@@ -94,6 +133,7 @@ class Memory:
     """
 
     relaxed: Array
+    last: Array
     reached: Array
     left_angle: float
     right_angle: float
@@ -156,11 +196,11 @@ class Section:
         K0 = self.pre_curvature
         return K0[:1] if np.ptp(K0) == 0.0 else K0
 
-    def virgin(self) -> tuple[Array, Array]:
-        """``relaxed`` (friction elements, n) and ``reached`` (n,) of the mounted cable, 1/m."""
+    def virgin(self) -> tuple[Array, Array, Array]:
+        """``relaxed`` (friction elements, n), ``last`` (n,) and ``reached`` (n,) of the mounted cable, 1/m."""
         elements = 0 if self.friction is None else self.friction.stick.size
         reached = np.full_like(self.pre_curvature, self.set_threshold)
-        return np.repeat(self.pre_curvature[None], elements, axis=0), reached
+        return np.repeat(self.pre_curvature[None], elements, axis=0), self.pre_curvature, reached
 
     def set_at(self, K: Array, memory: Memory) -> Array:
         """Plastic set p that goes with curvature K, (n,) 1/m."""
@@ -180,15 +220,14 @@ class Section:
     def response(self, memory: Memory) -> Response:
         """Function from K (n,) to moment and tangent (n,), for the memory at the start of the step."""
         elastic = self._set_response(memory) if self.sets else _elastic(self)
-        if self.friction is None:
+        friction = self.friction
+        if friction is None:
             return elastic
-        stick, slip, relaxed = self.friction.stick, self.friction.slip, memory.relaxed
 
         def with_friction(K: Array) -> tuple[Array, Array]:
             m, tangent = elastic(K)
-            u = (K - relaxed) / stick
-            sticking = np.abs(u) < 1.0
-            return m + (slip * np.clip(u, -1.0, 1.0)).sum(axis=0), tangent + (slip * sticking / stick).sum(axis=0)
+            q, by_K = friction.share(K, memory)
+            return m + (friction.slip * q).sum(axis=0), tangent + (friction.slip / friction.stick * by_K).sum(axis=0)
 
         return with_friction
 
@@ -206,13 +245,12 @@ class Section:
 
         return with_set
 
-    def advanced(self, K: Array, memory: Memory) -> tuple[Array, Array]:
-        """``relaxed`` and ``reached``, as of `virgin`, after a step that ended at curvature K (n,) 1/m."""
+    def advanced(self, K: Array, memory: Memory) -> tuple[Array, Array, Array]:
+        """``relaxed``, ``last`` and ``reached``, as of `virgin`, after a step that ended at curvature K (n,) 1/m."""
         reached = np.maximum(memory.reached, K - self.pre_curvature)
         if self.friction is None:
-            return memory.relaxed, reached
-        stick = self.friction.stick
-        return np.clip(memory.relaxed, K - stick, K + stick), reached
+            return memory.relaxed, K, reached
+        return K - self.friction.stick * self.friction.share(K, memory)[0], K, reached
 
 
 @lru_cache(maxsize=16)

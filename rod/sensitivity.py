@@ -58,12 +58,13 @@ class Derivatives:
 
 
 class _Past(NamedTuple):
-    """Derivative of the memory at the start of a step: relaxed (e, q, n), reached (q, n), left and right angle (q,).
+    """Derivative of the memory at the start of a step: relaxed (e, q, n), last and reached (q, n), both angles (q,).
 
-    Of the mounted cable they are (1, q, n) and (q, 1).
+    Of the mounted cable they are (1, q, n), (q, n) and (q, 1).
     """
 
     relaxed: Array
+    last: Array
     reached: Array
     left: Array
     right: Array
@@ -117,7 +118,7 @@ def derivatives(
     """
     moves = directions(test, parameters)
     rest = _mounted(test, moves)
-    start = moves.pre_curvature[None], moves.scalar("set_threshold")[:, None]
+    start = moves.pre_curvature[None], moves.pre_curvature, moves.scalar("set_threshold")[:, None]
     past = _Past(*start, rest.left, rest.right)
     if test.zero == "loaded":
         rest = rest._replace(zero=_step(test, test.free, moves, rest, past)[0].chord)
@@ -186,7 +187,10 @@ def _explicit(
     position = moves.scalar("chord") if hold.chord is not None else moves.none
     if hold.from_zero:
         position = position - moves.scalar("displacement_offset")
-        position = position + rest.zero - moves.scalar("rig_compliance") * step.right_reaction[0]
+        along = float(step.right_reaction[0])
+        softer = 1.0 + hold.stiffening * abs(along)
+        yields = moves.scalar("rig_compliance") - moves.scalar("rig_stiffening") * hold.compliance * abs(along) / softer
+        position = position + rest.zero - yields * along / softer
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):
@@ -246,10 +250,15 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
 
 def _friction_moment(friction: InternalFriction, K: Array, step: Equilibrium, moves: Directions, past: _Past) -> Array:
     """Change of the moment of the friction elements at fixed curvature, (q, n)."""
-    u = (K - step.before.relaxed) / friction.stick
-    slow = past.relaxed + u[:, None, :] * moves.stick.T[:, :, None]
-    sticking = (friction.slip / friction.stick * (np.abs(u) < 1.0))[:, None, :]
-    return np.asarray(moves.slip @ np.clip(u, -1.0, 1.0) - (sticking * slow).sum(axis=0))
+    share = _share_by_memory(friction, K, step, moves, past)
+    stiffness = (friction.slip / friction.stick)[:, :, None]
+    return np.asarray(moves.slip @ friction.share(K, step.before)[0] + (stiffness * share).sum(axis=0))
+
+
+def _share_by_memory(friction: InternalFriction, K: Array, step: Equilibrium, moves: Directions, past: _Past) -> Array:
+    """Change of what the elements carry at fixed curvature, of their slip moment and times c_e, (e, q, n) 1/m."""
+    by_relaxed, by_last, by_stick = (by[:, None, :] for by in friction.by_memory(K, step.before))
+    return np.asarray(by_relaxed * past.relaxed + by_last * past.last + by_stick * moves.stick.T[:, :, None])
 
 
 def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, *, side: str) -> Array:
@@ -317,8 +326,9 @@ def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Pas
         reached = np.where(virgin, dK - moves.pre_curvature, past.reached)
     relaxed = past.relaxed
     if (friction := section.friction) is not None:
-        u = ((K - memory.relaxed) / friction.stick)[:, None, :]
-        relaxed = np.where(np.abs(u) < 1.0, past.relaxed, dK - np.sign(u) * moves.stick.T[:, :, None])
+        q, by_K = (value[:, None, :] for value in friction.share(K, memory))
+        carried = by_K * dK + _share_by_memory(friction, K, step, moves, past)
+        relaxed = dK - q * moves.stick.T[:, :, None] - carried
     slips = []
     for end, support, slip, before, side in (
         (0, step.rod.left, memory.left_angle, past.left, "left"),
@@ -328,4 +338,4 @@ def _advanced(step: Equilibrium, balance: Balance, moves: Directions, past: _Pas
         if support.friction_moment and abs(turned) >= support.stick_angle:
             before = dangles[:, end] - np.sign(turned) * moves.scalar(f"stick_angle_{side}")
         slips.append(before)
-    return _Past(relaxed, reached, *slips)
+    return _Past(relaxed, dK, reached, *slips)

@@ -150,7 +150,7 @@ def test_noise_of_the_papers_photo_lies_along_the_normal(monkeypatch):
     [
         (lambda: Characteristic.from_ordinates([0.0], [1.0], reading="chord"), "unknown reading"),
         (lambda: Characteristic.from_ordinates([0.0], [1.0], abscissa="moment"), "unknown reading"),
-        (lambda: Hold(chord=0.1, compliance=-1.0), "compliance must not be negative"),
+        (lambda: Hold(chord=0.1, compliance=-1.0), "compliance and stiffening must not be negative"),
         (
             lambda: simulate(
                 BendingTest(

@@ -222,6 +222,8 @@ def test_grids_and_rods_are_checked() -> None:
         Hold()
     with pytest.raises(ValueError, match="compliance"):
         Hold(chord=0.1, compliance=-1.0)
+    with pytest.raises(ValueError, match="stiffening"):
+        Hold(chord=0.1, stiffening=-1.0)
 
 
 def test_equilibria_travel_between_processes() -> None:

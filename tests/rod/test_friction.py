@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
@@ -18,8 +19,7 @@ TEST = BendingTest(0.2, LAW, 2.0)
 
 def history(section: Section, path: np.ndarray) -> np.ndarray:
     """Moment along a path of curvature at one joint."""
-    relaxed, reached = section.virgin()
-    memory, moments = Memory(relaxed, reached, 0.0, 0.0), []
+    memory, moments = Memory(*section.virgin(), 0.0, 0.0), []
     for K in path:
         here = np.array([K])
         moments.append(float(section.response(memory)(here)[0][0]))
@@ -89,7 +89,7 @@ def test_set_either_takes_the_law_along_or_leaves_it(abscissa: str) -> None:
 @pytest.mark.parametrize("law_stays", [False, True])
 def test_potential_of_the_increment_has_the_moment_as_derivative(law_stays: bool) -> None:
     full = Section(LAW, np.full(60, 2.0), np.full(60, 0.9), InternalFriction(1e-3, 1.5), 0.08, law_stays)
-    memory = Memory(np.repeat(np.linspace(1.0, 4.0, 60)[None], 3, 0), np.full(60, 1.3), 0.0, 0.0)
+    memory = Memory(np.repeat(np.linspace(1.0, 4.0, 60)[None], 3, 0), np.full(60, 2.0), np.full(60, 1.3), 0.0, 0.0)
     K, step = np.linspace(0.03, 8.07, 60), 1e-6
     m, tangent = full.response(memory)(K)
     slope = (section_potential(full, K + step, memory) - section_potential(full, K - step, memory)) / (2.0 * step)
@@ -140,6 +140,23 @@ def test_plastic_set_leaves_the_unloaded_cable_more_bent() -> None:
 def test_friction_refuses_nonsense(wrong: tuple[float, float, int]) -> None:
     with pytest.raises(ValueError, match="half_width"):
         InternalFriction(*wrong)
+
+
+def test_an_element_that_gives_way_gradually_is_dahls() -> None:
+    """Its rate (1 - q sign dK) / c integrated along the path by an ODE solver, beside a sharp element."""
+    gradual = InternalFriction(5e-4, 1.5, elements=1, gradual=True)
+    path = np.array([2.5, 4.0, 9.0, 8.0, 5.0, 5.0, 6.0, 2.0, 3.5])
+    q, K, expected = np.zeros(1), 2.0, []
+    for there in path:
+        way = np.sign(there - K)
+        turn = solve_ivp(lambda _, q, w=way: w * (1.0 - w * q) / 1.5, (0.0, abs(there - K)), q, rtol=1e-10, atol=1e-12)
+        q, K = turn.y[:, -1], there
+        expected.append(float(q[0]))
+    found = history(section(gradual), path) - 1e-3 * (path - 2.0)
+    assert np.allclose(found, 5e-4 * np.array(expected), atol=1e-12)
+    sharp = InternalFriction(3e-4, 4.0, elements=2)
+    both = history(section(replace(sharp, beside=gradual)), path)
+    assert np.allclose(both, history(section(sharp), path) + found, atol=1e-15)
 
 
 def test_groups_of_elements_add_up() -> None:

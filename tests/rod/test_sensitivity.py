@@ -27,6 +27,7 @@ EVERYTHING = BendingTest(
     elements=JOINTS - 1,
     load=(0.05, 0.1),
     compliance=1e-3,
+    stiffening=0.5,
     left=Support(stiffness=2e-3, friction_moment=3e-4, rigid_length=4e-3),
     right=Support(stiffness=1e-3, friction_moment=2e-4, rigid_length=3e-3),
     friction=InternalFriction(1e-3, 1.5),
@@ -71,6 +72,7 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
     "stiffness_profile[0]": (lambda t, h: replace(t, stiffness_profile=t.rod.section.profile + h * BASIS), 3e-4),
     "displacement_offset": (lambda t, h: replace(t, displacement_offset=t.displacement_offset + h), 3e-7),
     "rig_compliance": (lambda t, h: replace(t, compliance=t.compliance + h), 3e-6),
+    "rig_stiffening": (lambda t, h: replace(t, stiffening=t.stiffening + h), 3e-4),
     "length": (lambda t, h: replace(t, length=t.length + h), 3e-6),
     "rigid_ends": (lambda t, h: both({"rigid_length": h}, t, h), 3e-6),
     "rigid_left": (one("left", "rigid_length"), 3e-6),
@@ -254,6 +256,7 @@ def test_toward_a_test_that_differs_is_the_parameter_that_differs(name: str) -> 
 
 
 BESIDE = replace(EVERYTHING, friction=replace(EVERYTHING.friction, beside=InternalFriction(7e-4, 0.4, 1)))
+GRADUAL = replace(EVERYTHING, friction=replace(BESIDE.friction, beside=InternalFriction(7e-4, 2.5, 2, gradual=True)))
 
 
 def beside(name: str) -> Vary:
@@ -300,6 +303,10 @@ def inner_knot(test: BendingTest, h: float) -> BendingTest:
     [
         (BESIDE, beside("half_width"), 3e-6),
         (BESIDE, beside("stick_curvature"), 3e-4),
+        (GRADUAL, beside("half_width"), 3e-6),
+        (GRADUAL, beside("stick_curvature"), 3e-4),
+        (GRADUAL, VARIATIONS["load_y"][0], 3e-4),
+        (GRADUAL, VARIATIONS["pre_curvature[0]"][0], 3e-4),
         (stick_angles(EVERYTHING, 0.03), stick_angles, 3e-5),
         (EVERYTHING, inner_knot, 1e-3),
         (GIVEN, given_set, 3e-4),

@@ -71,7 +71,8 @@ def reference(test: BendingTest, guess, *, chord=None, force=None, tip=None, tur
         conditions.append(last[2] - rest[1] if right.kind == "clamp" else at_right / LAW.EI0)
         if tip is not None:
             return np.array([*conditions, *((R - np.asarray(tip)) / LAW.EI0)])
-        along = (R[0] + force) / LAW.EI0 if force is not None else end[0] - chord + test.compliance * R[0]
+        yielded = test.compliance * R[0] / (1.0 + test.stiffening * abs(R[0]))
+        along = (R[0] + force) / LAW.EI0 if force is not None else end[0] - chord + yielded
         return np.array([*conditions, along, end[1]])
 
     s = np.linspace(a, b, 101)
@@ -139,8 +140,9 @@ def test_tension_against_collocation(name: str) -> None:
     held_against(BEARINGS[name], lambda test: simulate(test, chords=[chord])[0], chord=chord, turned=(-1.0, 1.0))
 
 
-def test_compliance_of_the_rig_against_collocation() -> None:
-    test = replace(BASE, compliance=4e-3)
+@pytest.mark.parametrize("stiffening", [0.0, 1.5])
+def test_compliance_of_the_rig_against_collocation(stiffening: float) -> None:
+    test = replace(BASE, compliance=4e-3, stiffening=stiffening)
     commanded = test.zero_chord - 0.012
     held_against(test, lambda t: simulate(replace(t, zero=test.zero_chord), [0.012])[0], chord=commanded)
 

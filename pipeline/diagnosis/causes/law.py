@@ -1,7 +1,7 @@
 """What the characteristic may be beyond the base model: its form, friction between the wires, and set.
 
 nonlinear_stiffness  the law of the base model may have any form; a cause in the paper's own two steps alone
-hysteresis           parallel elasto-plastic elements beside the law (see `rod.section.InternalFriction`)
+hysteresis           elements beside the law that slip, at once or gradually (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached, where it was reached; the law moves along or stays
                      (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all
 stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.load_cell import SETTLING, passed
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, Prediction
 from rod.section import InternalFriction
@@ -47,9 +48,8 @@ class NonlinearStiffness(Cause):
         return model
 
 
-WIRES = 6
-"""Elements of equal moment in a round corner: its loop is that of very many of them to 9 % of its half width. What that
-leaves is for further forms."""
+GRADUAL = "that gives way gradually"
+"""Label of Dahl's form of friction."""
 
 
 class Hysteresis(Cause):
@@ -68,32 +68,30 @@ class Hysteresis(Cause):
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Friction that slips after some share of the range of curvatures, at once or one wire after the other.
+        """Friction that slips after some share of the range of curvatures, all at once or giving way gradually.
 
-        A loop of any form is a sum of them. On loading alone they are part of the law.
+        Loops that follow Masing's rule are a sum of the first, Dahl's and those near it of the second. On loading alone
+        they are part of the law.
         """
-        # what has not slipped over the whole range is elastic, and no other than the law itself
-        reach = (0.01 * facts.curvature_scale, 0.9 * facts.curvature_scale)
+        # what has not slipped over the whole range is elastic, and no other than the law itself; of what gives way
+        # gradually a seventh still sticks once the curvature has changed by twice as much as it decays over
+        kinds, scale = (("with a sharp corner", 1.0), (GRADUAL, 0.5)), facts.curvature_scale
         return tuple(
             Variant(
                 label,
-                at=share * facts.curvature_scale,
-                width=float(wires),
+                at=share * part * scale,
                 tuned=("at",),
-                at_range=reach,
+                at_range=(0.01 * scale, 0.9 * part * scale),
                 of_law=not facts.returns,
             )
-            for label, wires in (("with a sharp corner", 1), ("with a round corner", WIRES))
+            for label, part in kinds
             for share in (0.05, 0.12, 0.25, 0.5, 0.8)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is.
-
-        ``width`` is the number of elements that slip one after the other up to that change.
-        """
-        wires = max(round(variant.width), 1)
-        friction = InternalFriction(max(amount, 0.0), variant.at, wires, beside=model.bending.friction)
+        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is."""
+        gradual, beside = variant.label == GRADUAL, model.bending.friction
+        friction = InternalFriction(max(amount, 0.0), variant.at, 1, gradual, beside)
         return replace(model, bending=replace(model.bending, friction=friction))
 
 
@@ -159,7 +157,7 @@ class StiffnessDrift(Cause):
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Steady, settling (``width`` above 0) or speeding up; from step to step, or in the holds (``at`` 1) too."""
-        form = Variant("from step to step", tuned=("width",), width_range=(-4.0, 4.0))
+        form = replace(SETTLING, label="from step to step")
         if len(facts.branch) < 3:
             return ()
         return (form, replace(form, label="steadily, also in the holds", at=1.0)) if facts.timed else (form,)
@@ -167,13 +165,13 @@ class StiffnessDrift(Cause):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply the forces of step k by ``1 + amount g(k)``."""
         count = len(facts.branch)
-        begin = np.arange(count, dtype=float)
-        pace = (count - 1) / facts.clock[-1] if variant.at > 0.5 else 0.0  # steps per second
-        if pace:
-            begin = pace * facts.clock
-        photo = 1.0 + amount * _passed(begin + pace * facts.photo_time, count, variant.width)
+        begin, pace = np.linspace(0.0, 1.0, count), 0.0  # shares of the test, and of it per second
+        if variant.at > 0.5:
+            begin, pace = facts.clock / facts.clock[-1], 1.0 / facts.clock[-1]
+        change = amount * (count - 1)
+        photo = 1.0 + change * passed(begin + pace * facts.photo_time, variant.width)
         held = [
-            1.0 + amount * _passed(first + pace * times, count, variant.width)
+            1.0 + change * passed(first + pace * times, variant.width)
             for first, times in zip(begin, facts.hold_times, strict=True)
         ]
 
@@ -182,11 +180,3 @@ class StiffnessDrift(Cause):
             return replace(prediction, force=photo * prediction.force, samples=samples)
 
         return model.observed(observer)
-
-
-def _passed(steps: Array, count: int, settling: float) -> Array:
-    """Change (n,) after so many steps, from 0 to ``count - 1``: linear, or like 1 - exp(-settling share)."""
-    share = steps / (count - 1)
-    if abs(settling) < 1e-6:
-        return np.asarray((count - 1) * share)
-    return np.asarray((count - 1) * np.expm1(-settling * share) / np.expm1(-settling))

@@ -2,9 +2,10 @@
 
     force_offset  shown = F + a
     force_gain    shown = F (1 + a)
-    force_drift   shown = F + a t                            t: since the first hold began
+    force_drift   shown = F + a T g(t / T)                   t: since the first hold began, T: until the last one did
     relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; sums of such forms
 
+What drifts does so steadily, g(u) = u, or settles like a warm-up or speeds up, g(u) = (1 - exp(-w u)) / (1 - exp(-w)).
 Relaxation belongs to the cable, but as it scales moments everywhere alike it changes forces only.
 """
 
@@ -16,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.inverse.cause import PLAIN, Cause, Variant
+from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, Observer, Prediction
 
 Array = NDArray[np.float64]
@@ -35,6 +36,17 @@ def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:
         return replace(prediction, force=np.stack(photo, axis=-1), samples=samples)
 
     return observer
+
+
+SETTLING = Variant(tuned=("width",), width_range=(-4.0, 4.0))
+"""Of what drifts: from a change that comes in the last quarter of the test to one that goes in the first."""
+
+
+def passed(share: Array, settling: float) -> Array:
+    """Share of a drift that has come after a share of the test: steadily, or like 1 - exp(-settling share)."""
+    if abs(settling) < 1e-6:
+        return share
+    return np.asarray(np.expm1(-settling * share) / np.expm1(-settling))
 
 
 class ForceOffset(Cause):
@@ -83,12 +95,17 @@ class ForceDrift(Cause):
         return 0.02 * facts.force_scale / span if span > 0.0 else 0.02 * facts.force_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form, if the log has times."""
-        return PLAIN if facts.timed else ()
+        """Steady, settling or speeding up, if the log has times."""
+        return (SETTLING,) if facts.timed else ()
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Add ``amount`` times the time since the first hold began."""
-        return model.observed(shown(lambda force, time, begin: force + amount * (begin + time)))
+        """Add ``amount``, the mean rate, times the time since the first hold began."""
+        span = float(np.max(facts.clock)) or 1.0
+
+        def reading(force: Array, time: Array, begin: float) -> Array:
+            return np.asarray(force + amount * span * passed((begin + time) / span, variant.width))
+
+        return model.observed(shown(reading))
 
 
 def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:

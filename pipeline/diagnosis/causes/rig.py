@@ -155,9 +155,15 @@ class RigCompliance(Cause):
         """Two percent of the travel lost at the largest force."""
         return 0.02 * facts.travel / facts.force_scale
 
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """In proportion to the force, or softer first: joints close and pads flatten (Hertz: the force to the 2/3)."""
+        stiffening = Variant("that stiffens with the force", at=1.0, tuned=("at",), at_range=(0.1, 10.0))
+        return (Variant(), stiffening)
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Let the rig yield by ``amount`` per force."""
-        return replace(model, bending=replace(model.bending, compliance=model.bending.compliance + amount))
+        """Let the rig yield by ``amount`` per force at the largest one, and ``1 + at`` times as easily at none."""
+        compliance, stiffening = amount * (1.0 + variant.at), variant.at / facts.force_scale
+        return replace(model, bending=replace(model.bending, compliance=compliance, stiffening=stiffening))
 
 
 MEASURED = 1e-3

@@ -6,6 +6,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, Reading, hidden_test
+from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -195,3 +196,11 @@ def test_a_cause_beside_a_steep_law_is_no_photo_at_fault():
     cable = Cable(EI0=0.02, EI1=0.0025, kc=0.6, form="exponential", compliance=8.39e-05)
     part, findings, _ = diagnose(faults_of_input(hidden_test(cable, LOOP, largest=0.0138, seed=900)), None, SETTINGS)
     assert [cause.name for cause in part.causes] == ["rig_compliance"] and findings == (), part.headline
+
+
+def test_a_frame_whose_pads_flatten_is_one_cause():
+    """A frame in proportion to the force left a play between the mounted position and the first step beside it."""
+    cable = Cable(EI0=0.02, EI1=0.0025, kc=0.6, form="exponential", contact=8e-4)
+    part, findings, _ = diagnose(faults_of_input(hidden_test(cable, SIX, largest=0.0138, seed=901)), None, SETTINGS)
+    assert [cause.name for cause in part.causes] == ["rig_compliance"] and findings == (), part.headline
+    assert f_error(part.extended, cable)[0] < 0.02
