@@ -158,7 +158,7 @@ class RigCompliance(Cause):
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """In proportion to the force, or softer first: joints close and pads flatten (Hertz: the force to the 2/3)."""
         stiffening = Variant("that stiffens with the force", at=1.0, tuned=("at",), at_range=(0.1, 10.0))
-        return (Variant(), stiffening)
+        return (Variant("in proportion to the force"), stiffening)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let the rig yield by ``amount`` per force at the largest one, and ``1 + at`` times as easily at none."""
