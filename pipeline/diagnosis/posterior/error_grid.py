@@ -156,10 +156,8 @@ class ErrorGrid:
     kinds : tuple of Kind
         Those of noise alone come first.
     hold : mapping of size -> probability
-    displacements : (N, m)
-        Whitened sensitivities to the displacements, per m.
     rig : (N, r)
-        To what every rig has a little of, per standard deviation of it.
+        Whitened sensitivities to what every rig has a little of, per standard deviation of it.
     """
 
     photos: NDArray[np.int_]
@@ -168,22 +166,19 @@ class ErrorGrid:
     log_det: Array
     kinds: tuple[Kind, ...]
     hold: Mapping[float, float]
-    displacements: Array
     rig: Array
-
-    @property
-    def beside(self) -> Array:
-        """Displacements and the rig (N, m + r)."""
-        return np.hstack([self.displacements, self.rig])
 
     @property
     def plain(self) -> ErrorGrid:
         """Without something else."""
         return replace(self, kinds=tuple(kind for kind in self.kinds if kind.noise))
 
-    def products(self, columns: Array, known: Array, added: Array) -> Products:
-        """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k)."""
-        beside = self.beside[: len(columns)]
+    def products(self, columns: Array, known: Array, displacements: Array, added: Array) -> Products:
+        """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k).
+
+        ``displacements`` (N, m): sensitivities to displacements that may scatter, per m; ``m`` may be 0.
+        """
+        beside = np.hstack([displacements, self.rig])
         whole = np.hstack([columns, beside, added])
         extra, count = beside.shape[1], added.shape[1]
         own, force = columns.shape[1] + extra, whole[self.forces]
@@ -219,7 +214,7 @@ class ErrorGrid:
             scales=np.zeros((len(table), extra)),
             sizes=positions,
         )
-        return _with_rig(found, self.displacements.shape[1], self.rig.shape[1])
+        return _with_rig(found, displacements.shape[1], self.rig.shape[1])
 
     def something_else(self, position: NDArray[np.int_], rows: Array) -> Array:
         """What is likeliest of whitened rows (N,) to be something else, as large as an error model (5,) says."""
@@ -275,17 +270,15 @@ def _with_rig(fixed: Products, displacements: int, rig: int) -> Products:
     )
 
 
-def error_grid(observation: Observation, facts: Facts, displacements: Array, rig: Array) -> ErrorGrid:
+def error_grid(observation: Observation, facts: Facts, rig: Array) -> ErrorGrid:
     """The error models of an observation.
 
     Parameters
     ----------
     observation : Observation
     facts : Facts
-    displacements : (N, m)
-        Whitened sensitivities to displacements that may scatter, per m; ``m`` may be 0.
     rig : (N, r)
-        To what every rig has a little of, per standard deviation of it; ``r`` may be 0.
+        Whitened sensitivities to what every rig has a little of, per standard deviation of it; ``r`` may be 0.
     """
     rows, count = observation.rows, len(facts.branch)
     forces, photos = np.flatnonzero(rows.force), np.flatnonzero(~rows.force)
@@ -312,7 +305,7 @@ def error_grid(observation: Observation, facts: Facts, displacements: Array, rig
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
         kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
-    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation), displacements, rig)
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation), rig)
 
 
 def hold_sizes(observation: Observation) -> dict[float, float]:

@@ -36,7 +36,6 @@ from pipeline.diagnosis.posterior.unknowns import (
     LOG_2PI,
     NOTHING,
     Solved,
-    beside_fit,
     conditional,
     log_sum,
     mean_over_laws,
@@ -113,7 +112,7 @@ def evidences(
     weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
     found = []
     for k, one in enumerate(weight.T):
-        moved = _moved(scales[:, 0], one) if grid.displacements.shape[1] else (0.0, 0.0)
+        moved = _moved(scales[:, 0], one) if fitted.beyond_log.size else (0.0, 0.0)
         rig = float(one @ (scales[:, -1] > 0.0)) if grid.rig.shape[1] else 0.0
         own_evidence = Evidence(float(plain[k]), float(disturbed[k]), moved, rig)
         found.append((own_evidence, WithColumn(*(part[k] for part in further))))
@@ -127,7 +126,7 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
-    size, beside = jacobian.shape[1], beside_fit(grid, fitted).beside[:data]
+    size, beside = jacobian.shape[1], np.hstack([fitted.jacobian[:data, fitted.beyond_log], grid.rig])
     moved = beside @ (solved.products.scales[best] * move[size:])
     left = residual[:data] - jacobian[:data] @ move[:size] - moved
     return grid.something_else(solved.products.sizes[best], left)

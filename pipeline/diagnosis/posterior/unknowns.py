@@ -11,7 +11,7 @@ are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ class Solved:
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
     """The unknowns of a fit for residuals (N, d) in the place of its own; ``more`` (N, k): further columns."""
     several, size = residuals.shape[1], fitted.extension.base.law.size
-    products, normal = _products(beside_fit(grid, fitted), fitted, more, residuals)
+    products, normal = _products(grid, fitted, more, residuals)
     law = slice(several, several + size)
     half, log_det = _inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
@@ -81,11 +81,6 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
-def beside_fit(grid: ErrorGrid, fitted: Fit) -> ErrorGrid:
-    """The error models with a fit's own sensitivities to displacements that scatter beyond the log."""
-    return replace(grid, displacements=fitted.jacobian[: len(grid.rig), fitted.beyond_log])
-
-
 def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:
     """Columns in the order residuals, sensitivities, displacements and rig; and the logs of the heights of priors.
 
@@ -104,7 +99,8 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=len(stated)):
         known[row, :several] = (middle - fitted.vector[at]) / width
         known[row, several + at - len(beyond)] = 1.0 / width
-    return grid.products(columns[:data], known, more[:data]), sum(_log_known(fitted)) - float(np.sum(np.log(std)))
+    found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], more[:data])
+    return found, sum(_log_known(fitted)) - float(np.sum(np.log(std)))
 
 
 def _inverse_root(H: Array) -> tuple[Array, Array]:

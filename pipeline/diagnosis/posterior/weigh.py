@@ -22,9 +22,7 @@ Array = NDArray[np.float64]
 
 def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
     """All error models of a test, about its base model."""
-    count = observation.rows.count
-    displacements, rig = base.jacobian[:count, base.beyond_log], ordinary(suspicion)[:count]
-    return error_grid(observation, base.extension.facts, displacements, rig)
+    return error_grid(observation, base.extension.facts, ordinary(suspicion)[: observation.rows.count])
 
 
 @dataclass(frozen=True, eq=False)

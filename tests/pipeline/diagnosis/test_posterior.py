@@ -50,10 +50,11 @@ def test_products_are_those_of_dense_covariances(bench, grid):
     rng = np.random.default_rng(1)
     count = bench.observation.rows.count
     own, added, known = rng.normal(size=(count, 3)), rng.normal(size=(count, 2)), rng.normal(size=(4, 3))
-    found = grid.products(own, known, added)
+    displacements = bench.base.jacobian[:count, bench.base.beyond_log]
+    found = grid.products(own, known, displacements, added)
     for k in rng.choice(len(found.log_det), 12, replace=False):
         dense = covariance(grid, found.sizes[k])
-        rows = np.hstack([own, np.hstack([grid.displacements, grid.rig])[:count] * found.scales[k]])
+        rows = np.hstack([own, np.hstack([displacements, grid.rig]) * found.scales[k]])
         expected = rows.T @ np.linalg.solve(dense, rows)
         expected[:3, :3] += known.T @ known
         expected[3:, 3:] += np.eye(len(expected) - 3)
@@ -65,7 +66,7 @@ def test_products_are_those_of_dense_covariances(bench, grid):
 
 def test_probabilities_of_error_models_sum_to_one(bench, grid):
     count = bench.observation.rows.count
-    found = grid.products(np.ones((count, 1)), np.ones((1, 1)), np.zeros((count, 0)))
+    found = grid.products(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((2, count, 0)))
     for rest in (True, False):
         assert np.exp(found.log_prior[found.rest == rest]).sum() == pytest.approx(1.0)
     assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, grid.hold, MOVED))
@@ -88,8 +89,7 @@ def test_a_level_told_by_few_samples_may_be_too_low():
 def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sign):
     """Ratio of two evidences, as the mean over prior sizes of an integral over the amount, by quadrature."""
     rng = np.random.default_rng(2)
-    none = np.zeros((len(bench.base.residual), 0))
-    plain = replace(grid.plain, displacements=none, rig=none)
+    plain = replace(grid.plain, rig=np.zeros((bench.observation.rows.count, 0)))
     term = next(t for t in bench.suspicion.terms if t.cause.sign == sign and bench.suspicion.scores.norm.max() > 0.0)
     k = bench.suspicion.terms.index(term)
     column, plausible = bench.suspicion.columns[:, k], term.cause.plausible(bench.facts)
@@ -129,7 +129,7 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
     Those are averaged over all priors of the law by hand, and sums over all error models.
     """
     rows, J, base = bench.observation.rows.count, bench.base.jacobian, bench.base.extension.base
-    one = replace(grid.plain, displacements=np.zeros((len(J), 0)), rig=np.zeros((len(J), 0)))
+    one = replace(grid.plain, rig=np.zeros((rows, 0)))
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
     other = np.r_[rows : rows + base.known, rows + len(base.prior) : len(J)]
     stated, size, precisions, norms = J[other].T @ J[other] + weak.T @ weak, base.law.size, [], []
@@ -143,7 +143,7 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             precisions.append(precision)
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
-    models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), np.zeros((rows, 0))), [], []
+    models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
     # displacements of a log that states what they scatter have priors of their own
     facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
     extension = replace(bench.base.extension, facts=facts)
