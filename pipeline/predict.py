@@ -33,7 +33,6 @@ from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
-from pipeline.settings.predict import PredictSettings
 from pipeline.units import quantity
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
@@ -58,6 +57,13 @@ PREDICTED = (
 DIFFERENCE = 0.1
 """Standard deviations of an amount or form by which it is moved to see what that does: within its band, well above
 rounding."""
+
+ELEMENTS = 400
+"""Of the simulated rod; its height is within 1e-6 of the length, a fifth of a good band."""
+
+SLACK = 0.01
+"""Share of the visited range by which a curvature may lie outside it: a repeated step may come out sharper by the noise
+of its photo, and f_EI does not change on that distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +155,7 @@ def predict(
     length_m: float | None = None,
     zero: Zero = "natural",
     extrapolate: bool = False,
-    settings: PredictSettings | None = None,
+    elements: int = ELEMENTS,
 ) -> Prediction | None:
     """Forces and shapes of a new experiment by the identified model.
 
@@ -164,7 +170,8 @@ def predict(
         Displacement is counted from the mounted, force-free cable, or from the chord that equals the length.
     extrapolate : bool
         Compute steps beyond the visited range too, marked ``extrapolated``, instead of refusing them.
-    settings : PredictSettings, optional
+    elements : int
+        Of the simulated rod.
 
     Returns
     -------
@@ -177,7 +184,6 @@ def predict(
         For no displacement, one that is not finite or as long as the cable, a length of no cable, a result that is not
         usable, or one whose numbers are none of a cable.
     """
-    settings = settings or PredictSettings()
     length = result.specimen.length_m if length_m is None else length_m
     if not len(displacements_m) or not np.all(np.isfinite(displacements_m)):
         raise ValueError(Message("misuse.displacements"))
@@ -189,8 +195,8 @@ def predict(
     if length is None:
         raise ValueError(Message("cli.no-length"))
     _check_sizes(length, displacements_m, model)
-    test = model.bending_test(length, zero=zero, elements=settings.elements)
-    steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate, settings)
+    test = model.bending_test(length, zero=zero, elements=elements)
+    steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate)
     limit = reachable(test, model) if any(step.status != "predicted" for step in steps) else None
     return Prediction(
         specimen=result.specimen.id,
@@ -236,39 +242,32 @@ def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:
 
 
 def _steps(
-    test: BendingTest, model: IdentifiedModel, displacements: list[float], extrapolate: bool, settings: PredictSettings
+    test: BendingTest, model: IdentifiedModel, displacements: list[float], extrapolate: bool
 ) -> tuple[PredictedStep, ...]:
     """All steps; where the cable remembers, those after one that cannot be predicted cannot either."""
     if not model.remembers:
         paths = [simulate(test, [d], branch="up") for d in displacements]
-        return tuple(
-            _step(test, model, path, d, extrapolate, settings) for path, d in zip(paths, displacements, strict=True)
-        )
+        return tuple(_step(test, model, path, d, extrapolate) for path, d in zip(paths, displacements, strict=True))
     whole, steps, lost = simulate(test, displacements, branch="up"), [], None
     for count, displacement in enumerate(displacements, start=1):
         if lost:
             steps.append(PredictedStep(displacement, "refused", lost))
             continue
-        steps.append(_step(test, model, whole[:count], displacement, extrapolate, settings))
+        steps.append(_step(test, model, whole[:count], displacement, extrapolate))
         if steps[-1].force_N is None:
             lost = Message("prediction.lost", displacement_m=displacement)
     return tuple(steps)
 
 
 def _step(
-    test: BendingTest,
-    model: IdentifiedModel,
-    path: tuple[Equilibrium, ...],
-    displacement: float,
-    extrapolate: bool,
-    settings: PredictSettings,
+    test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...], displacement: float, extrapolate: bool
 ) -> PredictedStep:
     """The last step of a path."""
     step = path[-1]
     if not step.good:
         return PredictedStep(displacement, "no equilibrium", ended(step.outcome))
     (low, high), sharpest = model.visited, float(step.kappa.max())
-    slack = settings.range_slack * (high - low)
+    slack = SLACK * (high - low)
     status: Status = "predicted"
     said = None
     if sharpest > high + slack or step.kappa.min() < min(low, float(test.rod.section.pre_curvature.min())) - slack:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
 
 from pipeline.batch.orders import Order
-from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
+from pipeline.batch.specimen import ATTEMPTS, Outcome, Stages, measure_order, store_death
 from pipeline.settings.batch import BatchSettings
 
 
@@ -56,14 +56,14 @@ def measure_all(
                 orders,
                 settings,
                 lost=lambda order, code, started: store_death(order, f"exit {code}", started),
-                attempts=settings.attempts,
+                attempts=ATTEMPTS,
                 interrupted=interrupted,
                 doing_now=lambda order, stage: doing(order.name, stage),
             )
         else:
             from pipeline.batch.cluster import measure_on_cluster  # dask takes half a second to load
 
-            yield from measure_on_cluster(scheduler, orders, settings, stages, interrupted)
+            yield from measure_on_cluster(scheduler, orders, stages, interrupted)
 
 
 @contextlib.contextmanager

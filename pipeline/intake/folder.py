@@ -175,7 +175,7 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     source = wrong.kept(read_source, folder, settings)
     file = wrong.kept(described, source, folder, settings) if source else None
     # what is wrong with it is told with the rest of the description
-    asked = file.log if file else Complaints().kept(asked_of_log, source, settings) if source else None
+    asked = file.log if file else Complaints().kept(asked_of_log, source) if source else None
     place = wrong.kept(_log_path, folder, asked, source, settings) if source and asked else None
     length = file.length_m if file else math.inf
     log = wrong.kept(read_force_log, place[0], asked, settings, length) if place and asked else None

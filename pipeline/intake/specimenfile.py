@@ -72,6 +72,10 @@ class SpecimenFile:
     hints: dict[str, PhotoHints] = field(default_factory=dict)
 
 
+# Outside, a size is surely in another unit: from a fine wire to a submarine cable, a phone at 10 m to a microscope.
+LENGTH, DIAMETER, SCALE = (5.0, 20_000.0, "(mm)"), (0.05, 500.0, "(mm)"), (0.05, 5_000.0, "(px/mm)")
+
+
 def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
     """Read ``specimen.toml`` of a folder; see `read_source` and `described` for what is raised."""
     return described(read_source(folder, settings), folder, settings)
@@ -99,9 +103,9 @@ def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Speci
     InputError
         ``toml/...``, ``file/outside``, ``camera/...``: unknown or missing key, value that cannot be meant; all at once.
     """
-    tables, wrong = _checks(settings), Complaints()
-    wrong.kept(check_names, source, source.tables, (*tables, "photos"))
-    values = {table: wrong.kept(checked_table, source, table, checks) or {} for table, checks in tables.items()}
+    wrong = Complaints()
+    wrong.kept(check_names, source, source.tables, (*CHECKS, "photos"))
+    values = {table: wrong.kept(checked_table, source, table, checks) or {} for table, checks in CHECKS.items()}
     wrong.kept(_check_sizes_given, source)
     camera = wrong.kept(_camera, source, values["camera"], folder, settings)
     hints = wrong.kept(read_hints, source)
@@ -121,10 +125,9 @@ def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Speci
     )
 
 
-def asked_of_log(source: TomlFile, settings: IntakeSettings) -> LogSpec:
+def asked_of_log(source: TomlFile) -> LogSpec:
     """What the user says about the force log in a file of which other parts may be wrong; raises as `described`."""
-    tables = _checks(settings)
-    log, rig = (checked_table(source, table, tables[table]) for table in ("force_log", "rig"))
+    log, rig = (checked_table(source, table, CHECKS[table]) for table in ("force_log", "rig"))
     return LogSpec(**log, force_sign=rig.get("force_sign"))
 
 
@@ -139,41 +142,6 @@ def _check_sizes_given(source: TomlFile) -> None:
         add = [Message(f"toml/missing-key.{key}") for key in missing]
         key = "toml/missing-key" if len(missing) == 1 else "toml/missing-key.several"
         raise source.error(Message(key, names=missing, add=add), table="specimen")
-
-
-def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
-    """Known tables, their keys and the values these may hold."""
-    return {
-        "specimen": {
-            "id": _identifier,
-            "length_mm": number_in(*settings.length_range_mm, "(mm)"),
-            "diameter_mm": number_in(*settings.diameter_range_mm, "(mm)"),
-            "type": free_text,
-            "batch": free_text,
-            "notes": free_text,
-            "temperature_C": lambda value: f"{number(value):g}",
-        },
-        "camera": {
-            "scale_px_per_mm": number_in(*settings.scale_range_px_per_mm, "(px/mm)"),
-            "calibration": path_text,
-            "board": _board,
-            "distance_mm": number_in(1.0, 1e6, "(mm)"),
-        },
-        "rig": {
-            "moving_bearing": one_of("left", "right"),
-            "bearing_marker_mm": number_in(*settings.diameter_range_mm, "(mm)"),
-            "bearings_px": _bearings,
-            "force_sign": one_of("compression", "tension"),
-        },
-        "force_log": {
-            "file": path_text,
-            "columns": _columns,
-            "units": _units,
-            "separator": one_of(";", ",", "\t"),
-            "decimal": one_of(".", ","),
-            "encoding": one_of("utf-8", "cp1252", "utf-16"),
-        },
-    }
 
 
 def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: IntakeSettings) -> CameraSpec:
@@ -267,3 +235,37 @@ def _units(value: Any) -> dict[str, str]:
     if not isinstance(value, dict) or not value.keys() <= set(MEASURED):
         raise ValueError(Message("wanted.units"))
     return {role: text(unit) for role, unit in value.items()}
+
+
+CHECKS: dict[str, dict[str, Check]] = {
+    "specimen": {
+        "id": _identifier,
+        "length_mm": number_in(*LENGTH),
+        "diameter_mm": number_in(*DIAMETER),
+        "type": free_text,
+        "batch": free_text,
+        "notes": free_text,
+        "temperature_C": lambda value: f"{number(value):g}",
+    },
+    "camera": {
+        "scale_px_per_mm": number_in(*SCALE),
+        "calibration": path_text,
+        "board": _board,
+        "distance_mm": number_in(1.0, 1e6, "(mm)"),
+    },
+    "rig": {
+        "moving_bearing": one_of("left", "right"),
+        "bearing_marker_mm": number_in(*DIAMETER),
+        "bearings_px": _bearings,
+        "force_sign": one_of("compression", "tension"),
+    },
+    "force_log": {
+        "file": path_text,
+        "columns": _columns,
+        "units": _units,
+        "separator": one_of(";", ",", "\t"),
+        "decimal": one_of(".", ","),
+        "encoding": one_of("utf-8", "cp1252", "utf-16"),
+    },
+}
+"""Known tables, their keys and the values these may hold."""

@@ -129,7 +129,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
-    pooled = list(repeats(rows, unit, words, settings))
+    pooled = list(repeats(rows, unit, words))
     shown = {row.state for row in rows}
     # rows are drawn by a script too, from texts as they are; and narrow columns must break somewhere
     engine = environment().overlay(finalize=lambda value: value)
