@@ -127,31 +127,20 @@ def _readings(law: MeasuredLaw, fitted: FreeLaw) -> list[KnotPart]:
 
 def misfit_part(way: Estimate) -> MisfitPart | None:
     """Residuals in units and in sigma; None without a fit."""
-    observation, fitted, test = way.observation, way.fitted, way.test
-    if observation is None or fitted is None or test is None or fitted.run.prediction is None:
+    observation, fitted = way.observation, way.fitted
+    if observation is None or fitted is None or fitted.run.prediction is None:
         return None
     holds = zip(observation.forces, fitted.run.prediction.samples, strict=True)
     forces = [float(np.mean(data - model[: len(data)])) for data, model in holds if len(data)]
-    distances, bends = [], []
-    for photo in observation.photos:
-        if (shape := test.steps[photo.step].shape) is not None:
-            distances.append(photo_fit(observation, fitted, photo, photo.sections).distance)
-            bends.append((shape.kappa - photo_fit(observation, fitted, photo, shape).kappa)[shape.seen])
-    by_block = {
-        f"{kind}/{step.step}": found
-        for i, step in enumerate(test.steps)
-        for kind in KINDS[:-1]
-        if (found := way.chi2(kind, i))[1]
-    }
+    distances = [photo_fit(observation, fitted, photo, photo.sections).distance for photo in observation.photos]
+    kinds = [way.chi2(kind) for kind in KINDS[:-1]]
     base = fitted.extension.base
     return MisfitPart(
         force_rmse_N=_rms(np.array(forces)),
         shape_rmse_m=_rms(np.concatenate(distances)) if distances else 0.0,
-        curvature_rmse_per_m=_rms(np.concatenate(bends)) if bends else None,
-        chi2=sum(chi2 for chi2, _ in by_block.values()),
+        chi2=sum(chi2 for chi2, _ in kinds),
         # each prior adds a row and takes an unknown; law and K0 are what the data pay
-        degrees_of_freedom=sum(n for _, n in by_block.values()) - base.law.size - 1,
-        chi2_by_block=by_block,
+        degrees_of_freedom=sum(n for _, n in kinds) - base.law.size - 1,
     )
 
 
