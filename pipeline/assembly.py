@@ -12,7 +12,7 @@ import datetime
 import importlib.metadata
 import platform
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any, TypeVar
 
 import numpy as np
@@ -80,7 +80,7 @@ def assemble(
     specimen, traces, identification
         The stages' records.
     diagnosis : DiagnosisPart or None
-        None where identification left nothing to diagnose.
+        None where a fault of the data makes the numbers none of the cable's.
     findings : iterable of Finding
         Faults of the data, and what the diagnosis noticed; those of the other stages are in their records.
     settings : Settings
@@ -124,21 +124,21 @@ def with_all_believed(part: Way, widening: Widening | None) -> Way:
     return part.model_copy(update={"curve": widening.of(part.curve), "pre_curvature_std_per_m": rest})
 
 
-WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium", "stalled", "limit-point")}
-"""Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
+OF_THE_DATA = {"identify/force-zero", "identify/chord-displacement", "identify/inverse-opposite-forces"}
+"""What identification notices without a model."""
 
 
-EXPLAINED = {"identify/misfit-force", "identify/misfit-shape", "identify/branches"}
-"""What the simulation without a cause leaves: no warning where the cause was found."""
-
-
-def without_advice(earlier: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
-    """Findings, those of a fit that lacked a cause told as that where the curve is that with the cause."""
+def without_advice(identified: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
+    """Findings of identification: beside a curve with the cause, what both ways without it lead to is no warning."""
     if diagnosis is None or diagnosis.extended is None or diagnosis.verdict not in CAUSES_NAMED:
-        return list(earlier)
-    said = Message("way.inverse-extended")
-    told = [replace(one, level="info") if one.code in EXPLAINED else one for one in earlier]
-    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in told]
+        return list(identified)
+    lacking = Message("way.inverse-extended")
+    return [
+        one
+        if one.code in OF_THE_DATA
+        else Finding(one.code, "info", lacking if one.code.startswith("identify/inverse-") else one.said)
+        for one in identified
+    ]
 
 
 def _gathered(
@@ -198,6 +198,7 @@ TOLD_BETTER = {
     "photo/doubled": {"photo/doubled"},
     "log/unit": {"scale/displacement"},
     "length/traced": {"scale/length", "identify/length", "identify/scale"},
+    "length/other-cable": {"scale/length", "identify/length", "identify/scale"},
 }
 """Faults of the data, and findings by which other rooms noticed the same without knowing what it is."""
 

@@ -33,8 +33,6 @@ Array = NDArray[np.float64]
 # Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it; besides them the
 # one that comes before all its numbers.
 DOUBTS = ("identify/scale", "identify/length", "identify/misfit-shape", "identify/misfit-force", "length/traced")
-# Misfit of the base model is no doubt about the answer of an extended one.
-EXPLAINED = ("identify/misfit-shape", "identify/misfit-force")
 TESTS = 2
 
 LEAST_OVERLAP = 0.5
@@ -225,10 +223,8 @@ def _findings(a: Result, b: Result, curves: tuple[Visited, Visited], mean: Diffe
     if curves[0].method != curves[1].method:
         yield doubtful("compare/method", a=curves[0].method, b=curves[1].method)
     for result in (a, b):
-        settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
         fault = leading(result.findings)
-        noticed = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
-        doubts = [f.said for f in noticed]
+        doubts = [f.said for f in result.findings if f is fault or (f.code in DOUBTS and f.level != "info")]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
             doubts.append(Message("compare/doubt.unexplained"))
         if doubts:

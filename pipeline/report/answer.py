@@ -132,12 +132,13 @@ def _agreement(result: Result, words: Words) -> str:
     noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
     key = {True: "agree_yes", False: "agree_no", None: "agree_open"}[part.compatible]
-    if expected > 1.0:
+    if "extended" in found:
+        key = "agree_without"
+    elif expected > 1.0:
         key = "agree_lost"
     elif part.compatible and expected > WIDE:
         key = "agree_wide"
-    text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
-    return f"{text} {words('before_extension')}" if "extended" in found else text
+    return words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
 
 
 MISFIT = 3.0

@@ -175,7 +175,8 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
     of them and its language if it is another one, shapes, causes.
     """
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
-    rms = None if row.rms_relative is None else 100.0 * row.rms_relative
+    # both ways lack a cause that was found and is in the answer: how far they differ says nothing
+    rms = None if row.rms_relative is None or row.method == "extended" else 100.0 * row.rms_relative
     said = words.said(row.fault or row.reason or Message("text", text=""))
     state, verdict = row.state, _verdict(row)
     numbers: list[tuple[float | None, str]] = [(value, unit.number(value, std)) for value, std in ends]
