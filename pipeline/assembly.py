@@ -36,16 +36,12 @@ from pipeline.result import (
 )
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.headline import headline
+from pipeline.rounding import digits
 from pipeline.settings import Settings
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
 SIGNIFICANT_DIGITS = 9  # of an array in result.json: finer than any error bar, a third of the size of full precision
-
-
-def listed(values: Iterable[float] | np.ndarray) -> list[float]:
-    """Array as a list of numbers with `SIGNIFICANT_DIGITS`."""
-    return [float(f"{value:.{SIGNIFICANT_DIGITS}g}") for value in np.asarray(values, float).ravel()]
 
 
 def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str, Any]:
@@ -155,7 +151,7 @@ def _gathered(
         *photo_findings(traces.photos),
         *without_advice(parts.findings, diagnosis),
     ]
-    found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
+    found = dict.fromkeys([*without_those_told_better(earlier, diagnosed), *diagnosed])  # two may have seen the same
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 
 
@@ -189,11 +185,6 @@ def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
     )
 
 
-def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings in their order, each once: two stages may have seen the same thing."""
-    return list(dict.fromkeys(findings))
-
-
 TOLD_BETTER = {
     "photo/doubled": {"photo/doubled"},
     "log/unit": {"scale/displacement"},
@@ -207,6 +198,13 @@ def without_those_told_better(earlier: Iterable[Finding], faults: Iterable[Findi
     """Earlier findings but for those that are told as faults."""
     named = set[str]().union(*(TOLD_BETTER.get(finding.code, set()) for finding in faults))
     return [finding for finding in earlier if finding.code not in named]
+
+
+MEASURED = (
+    *("chord_m", "chord_std_m", "traced_length_m", "traced_length_std_m", "width_m", "width_std_m"),
+    *("left_px", "right_px", "mirrored"),
+)
+"""Of a centerline, as the result keeps it."""
 
 
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
@@ -225,32 +223,18 @@ def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: P
             preview=_preview_part(photo.preview),
         )
     shape = photo.shape
-    fitted = {} if residual is None else asdict(residual)
+    along = {"s_m": shape.s, "x_m": shape.x, "y_m": shape.y, "theta_rad": shape.theta, "kappa_per_m": shape.kappa}
+    along |= {"u_px": photo.u_px, "v_px": photo.v_px, "kappa_std_per_m": photo.kappa_std}
     return PhotoPart(
         image=image,
         step=step.step,
         status="traced",
-        chord_m=photo.chord_m,
-        chord_std_m=photo.chord_std_m,
-        traced_length_m=photo.traced_length_m,
-        traced_length_std_m=photo.traced_length_std_m,
-        width_m=photo.width_m,
-        width_std_m=photo.width_std_m,
-        left_px=photo.left_px,
-        right_px=photo.right_px,
-        mirrored=photo.mirrored,
-        s_m=listed(shape.s),
-        x_m=listed(shape.x),
-        y_m=listed(shape.y),
-        u_px=listed(photo.u_px),
-        v_px=listed(photo.v_px),
-        theta_rad=listed(shape.theta),
-        kappa_per_m=listed(shape.kappa),
-        kappa_std_per_m=listed(photo.kappa_std),
-        seen=[bool(seen) for seen in shape.seen],
+        **{name: getattr(photo, name) for name in MEASURED},
+        **{name: digits(values, SIGNIFICANT_DIGITS) for name, values in along.items()},
+        seen=shape.seen.tolist(),
         quality={name: float(value) for name, value in photo.quality.items()},
         preview=_preview_part(photo.preview),
-        **fitted,
+        **({} if residual is None else asdict(residual)),
     )
 
 

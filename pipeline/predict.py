@@ -20,7 +20,7 @@ Signs and units: chord frame, SI; force positive in compression; displacement po
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -40,19 +40,6 @@ from rod.sensitivity import derivatives
 
 Array = NDArray[np.float64]
 Status = Literal["predicted", "extrapolated", "refused", "no equilibrium"]
-
-# Arrays of a predicted step along the cable.
-PREDICTED = (
-    "s_m",
-    "x_m",
-    "x_std_m",
-    "y_m",
-    "y_std_m",
-    "theta_rad",
-    "theta_std_rad",
-    "kappa_per_m",
-    "kappa_std_per_m",
-)
 
 DIFFERENCE = 0.1
 """Standard deviations of an amount or form by which it is moved to see what that does: within its band, well above
@@ -108,6 +95,10 @@ class PredictedStep:
             return f"{self.status}: {self.reason}"
         bent = f"{quantity(self.force_N, 'N', self.force_std_N)}, bent to {plain(self.kappa_max_per_m or 0.0)} 1/m"
         return f"{bent} ({self.status}: {self.reason})" if self.reason else bent
+
+
+PREDICTED = tuple(one.name for one in fields(PredictedStep) if one.default == ())
+"""Arrays of a predicted step along the cable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +277,12 @@ def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
     return replace(step, status="refused", said=Message("prediction.unknown"))
 
 
+ALONG = {"x": "m", "y": "m", "theta": "rad", "kappa": "per_m"}
+"""What of an equilibrium has a band along the cable, and its unit."""
+
+BANDED = ("force", *ALONG)
+
+
 def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> PredictedStep:
     """Force and shape of the last equilibrium of a path with standard deviations to first order."""
     step, by = path[-1], derivatives(test, path, ["ordinates", "pre_curvature"])[-1]
@@ -306,14 +303,8 @@ def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibri
         force_std_N=float(std("force")),
         kappa_max_per_m=float(step.kappa.max()),
         s_m=step.s.tolist(),
-        x_m=step.x.tolist(),
-        x_std_m=std("x").tolist(),
-        y_m=step.y.tolist(),
-        y_std_m=std("y").tolist(),
-        theta_rad=step.theta.tolist(),
-        theta_std_rad=std("theta").tolist(),
-        kappa_per_m=step.kappa.tolist(),
-        kappa_std_per_m=std("kappa").tolist(),
+        **{f"{name}_{unit}": getattr(step, name).tolist() for name, unit in ALONG.items()},
+        **{f"{name}_std_{unit}": std(name).tolist() for name, unit in ALONG.items()},
     )
 
 
@@ -335,10 +326,6 @@ def _by_causes(
         if rows:
             found.append((np.array(rows), {name: np.stack([c[name] for c in columns], axis=-1) for name in BANDED}))
     return found
-
-
-BANDED = ("force", "x", "y", "theta", "kappa")
-"""What of an equilibrium has a band."""
 
 
 def _again(

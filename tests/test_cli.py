@@ -12,12 +12,15 @@ import pytest
 from click.testing import CliRunner
 
 from pipeline.assembly import provenance
+from pipeline.batch import Tally
 from pipeline.batch.specimen import Stages
 from pipeline.cli import main
 from pipeline.cli.configuration import commented_settings, read_settings
 from pipeline.cli.group import COMMANDS
+from pipeline.cli.run import echo_json
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
+from pipeline.messages import Message
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -115,6 +118,14 @@ def test_log_that_cannot_be_written_costs_no_result(cheap):
     done = call("run", "batch", "-o", "taken", *IN_PROCESS)
     assert done.exit_code == 2
     assert "taken: cannot be written (is a directory)" in done.stderr
+
+
+def test_what_else_is_to_say_stands_in_the_document_too(tmp_path, capsys):
+    fault = Message("fault.none-of-its-type", times=1000.0, others=3, type="HV 35")
+    tally = Tally(1, ("a",), measured=1, trouble=(Message("cli.outlying", name="a", said=fault),))
+    echo_json(iter([]), tally, tmp_path)
+    (told,) = json.loads(capsys.readouterr().out)["trouble"]
+    assert told.startswith("a: f_EI is 1000 times that of the other 3 specimens")
 
 
 def test_one_specimen_folder(cheap):
@@ -235,12 +246,12 @@ def test_check_measures_nothing_and_says_what_is_wrong(cheap):
     for name in "abc":  # with photos that show a cable
         shutil.rmtree(cheap / "batch" / name)
         shutil.copytree(ROOT / "fixtures/specimens/three", cheap / "batch" / name)
-    done = call("check", "batch")
+    done = call("check", "batch", *IN_PROCESS)
     assert done.exit_code == 0
     assert "3 of 3 specimens would run" in done.stdout
     (cheap / "batch/b/force.csv").write_text("step,displacement_mm,force_N\n1,2,abc\n")
     (cheap / "batch/c/images/step_01.jpg").unlink()
-    done = call("check", "batch", "--json")
+    done = call("check", "batch", "--json", *IN_PROCESS)
     assert done.exit_code == 1
     rows = json.loads(done.stdout)["specimens"]
     assert [row["status"] for row in rows] == ["ok", "error", "warning"]
@@ -372,7 +383,7 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
     deep = cheap / "batch/1/2/3"
     (deep / "empty").mkdir(parents=True)
     (cheap / "b").rename(deep / "b")
-    assert call("check", "batch").stderr == ""
+    assert call("check", "batch", *IN_PROCESS).stderr == ""
     done = call("check", "batch", "--set", "intake.search_depth=3")
     assert done.stderr == (
         "cablebend: folders more than 3 levels below the one given were not searched (2, first batch/1/2/3/b); "
@@ -385,8 +396,10 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
 
 def test_folders_without_description_are_told(cheap):
     (cheap / "batch/b/specimen.toml").unlink()
-    done = call("check", "batch")
+    done = call("check", "batch", *IN_PROCESS)
     assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
     assert "0 of 2 specimens would run" in done.stdout
     (cheap / "batch/b").rename(cheap / "batch/b\x1b[2J")
-    assert "batch/b\\x1b[2J: has photos" in call("check", "batch").stderr  # a name does not command the terminal
+    assert (
+        "batch/b\\x1b[2J: has photos" in call("check", "batch", *IN_PROCESS).stderr
+    )  # a name does not command the terminal

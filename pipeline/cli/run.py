@@ -110,21 +110,20 @@ def exit_code(tally: Tally, refused: int = 0) -> int:
 
 
 def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:
-    """One JSON document, written piece by piece so that memory does not grow with the batch."""
+    """One JSON document."""
     keys = ("name", "id", "folder", "status", "headline", "code")
-    click.echo('{"specimens": [', nl=False)
-    for number, stored in enumerate(entries):
-        shown = {key: stored.get(key) for key in keys} | {"usable": stored.get("state") in ("measured", "partial")}
-        click.echo(("" if number == 0 else ",") + "\n " + json.dumps(shown), nl=False)
-    counts = {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused}
-    rest = {
-        "counts": counts,
+    document = {
+        "specimens": [
+            {key: stored.get(key) for key in keys} | {"usable": stored.get("state") in ("measured", "partial")}
+            for stored in entries
+        ],
+        "counts": {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused},
         "unusable": tally.unusable,
         "interrupted": tally.interrupted,
         "out": str(out),
-        "trouble": list(tally.trouble),
+        "trouble": list(map(str, tally.trouble)),
     }
-    click.echo("],\n " + json.dumps(rest)[1:])
+    click.echo(json.dumps(document, indent=1))
 
 
 def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:

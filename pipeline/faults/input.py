@@ -18,7 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.faults.record import Faults
 from pipeline.faults.stuck_forces import stuck_forces
-from pipeline.records import doubtful, failed
+from pipeline.records import Array, doubtful, failed
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 UNITS = {1e3: "m", 1e-3: "um", 10.0: "cm", 25.4: "inches"}
@@ -69,23 +69,24 @@ def faults_of_input(test: MeasuredTest) -> Faults:
     return found
 
 
-def _with_both(found: Faults) -> list[int]:
-    steps = found.test.steps
-    return [
-        i
-        for i, step in enumerate(steps)
-        if step.chord is not None and step.displacement is not None and i not in found.photos
+def _logged(
+    test: MeasuredTest, *, without: frozenset[int] = frozenset(), loaded: bool = False
+) -> tuple[list[int], Array, Array]:
+    """Steps (n,) with a chord on a photo and a displacement in the log: their indices, displacements and chords (m)."""
+    both = [
+        (i, step.displacement, step.chord)
+        for i, step in enumerate(test.steps)
+        if step.chord is not None and step.displacement is not None and i not in without
+        if not loaded or step.branch != "mounted"
     ]
+    _, displacement, chord = np.array(both, dtype=float).reshape(-1, 3).T
+    return [i for i, *_ in both], displacement, chord
 
 
 def _unit_of_displacement(found: Faults) -> Faults:
     """The chord changes by another factor than one per displacement: a unit."""
-    test, used = found.test, _with_both(found)
-    if len(used) < 2:
-        return Faults(test)
-    chord = np.array([test.steps[i].chord for i in used], dtype=float)
-    displacement = np.array([test.steps[i].displacement for i in used], dtype=float)
-    if np.ptp(displacement) <= 0.0 or np.ptp(chord) <= 0.0:
+    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos)
+    if len(used) < 2 or np.ptp(displacement) <= 0.0 or np.ptp(chord) <= 0.0:
         return Faults(test)
     slope, at_zero = np.polyfit(displacement, chord, 1)
     left = float(np.sqrt(np.mean((chord - at_zero - slope * displacement) ** 2)))
@@ -104,14 +105,13 @@ def _doubled_photos(found: Faults) -> Faults:
     """Two photos from files of the same contents, or whose noise is the same, are one photo."""
     steps = found.test.steps
     pictures = [(i, step.shape) for i, step in enumerate(steps) if step.shape is not None]
-    findings, dropped = [], set()
+    findings, dropped, gap = [], set(), _mismatch(found.test)
     for (i, one), (j, other) in combinations(pictures, 2):
         assert one is not None and other is not None
         same_file = steps[i].picture is not None and steps[i].picture == steps[j].picture
         if not same_file and not _same_noise(one, other, DOUBLED):
             continue
-        gap = {k: abs(_mismatch(found.test, k)) for k in (i, j)}
-        wrong = j if gap[j] >= gap[i] else i
+        wrong = j if gap.get(j, 0.0) >= gap.get(i, 0.0) else i
         dropped.add(wrong)
         both = {"step": steps[i].step, "other": steps[j].step}
         findings.append(doubtful("photo/doubled.picture", **both, wrong=steps[wrong].step))
@@ -137,14 +137,11 @@ def _scatter(shape: MeasuredShape) -> float:
     return float(np.sqrt(np.mean((-np.sin(theta) * dx + np.cos(theta) * dy) ** 2)))
 
 
-def _mismatch(test: MeasuredTest, index: int) -> float:
-    """Chord plus displacement of a step, against the median of all."""
-    sums = {
-        i: step.chord + step.displacement
-        for i, step in enumerate(test.steps)
-        if step.chord is not None and step.displacement is not None
-    }
-    return sums[index] - float(np.median(list(sums.values()))) if index in sums else 0.0
+def _mismatch(test: MeasuredTest) -> dict[int, float]:
+    """How far chord plus displacement of each step lies from the median of all, m."""
+    used, displacement, chord = _logged(test)
+    sums = displacement + chord
+    return dict(zip(used, np.abs(sums - np.median(sums)).tolist() if used else [], strict=True))
 
 
 def _order_of_photos(found: Faults) -> Faults:
@@ -153,11 +150,9 @@ def _order_of_photos(found: Faults) -> Faults:
     A cable that is pushed further has a shorter chord, whatever rig and cable do. Steps of one displacement (up and
     down) cannot be told apart by it: a photo that may be of either is left out.
     """
-    test, used = found.test, _with_both(found)
+    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos)
     if len(used) < 2:
         return Faults(test)
-    chord = np.array([test.steps[i].chord for i in used], dtype=float)
-    displacement = np.array([test.steps[i].displacement for i in used], dtype=float)
     by_log, by_photo = np.argsort(displacement, kind="stable"), np.argsort(-chord, kind="stable")
     sums = chord[by_photo] + displacement[by_log]
     limit = MISMATCH * float(np.ptp(displacement))
@@ -201,11 +196,10 @@ def _displacement(found: Faults) -> Faults:
 
     The force-free step is none of them: play and a yielding frame set it apart from all others.
     """
-    test, used = found.test, [i for i in _with_both(found) if found.test.steps[i].branch != "mounted"]
+    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos, loaded=True)
     if len(used) < 4:
         return Faults(test)
-    chord = np.array([test.steps[i].chord for i in used], dtype=float)
-    sums = chord + np.array([test.steps[i].displacement for i in used], dtype=float)
+    sums = chord + displacement
     off = sums - np.median(sums)
     worst = int(np.argmax(np.abs(off)))
     rest, travel = float(np.ptp(np.delete(off, worst))), float(np.ptp(chord))
@@ -221,14 +215,12 @@ def _displacement(found: Faults) -> Faults:
 
 def _moving_apart(found: Faults) -> Faults:
     """The bearings move apart on the photos where the log pushes them together."""
-    test, used = found.test, _with_both(found)
+    used, displacement, chord = _logged(found.test, without=found.photos)
     if len(used) < 3:
-        return Faults(test)
-    both = np.array([(test.steps[i].displacement, test.steps[i].chord) for i in used], dtype=float)
-    moved, chord = (both - both.mean(axis=0)).T
-    if float(moved @ chord) <= TOGETHER * float(np.linalg.norm(moved) * np.linalg.norm(chord)):
-        return Faults(test)
-    return Faults(test, (failed("photo/moving-apart"),))
+        return Faults(found.test)
+    moved, chord = displacement - displacement.mean(), chord - chord.mean()
+    together = float(moved @ chord) > TOGETHER * float(np.linalg.norm(moved) * np.linalg.norm(chord))
+    return Faults(found.test, (failed("photo/moving-apart"),) if together else ())
 
 
 def _traced_length(found: Faults) -> Faults:

@@ -1,4 +1,4 @@
-"""``specimen.toml`` -> `SpecimenFile`: what the user says about cable, camera, rig and force log, checked, in SI units.
+"""``specimen.toml`` -> a `Specimen` without steps and a `LogSpec`: what the user says, checked, in SI units.
 
 The keys carry their unit in the name (``length_mm``); records carry metres. Every refusal names file and line.
 """
@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from pipeline.errors import Complaints
 from pipeline.intake.access import inside, is_folder, outside
-from pipeline.intake.photohints import read_hints
+from pipeline.intake.photohints import points, read_hints
 from pipeline.intake.tomltable import (
     Check,
     TomlFile,
@@ -30,7 +30,7 @@ from pipeline.intake.tomltable import (
     whole,
 )
 from pipeline.messages import Message
-from pipeline.records import Board, CameraSpec, PhotoHints, RigSpec
+from pipeline.records import Board, CameraSpec, RigSpec, Specimen
 from pipeline.settings.intake import IntakeSettings
 
 NAME = "specimen.toml"
@@ -57,26 +57,11 @@ class LogSpec:
     force_sign: Literal["compression", "tension"] | None = None
 
 
-@dataclass(frozen=True)
-class SpecimenFile:
-    """The contents of ``specimen.toml``. ``source`` finds the line of a key for later complaints."""
-
-    id: str
-    length_m: float
-    diameter_m: float
-    camera: CameraSpec
-    rig: RigSpec
-    log: LogSpec
-    description: dict[str, str]
-    source: TomlFile
-    hints: dict[str, PhotoHints] = field(default_factory=dict)
-
-
 # Outside, a size is surely in another unit: from a fine wire to a submarine cable, a phone at 10 m to a microscope.
 LENGTH, DIAMETER, SCALE = (5.0, 20_000.0, "(mm)"), (0.05, 500.0, "(mm)"), (0.05, 5_000.0, "(px/mm)")
 
 
-def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
+def read_specimen_file(folder: Path, settings: IntakeSettings) -> Specimen:
     """Read ``specimen.toml`` of a folder; see `read_source` and `described` for what is raised."""
     return described(read_source(folder, settings), folder, settings)
 
@@ -95,8 +80,8 @@ def read_source(folder: Path, settings: IntakeSettings) -> TomlFile:
     return read_toml(path, limit=settings.toml_max_bytes)
 
 
-def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> SpecimenFile:
-    """The contents of a ``specimen.toml``.
+def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Specimen:
+    """What a ``specimen.toml`` says of its specimen; of what the force log is, `asked_of_log` tells.
 
     Raises
     ------
@@ -112,15 +97,16 @@ def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Speci
     wrong.settle()
     assert camera is not None and hints is not None
     cable = values["specimen"]
-    return SpecimenFile(
+    return Specimen(
         id=cable.get("id", folder_name(folder)),
+        folder=folder,
         length_m=cable["length_mm"] * 1e-3,
         diameter_m=cable["diameter_mm"] * 1e-3,
         camera=camera,
         rig=_rig(values["rig"]),
-        log=LogSpec(**values["force_log"], force_sign=values["rig"].get("force_sign")),
+        steps=(),
+        images={},
         description={key: cable[key] for key in DESCRIPTION if key in cable},
-        source=source,
         hints=hints,
     )
 
@@ -212,15 +198,6 @@ def _board(value: Any) -> Board:
     )
 
 
-def _bearings(value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    if not isinstance(value, list) or len(value) != 2 or any(not isinstance(p, list) or len(p) != 2 for p in value):
-        raise ValueError(Message("wanted.bearings"))
-    (x0, y0), (x1, y1) = ((number(p[0]), number(p[1])) for p in value)
-    if (x0, y0) == (x1, y1) or max(map(abs, (x0, y0, x1, y1))) > 1e6:
-        raise ValueError(Message("wanted.bearings.different"))
-    return (x0, y0), (x1, y1)
-
-
 def _columns(value: Any) -> dict[str, str | int]:
     if not isinstance(value, dict) or not value.keys() <= set(ROLES):
         raise ValueError(Message("wanted.columns", roles=ROLES))
@@ -256,7 +233,7 @@ CHECKS: dict[str, dict[str, Check]] = {
     "rig": {
         "moving_bearing": one_of("left", "right"),
         "bearing_marker_mm": number_in(*DIAMETER),
-        "bearings_px": _bearings,
+        "bearings_px": points(2, "wanted.bearings", most=2),
         "force_sign": one_of("compression", "tension"),
     },
     "force_log": {

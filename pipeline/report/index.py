@@ -31,6 +31,7 @@ from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
+from pipeline.rounding import digits
 from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit, suited
 
@@ -45,8 +46,8 @@ HEAD, TAIL = 200, 40
 
 
 def index_rows(out: Path, settings: ReportSettings) -> list[IndexRow]:
-    """Rows of all results below a folder; those whose stiffness cannot be that of their type are not usable."""
-    return without_outlying([_row_of(name, out, settings) for name in result_folders(out)])
+    """Rows of all results in a folder; those whose stiffness cannot be that of their type are not usable."""
+    return without_outlying([_row_of(name, out, settings) for name in result_names(out)])
 
 
 def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tuple[Path, Path]:
@@ -55,20 +56,10 @@ def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tup
     return page, write_atomic(out / "summary.csv", summary_lines(rows))
 
 
-def result_folders(folder: Path) -> list[str]:
-    """Folders below a folder that hold a result, relative to it, in the order in which people count."""
-    found, open_ = [], [""]
-    while open_:
-        below = open_.pop()
-        try:
-            entries = list(os.scandir(folder / below))
-        except OSError:  # a folder that may not be read holds nothing for us
-            continue
-        if below and any(entry.name == "result.json" for entry in entries):
-            found.append(below)
-        inside = (e.name for e in entries if not e.name.startswith(".") and e.is_dir(follow_symlinks=bool(below == "")))
-        open_ += [f"{below}/{name}" if below else name for name in inside]
-    return sorted(found, key=natural_key)
+def result_names(folder: Path) -> list[str]:
+    """Names of the results in a folder, in the order in which people count."""
+    held = (path for path in folder.iterdir() if os.access(path / "result.json", os.F_OK))
+    return sorted((path.name for path in held if not path.name.startswith(".")), key=natural_key)
 
 
 def _row_of(name: str, out: Path, settings: ReportSettings) -> IndexRow:
@@ -251,8 +242,8 @@ def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
     """The mean of a type for its figure."""
     mean = entry.pooled
     parts = {"mean": mean.mean, "std": mean.std, "scatter": mean.scatter}
-    scaled = {name: [float(f"{unit.factor * value:.4g}") for value in values] for name, values in parts.items()}
-    return {"alt": entry.alt, "members": entry.members, "kappa": [float(f"{k:.4g}") for k in mean.kappa], **scaled}
+    scaled = {name: digits(unit.factor * values, 4) for name, values in parts.items()}
+    return {"alt": entry.alt, "members": entry.members, "kappa": digits(mean.kappa, 4), **scaled}
 
 
 def _list(values: NDArray[np.float64]) -> str:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, PlainValidator, StrictBool, StrictInt, TypeAdapter
 
 from pipeline.messages import UNREADABLE, Message
+from pipeline.rounding import digits
 
 if TYPE_CHECKING:
     from pipeline.result import FindingPart, Result, Visited
@@ -198,16 +199,12 @@ def as_entry(row: IndexRow) -> dict[str, Any]:
     plain = {name: value for name, value in asdict(row).items() if name not in ("curve", "report", "outlying")}
     curve = row.curve
     plain["curve"] = None if curve is None else {
-        "range": _digits([curve.kappa[0], curve.kappa[-1]], 9),
-        "tangent": _digits(curve.tangent, 9),
-        "tangent_std": _digits(curve.tangent_std, 9),
+        "range": digits([curve.kappa[0], curve.kappa[-1]], 9),
+        "tangent": digits(curve.tangent, 9),
+        "tangent_std": digits(curve.tangent_std, 9),
         "factor": b64encode(curve.factor[_below(*curve.factor.shape)].astype("<f4").tobytes()).decode(),
     }  # fmt: skip
     return {"version": ROW, **plain}
-
-
-def _digits(values: Iterable[float], digits: int) -> list[float]:
-    return [float(f"{value:.{digits}g}") for value in values]
 
 
 def from_entry(data: object) -> IndexRow:

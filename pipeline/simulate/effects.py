@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.intake.tomltable import nearest
 from pipeline.messages import Message
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest
@@ -133,8 +133,8 @@ def parse_effect(text: str) -> tuple[str, Values]:
     told = {"text": repr(text), "name": effect.name, "takes": effect.takes}
     try:
         values = tuple(float(part) for part in rest.split(","))
-    except ValueError as error:
-        raise ValueError(Message("misuse.no-number", **told)) from error
+    except ValueError:
+        values = (np.nan,)
     if not np.all(np.isfinite(values)):
         raise ValueError(Message("misuse.no-number", **told))
     low, high = POSSIBLE.get(effect.name, (-np.inf, np.inf))
@@ -166,9 +166,9 @@ def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, fl
 def _effect(name: str) -> Effect:
     if name in EFFECTS:
         return EFFECTS[name]
-    near = get_close_matches(name, EFFECTS, n=1)
+    near = nearest(name, EFFECTS)
     key = "misuse.no-cause-near" if near else "misuse.no-cause"
-    raise ValueError(Message(key, name=repr(name), known=near or EFFECTS))
+    raise ValueError(Message(key, name=repr(name), known=[near] if near else EFFECTS))
 
 
 def _along(values: Values) -> Callable[[Array], Array]:
@@ -204,68 +204,56 @@ def _load(setup: Setup, values: Values) -> Setup:
     return replace(setup, test=replace(setup.test, load=(values[0], values[1])))
 
 
-def _relaxation(setup: Setup, values: Values) -> Setup:
-    time = values[1] if len(values) > 1 else setup.readings.relaxation_time
-    return replace(setup, readings=replace(setup.readings, relaxation=values[0], relaxation_time=time))
-
-
 def _tilt(setup: Setup, values: Values) -> Setup:
-    terms = (values[0], values[1] if len(values) > 1 else 0.0)
-    return replace(setup, camera=replace(setup.camera, perspective_per_m=terms))
+    return replace(setup, camera=replace(setup.camera, perspective_per_m=(values[0], sum(values[1:]))))
 
 
-def _one(field: str, values: Values) -> dict[str, Any]:
-    return {field: values[0]}
+def _in(place: Literal["test", "readings", "camera"], *fields: str) -> Callable[[Setup, Values], Setup]:
+    """The values, in their order, are those of fields of a part of the set-up."""
 
-
-def _on_test(field: str) -> Callable[[Setup, Values], Setup]:
-    return lambda setup, values: replace(setup, test=replace(setup.test, **_one(field, values)))
-
-
-def _on_supports(field: str) -> Callable[[Setup, Values], Setup]:
     def apply(setup: Setup, values: Values) -> Setup:
-        left, right = (replace(end, **_one(field, values)) for end in (setup.test.left, setup.test.right))
-        return replace(setup, test=replace(setup.test, left=left, right=right))
+        part: Any = getattr(setup, place)
+        changes: dict[str, Any] = {place: replace(part, **dict(zip(fields, values, strict=False)))}
+        return replace(setup, **changes)
 
     return apply
 
 
-def _on_readings(field: str) -> Callable[[Setup, Values], Setup]:
-    return lambda setup, values: replace(setup, readings=replace(setup.readings, **{field: values[0]}))
+def _in_bearings(field: str) -> Callable[[Setup, Values], Setup]:
+    """The value is that of a field of both bearings."""
 
+    def apply(setup: Setup, values: Values) -> Setup:
+        change: dict[str, Any] = {field: values[0]}
+        left, right = (replace(end, **change) for end in (setup.test.left, setup.test.right))
+        return replace(setup, test=replace(setup.test, left=left, right=right))
 
-def _lens(setup: Setup, values: Values) -> Setup:
-    return replace(setup, camera=replace(setup.camera, k1=values[0]))
-
-
-def _bow(setup: Setup, values: Values) -> Setup:
-    return replace(setup, bow=values[0])
+    return apply
 
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         Effect("nonlinear_stiffness", (), _stiffness),
-        Effect("pre_curvature", (1,), _on_test("pre_curvature")),
+        Effect("pre_curvature", (1,), _in("test", "pre_curvature")),
         Effect("pre_curvature_varying", (1, 2), _varying_pre_curvature),
         Effect("stiffness_varying", (1, 2), _varying_stiffness),
         Effect("hysteresis", (1, 2), _hysteresis),
-        Effect("plastic_set", (1,), _on_test("plastic_rate")),
-        Effect("relaxation", (1, 2), _relaxation),
-        Effect("bearing_friction", (1,), _on_supports("friction_moment")),
-        Effect("bearing_stiffness", (1,), _on_supports("stiffness")),
-        Effect("rigid_ends", (1,), _on_supports("rigid_length")),
-        Effect("rig_compliance", (1,), _on_test("compliance")),
-        Effect("displacement_offset", (1,), _on_test("displacement_offset")),
-        Effect("length_error", (1,), _on_readings("length")),
-        Effect("force_offset", (1,), _on_readings("offset")),
-        Effect("force_drift", (1,), _on_readings("drift")),
-        Effect("force_gain", (1,), _on_readings("gain")),
+        Effect("plastic_set", (1,), _in("test", "plastic_rate")),
+        Effect("relaxation", (1, 2), _in("readings", "relaxation", "relaxation_time")),
+        Effect("bearing_friction", (1,), _in_bearings("friction_moment")),
+        Effect("bearing_stiffness", (1,), _in_bearings("stiffness")),
+        Effect("rigid_ends", (1,), _in_bearings("rigid_length")),
+        Effect("rig_compliance", (1,), _in("test", "compliance")),
+        Effect("displacement_offset", (1,), _in("test", "displacement_offset")),
+        Effect("length_error", (1,), _in("readings", "length")),
+        Effect("force_offset", (1,), _in("readings", "offset")),
+        Effect("force_drift", (1,), _in("readings", "drift")),
+        Effect("force_gain", (1,), _in("readings", "gain")),
         Effect("in_plane_load", (2,), _load),
-        Effect("scale_error", (1,), _on_readings("scale")),
-        Effect("lens_distortion", (1,), _lens),
+        Effect("scale_error", (1,), _in("readings", "scale")),
+        Effect("lens_distortion", (1,), _in("camera", "k1")),
         Effect("camera_tilt", (1, 2), _tilt),
-        Effect("out_of_plane_bow", (1,), _bow),
-        Effect("stiffness_drift", (1,), _on_readings("stiffer")),
+        Effect("out_of_plane_bow", (1,), lambda setup, values: replace(setup, bow=values[0])),
+        Effect("stiffness_drift", (1,), _in("readings", "stiffer")),
     )
 }

@@ -8,7 +8,7 @@ kappa (1/m), moment (N m), position (mm) and the pixel path of the centerline, (
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -88,8 +88,8 @@ def write_specimen(
     lean = _lean(setup, states)
     for number, (name, state) in enumerate(zip(names, states, strict=True)):
         picture = render(photography.scene(experiment, state, setup.camera, number, lean=lean))
-        _save(folder / name, picture.pixels, photography)
-        pictures.append(_Traced(picture))
+        write_picture(folder / name, picture.pixels, jpeg_quality=photography.jpeg_quality)
+        pictures.append(replace(picture, pixels=picture.pixels[:0]))  # its truth alone
     if photography.scale == "board":
         _calibrate(folder, experiment, photography, setup.camera, states[0])
     shown, log = _force_log(experiment, setup.readings, states, names)
@@ -115,23 +115,12 @@ def _lean(setup: Setup, states: tuple[State, ...]) -> float:
     return setup.bow / bow
 
 
-class _Traced:
-    """What is kept of a picture: its truth without the pixels."""
-
-    def __init__(self, picture: Picture) -> None:
-        self.s, self.u, self.v = picture.curve.s, picture.u_px, picture.v_px
-        self.left, self.right = picture.left_px, picture.right_px
-
-
-def _save(path: Path, pixels: Any, photography: Photography) -> None:
-    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
-
-
 def _calibrate(folder: Path, experiment: Experiment, photography: Photography, camera: Camera, state: State) -> None:
     (folder / "calibration").mkdir(exist_ok=True)
     scene = photography.scene(experiment, state, camera, 10_000)  # a seed no step has
     pixels = render_board(scene, photography.fitted_board(experiment, camera))
-    _save(folder / "calibration" / f"board{photography.suffix}", pixels, photography)
+    path = folder / "calibration" / f"board{photography.suffix}"
+    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
 
 
 def _force_log(
@@ -156,7 +145,7 @@ def _force_log(
     return shown, "\n".join(lines) + "\n"
 
 
-def _description(experiment: Experiment, setup: Setup, photography: Photography, first: _Traced) -> str:
+def _description(experiment: Experiment, setup: Setup, photography: Photography, first: Picture) -> str:
     """Text of ``specimen.toml``."""
     length = 1e3 * experiment.length_m * (1.0 + setup.readings.length)
     lines = [
@@ -182,7 +171,7 @@ def _description(experiment: Experiment, setup: Setup, photography: Photography,
     if len(covers) == 2:
         lines.append(f"bearing_marker_mm = {1e3 * covers[0].diameter_m:.3f}")
     else:
-        axes = ", ".join(f"[{u:.2f}, {v:.2f}]" for u, v in (first.left, first.right))
+        axes = ", ".join(f"[{u:.2f}, {v:.2f}]" for u, v in (first.left_px, first.right_px))
         lines.append(f"bearings_px = [{axes}]")
     return "\n".join(lines) + "\n"
 
@@ -191,7 +180,7 @@ def _truth(
     experiment: Experiment,
     setup: Setup,
     states: tuple[State, ...],
-    pictures: list[_Traced],
+    pictures: list[Picture],
     shown: list[float],
 ) -> dict[str, Any]:
     excess = np.linspace(-5.0, 20.0, 251)
@@ -218,9 +207,9 @@ def _truth(
     }
 
 
-def _step(number: int, experiment: Experiment, state: State, picture: _Traced, shown: float) -> dict[str, Any]:
+def _step(number: int, experiment: Experiment, state: State, picture: Picture, shown: float) -> dict[str, Any]:
     s = np.linspace(0.0, float(state.s[-1]), TRUTH_POINTS)
-    x, y, u, v = (CubicSpline(state.s, row)(s) for row in (state.x, state.y, picture.u, picture.v))
+    x, y, u, v = (CubicSpline(state.s, row)(s) for row in (state.x, state.y, picture.u_px, picture.v_px))
     kappa, m = (np.interp(s, state.s, row) for row in (state.kappa, state.moment))
     return {
         "step": number,
@@ -233,6 +222,6 @@ def _step(number: int, experiment: Experiment, state: State, picture: _Traced, s
         "m": m.tolist(),
         "xy_mm": (1e3 * np.column_stack([x, y])).tolist(),
         "px": np.column_stack([u, v]).tolist(),
-        "left_px": list(picture.left),
-        "right_px": list(picture.right),
+        "left_px": list(picture.left_px),
+        "right_px": list(picture.right_px),
     }
