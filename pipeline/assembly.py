@@ -12,7 +12,7 @@ import datetime
 import importlib.metadata
 import platform
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -145,12 +145,11 @@ def _gathered(
     diagnosis: DiagnosisPart | None,
 ) -> list[FindingPart]:
     """Findings of all stages in their order, each fault told once."""
-    earlier = [
-        *specimen.findings,
-        *traces.findings,
-        *photo_findings(traces.photos),
-        *without_advice(parts.findings, diagnosis),
-    ]
+    photos, identified = photo_findings(traces.photos), without_advice(parts.findings, diagnosis)
+    if traces.photos and all(isinstance(photo, Rejected) for photo in traces.photos):
+        # that is why nothing is measured, not what both ways lack for it
+        photos, identified = [replace(one, level="error") for one in photos], []
+    earlier = [*specimen.findings, *traces.findings, *photos, *identified]
     found = dict.fromkeys([*without_those_told_better(earlier, diagnosed), *diagnosed])  # two may have seen the same
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 

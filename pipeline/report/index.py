@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
+from pipeline.report.cells import csv_lines
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
-from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
@@ -248,3 +248,25 @@ def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
 
 def _list(values: NDArray[np.float64]) -> str:
     return f"[{','.join(map('{:.4g}'.format, values.tolist()))}]"
+
+
+HEADS = (
+    *("id", "status", "usable", "verdict", "causes", "answer_method", "K0_per_m", "K0_std_per_m"),
+    *("kappa_low_per_m", "f_EI_low_Nm2", "f_EI_low_std_Nm2", "kappa_high_per_m", "f_EI_high_Nm2", "f_EI_high_std_Nm2"),
+    *("worst_finding", "reason", "type", "agreement_rms_relative", "compatible"),
+    *("photos_used", "photos_given", "warnings", "errors", "report"),
+)
+
+
+def summary_lines(rows: Iterable[IndexRow]) -> Iterator[str]:
+    """Lines of ``summary.csv``; nothing stands where nothing was measured."""
+    return csv_lines(HEADS, map(_summed, rows))
+
+
+def _summed(row: IndexRow) -> tuple[object, ...]:
+    none = (None, None, None)
+    rest, ends = row.pre_curvature or (None, None), (*(row.low or none), *(row.high or none))
+    told = (row.worst, str(row.fault or row.reason or ""), row.type, row.rms_relative, row.compatible)
+    counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
+    about = (row.id, row.status, row.usable, row.verdict, ";".join(row.causes), row.method)
+    return (*about, *rest, *ends, *told, *counts, row.report)

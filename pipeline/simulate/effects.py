@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,27 +79,11 @@ class Setup:
     bow: float = 0.0
 
 
-@dataclass(frozen=True)
-class Effect:
-    """A cause that can be hidden.
+class Effect(NamedTuple):
+    """A cause that can be hidden: how many values it may have, any number if none is told, and what they change."""
 
-    Attributes
-    ----------
-    name : str
-    counts : tuple of int
-        How many values are allowed.
-    apply : callable
-        (Setup, values) -> Setup.
-    """
-
-    name: str
     counts: tuple[int, ...]
     apply: Callable[[Setup, Values], Setup]
-
-    @property
-    def takes(self) -> Message:
-        """What its values are, with units."""
-        return Message(f"effect.{self.name}")
 
 
 def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
@@ -115,7 +99,7 @@ def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
         values = tuple(float(v) for v in np.atleast_1d(given))
         if effect.counts and len(values) not in effect.counts:
             counts = {"given": len(values), "counts": effect.counts}
-            raise ValueError(Message("misuse.values", name=name, takes=effect.takes, **counts))
+            raise ValueError(Message("misuse.values", name=name, takes=Message(f"effect.{name}"), **counts))
         setup = effect.apply(setup, values)
     return setup
 
@@ -128,21 +112,22 @@ def parse_effect(text: str) -> tuple[str, Values]:
     ValueError
         If it cannot be read, or no such value can be; the message names the nearest known name.
     """
-    name, _, rest = text.partition("=")
-    effect = _effect(name.strip())
-    told = {"text": repr(text), "name": effect.name, "takes": effect.takes}
+    given, _, rest = text.partition("=")
+    name = given.strip()
+    _effect(name)
+    told = {"text": repr(text), "name": name, "takes": Message(f"effect.{name}")}
     try:
         values = tuple(float(part) for part in rest.split(","))
     except ValueError:
         values = (np.nan,)
     if not np.all(np.isfinite(values)):
         raise ValueError(Message("misuse.no-number", **told))
-    low, high = POSSIBLE.get(effect.name, (-np.inf, np.inf))
-    if effect.name in ONE_SIDED and min(values) < 0.0:
+    low, high = POSSIBLE.get(name, (-np.inf, np.inf))
+    if name in ONE_SIDED and min(values) < 0.0:
         raise ValueError(Message("misuse.negative", **told))
     if not low < values[0] < high:
         raise ValueError(Message("misuse.impossible", **told, low=low, high=high))
-    return effect.name, values
+    return name, values
 
 
 def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, float | Values]) -> None:
@@ -231,29 +216,26 @@ def _in_bearings(field: str) -> Callable[[Setup, Values], Setup]:
 
 
 EFFECTS: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        Effect("nonlinear_stiffness", (), _stiffness),
-        Effect("pre_curvature", (1,), _in("test", "pre_curvature")),
-        Effect("pre_curvature_varying", (1, 2), _varying_pre_curvature),
-        Effect("stiffness_varying", (1, 2), _varying_stiffness),
-        Effect("hysteresis", (1, 2), _hysteresis),
-        Effect("plastic_set", (1,), _in("test", "plastic_rate")),
-        Effect("relaxation", (1, 2), _in("readings", "relaxation", "relaxation_time")),
-        Effect("bearing_friction", (1,), _in_bearings("friction_moment")),
-        Effect("bearing_stiffness", (1,), _in_bearings("stiffness")),
-        Effect("rigid_ends", (1,), _in_bearings("rigid_length")),
-        Effect("rig_compliance", (1,), _in("test", "compliance")),
-        Effect("displacement_offset", (1,), _in("test", "displacement_offset")),
-        Effect("length_error", (1,), _in("readings", "length")),
-        Effect("force_offset", (1,), _in("readings", "offset")),
-        Effect("force_drift", (1,), _in("readings", "drift")),
-        Effect("force_gain", (1,), _in("readings", "gain")),
-        Effect("in_plane_load", (2,), _load),
-        Effect("scale_error", (1,), _in("readings", "scale")),
-        Effect("lens_distortion", (1,), _in("camera", "k1")),
-        Effect("camera_tilt", (1, 2), _tilt),
-        Effect("out_of_plane_bow", (1,), lambda setup, values: replace(setup, bow=values[0])),
-        Effect("stiffness_drift", (1,), _in("readings", "stiffer")),
-    )
+    "nonlinear_stiffness": Effect((), _stiffness),
+    "pre_curvature": Effect((1,), _in("test", "pre_curvature")),
+    "pre_curvature_varying": Effect((1, 2), _varying_pre_curvature),
+    "stiffness_varying": Effect((1, 2), _varying_stiffness),
+    "hysteresis": Effect((1, 2), _hysteresis),
+    "plastic_set": Effect((1,), _in("test", "plastic_rate")),
+    "relaxation": Effect((1, 2), _in("readings", "relaxation", "relaxation_time")),
+    "bearing_friction": Effect((1,), _in_bearings("friction_moment")),
+    "bearing_stiffness": Effect((1,), _in_bearings("stiffness")),
+    "rigid_ends": Effect((1,), _in_bearings("rigid_length")),
+    "rig_compliance": Effect((1,), _in("test", "compliance")),
+    "displacement_offset": Effect((1,), _in("test", "displacement_offset")),
+    "length_error": Effect((1,), _in("readings", "length")),
+    "force_offset": Effect((1,), _in("readings", "offset")),
+    "force_drift": Effect((1,), _in("readings", "drift")),
+    "force_gain": Effect((1,), _in("readings", "gain")),
+    "in_plane_load": Effect((2,), _load),
+    "scale_error": Effect((1,), _in("readings", "scale")),
+    "lens_distortion": Effect((1,), _in("camera", "k1")),
+    "camera_tilt": Effect((1, 2), _tilt),
+    "out_of_plane_bow": Effect((1,), lambda setup, values: replace(setup, bow=values[0])),
+    "stiffness_drift": Effect((1,), _in("readings", "stiffer")),
 }

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
 from pipeline.simulate.effects import Readings, Setup
-from pipeline.simulate.experiment import Experiment, State, bend
+from pipeline.simulate.experiment import Experiment, State, bend, protocol
 from pipeline.simulate.photography import Photography
 from pipeline.vision.render import Camera, Picture, render, render_board
 from pipeline.vision.render.sensor import write_picture
@@ -48,6 +48,41 @@ def simulate_specimen(
     """Bend, photograph and log a cable; see `write_specimen`."""
     experiment = experiment or Experiment(id=folder.name)
     return write_specimen(folder, experiment, states=bend(experiment), photography=photography, truth_file=truth_file)
+
+
+def demo_specimen(folder: Path, seed: int = 0, *, truth_file: Path | None = None) -> Written:
+    """Simulate and photograph the specimen of ``cablebend demo``, a mounted cable and six loading steps; a few seconds.
+
+    The cable, its pre-curvature, the camera's roll and the print on the sheath differ from seed to seed within what is
+    usual on such a rig; nothing is hidden in it.
+
+    Parameters
+    ----------
+    folder : Path
+    seed : int
+        Chooses cable, camera and noise.
+    truth_file : Path or None
+        See `write_specimen`.
+    """
+    rng = np.random.default_rng([seed, 2])
+    length = rng.uniform(0.17, 0.21)
+    EI0 = float(np.exp(rng.uniform(np.log(4e-3), np.log(4e-2))))
+    experiment = Experiment(
+        id=folder.name,
+        length_m=round(length, 4),
+        diameter_m=round(rng.uniform(0.0042, 0.0062), 4),
+        EI0=EI0,
+        EI1=EI0 * rng.uniform(0.3, 0.6),
+        kc=rng.uniform(3.5, 6.0),
+        K0=rng.uniform(1.0, 2.5),
+        displacements_m=protocol("loading", 6, round(0.0125 * length, 4)),
+        seed=seed,
+    )
+    photography = Photography(roll_rad=rng.uniform(-0.02, 0.02))
+    printed = replace(photography.sheath, text=f"CABLEBEND DEMO {seed:04d}", text_pitch=30.0)
+    return simulate_specimen(
+        folder, experiment, photography=replace(photography, sheath=printed), truth_file=truth_file
+    )
 
 
 def write_specimen(

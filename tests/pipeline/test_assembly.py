@@ -1,7 +1,11 @@
 """What the stages saw is gathered into a result: nothing that cost a photo is missing among the findings."""
 
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
 
 from pipeline.assembly import photo_findings, without_advice, without_those_told_better
@@ -11,8 +15,11 @@ from pipeline.report.answer import first_screen
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, leading
 from pipeline.result.headline import headline
+from pipeline.run import measure
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_result import measured_result
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name():
@@ -108,3 +115,15 @@ def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     german = Words("de").said(told[0].said)
     assert german.language == "de" and german.text.startswith("2 Fotos (a.png, c.png), auf a.png: Das ")
     assert Words("de").said(alike.said).language == "de"
+
+
+def test_where_all_photos_are_refused_that_is_the_error(tmp_path):
+    """Errors said that no step had a photo, and that the photos were black stood below as a warning."""
+    shutil.copytree(ROOT / "fixtures/specimens/three", tmp_path / "dark")
+    for photo in (tmp_path / "dark/images").iterdir():
+        cv2.imwrite(str(photo), np.zeros((300, 400), np.uint8))
+    result = measure(tmp_path / "dark")
+    assert result.status == "failed" and "could be used" in result.headline
+    told = {(finding.code, finding.level) for finding in result.findings if finding.level != "info"}
+    assert ("photo/blank", "error") in told
+    assert not [code for code, _ in told if code.startswith("identify/")]

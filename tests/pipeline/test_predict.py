@@ -201,7 +201,7 @@ def test_command(result, tmp_path):
 
     done = call("--displacement-mm", "5,10", "-o", str(tmp_path / "out.csv"))
     assert done.exit_code == 0
-    assert done.stdout.count(" N, rise ") == 2
+    assert done.stdout.count(" N, bow ") == 2
     assert (tmp_path / "out.csv").read_text().count("\n") == 1 + 2 * POINTS
     document = json.loads(call("--displacement-mm", "5", "--length-mm", "210", "--json").stdout)
     assert document["length_m"] == pytest.approx(0.21)

@@ -51,11 +51,13 @@ def test_exit_code_and_output_say_so(run):
 
 def test_result_and_summary_say_so(run):
     out, _ = run
-    answer = json.loads((out / WRONG / "result.json").read_text())["answer"]
+    result = json.loads((out / WRONG / "result.json").read_text())
+    answer = result["answer"]
+    assert result["diagnosis"] is None  # nothing is concluded from numbers of no cable
     assert answer["usable"] is False and "1000 times too large" in answer["reason"]
     table = pd.read_csv(out / "summary.csv").set_index("id")
     assert list(table[~table.usable].index) == [WRONG]
-    assert table.status[WRONG] == "measured"
+    assert (table.status[WRONG], table.verdict[WRONG]) == ("measured", "none")
     assert table.worst_finding[WRONG] == "size/force"
     assert set(table.answer_method) <= {"inverse", "balance", "extended"}
 
