@@ -34,6 +34,7 @@ from pipeline.result import (
     SpecimenPart,
     Widening,
 )
+from pipeline.result.answer import OF_NO_CABLE
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.headline import headline
 from pipeline.rounding import digits
@@ -149,6 +150,8 @@ def _gathered(
     if traces.photos and all(isinstance(photo, Rejected) for photo in traces.photos):
         # that is why nothing is measured, not what both ways lack for it
         photos, identified = [replace(one, level="error") for one in photos], []
+    if any(one.code in OF_NO_CABLE for one in (*specimen.findings, *diagnosed)):  # what follows from it is no warning
+        identified = [replace(one, level="info") for one in identified]
     earlier = [*specimen.findings, *traces.findings, *photos, *identified]
     found = dict.fromkeys([*without_those_told_better(earlier, diagnosed), *diagnosed])  # two may have seen the same
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]

@@ -54,6 +54,7 @@ def test_result_and_summary_say_so(run):
     result = json.loads((out / WRONG / "result.json").read_text())
     answer = result["answer"]
     assert result["diagnosis"] is None  # nothing is concluded from numbers of no cable
+    assert [finding["code"] for finding in result["findings"] if finding["level"] != "info"] == ["size/force"]
     assert answer["usable"] is False and "1000 times too large" in answer["reason"]
     table = pd.read_csv(out / "summary.csv").set_index("id")
     assert list(table[~table.usable].index) == [WRONG]
