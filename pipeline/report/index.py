@@ -17,9 +17,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
@@ -235,7 +232,7 @@ def _curve(row: IndexRow, unit: Unit) -> str:
     if row.curve is None:
         return "null"
     parts = (row.curve.kappa[[0, -1]], unit.factor * row.curve.tangent, unit.factor * row.curve.tangent_std)
-    return "[" + ",".join(_list(part) for part in parts) + "]"
+    return _json([digits(part, 4) for part in parts])
 
 
 def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
@@ -244,10 +241,6 @@ def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
     parts = {"mean": mean.mean, "std": mean.std, "scatter": mean.scatter}
     scaled = {name: digits(unit.factor * values, 4) for name, values in parts.items()}
     return {"alt": entry.alt, "members": entry.members, "kappa": digits(mean.kappa, 4), **scaled}
-
-
-def _list(values: NDArray[np.float64]) -> str:
-    return f"[{','.join(map('{:.4g}'.format, values.tolist()))}]"
 
 
 HEADS = (

@@ -175,12 +175,8 @@ def data_fault(result: Result, curve: Visited | None) -> Message | None:
     turned = diagnosis is not None and any(part.factor < 0.0 for part in diagnosis.corrected_forces)
     wrong = OF_NO_CABLE if turned else OF_NO_CABLE | {"force/sign"}
     told = next((finding.said for finding in result.findings if finding.code in wrong), None)
-    return told or _negative(curve)
-
-
-def _negative(curve: Visited | None) -> Message | None:
-    """The stiffness comes out negative: the cable would help to bend itself."""
-    return None if curve is None or float(np.mean(curve.tangent)) > 0.0 else Message("fault.negative")
+    negative = curve is not None and float(np.mean(curve.tangent)) <= 0.0  # the cable would help to bend itself
+    return told or (Message("fault.negative") if negative else None)
 
 
 def none_of_its_type(times: float, *, others: int, kind: str) -> Message:

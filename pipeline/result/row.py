@@ -7,7 +7,6 @@ summary, mean of repeat specimens) reads rows alone: a result with its photos is
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -20,7 +19,7 @@ from pipeline.messages import UNREADABLE, Message
 from pipeline.rounding import digits
 
 if TYPE_CHECKING:
-    from pipeline.result import FindingPart, Result, Visited
+    from pipeline.result import Result, Visited
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -121,7 +120,8 @@ class IndexRow:
 def index_row(result: Result) -> IndexRow:
     """Row of one result, without its report."""
     told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
-    curve, worst = told.curve, _worst(result.findings)
+    curve, levels = told.curve, ("error", "warning")
+    worst = next((f for level in levels for f in result.findings if f.level == level), None)
     low, high = curve.ends() if curve else (None, None)
     return IndexRow(
         id=result.specimen.id,
@@ -147,12 +147,6 @@ def index_row(result: Result) -> IndexRow:
         shapes=_shapes(result),
         curve=None if curve is None else thinned(curve, POINTS),
     )
-
-
-def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The first error, else the first warning."""
-    levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
-    return levels["error"] or levels["warning"]
 
 
 POINTS = 24
