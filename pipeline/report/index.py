@@ -43,8 +43,8 @@ HEAD, TAIL = 200, 40
 
 
 def index_rows(out: Path, settings: ReportSettings) -> list[IndexRow]:
-    """Rows of all results in a folder; those whose stiffness cannot be that of their type are not usable."""
-    return without_outlying([_row_of(name, out, settings) for name in result_names(out)])
+    """Rows of all results below a folder; those whose stiffness cannot be that of their type are not usable."""
+    return without_outlying([_row_of(name, out, settings) for name in result_folders(out)])
 
 
 def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tuple[Path, Path]:
@@ -53,10 +53,15 @@ def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tup
     return page, write_atomic(out / "summary.csv", summary_lines(rows))
 
 
-def result_names(folder: Path) -> list[str]:
-    """Names of the results in a folder, in the order in which people count."""
-    held = (path for path in folder.iterdir() if os.access(path / "result.json", os.F_OK))
-    return sorted((path.name for path in held if not path.name.startswith(".")), key=natural_key)
+def result_folders(folder: Path) -> list[str]:
+    """Folders below a folder that hold a result, relative to it, in the order in which people count."""
+    found = []
+    for top in (path for path in folder.iterdir() if not path.name.startswith(".")):
+        for below, names, files in os.walk(top):  # what may not be read holds nothing for us
+            names[:] = (name for name in names if not name.startswith("."))
+            if "result.json" in files:
+                found.append(Path(below).relative_to(folder).as_posix())
+    return sorted(found, key=natural_key)
 
 
 def _row_of(name: str, out: Path, settings: ReportSettings) -> IndexRow:
