@@ -79,16 +79,16 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
     root = np.sqrt(values[keep])
     factor = law.tangent[:, None] * vectors[:, keep] * root
     return Curve(
-        kappa_per_m=_list(law.kappa),
-        moment_Nm=_list(law.moment),
-        moment_std_Nm=_list(law.moment_std),
-        tangent_Nm2=_list(law.tangent),
-        tangent_std_Nm2=_list(law.tangent_std),
-        secant_Nm2=_list(law.secant),
-        secant_std_Nm2=_list(law.secant_std),
+        kappa_per_m=law.kappa.tolist(),
+        moment_Nm=law.moment.tolist(),
+        moment_std_Nm=law.moment_std.tolist(),
+        tangent_Nm2=law.tangent.tolist(),
+        tangent_std_Nm2=law.tangent_std.tolist(),
+        secant_Nm2=law.secant.tolist(),
+        secant_std_Nm2=law.secant_std.tolist(),
         supported=[True] * law.kappa.size,
-        tangent_factor_Nm2=[_list(row) for row in factor],
-        pre_curvature_factor_per_m=_list(vectors[:, keep].T @ law.rest_covariance / root),
+        tangent_factor_Nm2=factor.tolist(),
+        pre_curvature_factor_per_m=(vectors[:, keep].T @ law.rest_covariance / root).tolist(),
     )
 
 
@@ -155,7 +155,7 @@ def balance_part(way: BalanceGraph) -> BalancePart:
             kappa, ratio = pointwise_graph(points.step)
             good = np.isfinite(ratio)
             pointwise.append(
-                PointwisePart(step=points.step.step, kappa_per_m=_list(kappa[good]), tangent_Nm2=_list(ratio[good]))
+                PointwisePart(step=points.step.step, kappa_per_m=kappa[good].tolist(), tangent_Nm2=ratio[good].tolist())
             )
     return BalancePart(
         **BalancePart.ending(way.outcome),
@@ -163,8 +163,8 @@ def balance_part(way: BalanceGraph) -> BalancePart:
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
         curve=curve(way),
-        points_kappa_per_m=_list(np.concatenate([p.kappa[p.seen][::POINTS] for p in way.points])),
-        points_moment_Nm=_list(np.concatenate([p.moment[p.seen][::POINTS] for p in way.points])),
+        points_kappa_per_m=np.concatenate([p.kappa[p.seen][::POINTS] for p in way.points]).tolist(),
+        points_moment_Nm=np.concatenate([p.moment[p.seen][::POINTS] for p in way.points]).tolist(),
         pointwise=pointwise,
         checks=way.checks,
     )
@@ -219,13 +219,9 @@ def _photos(way: Estimate) -> dict[int, PhotoResidual]:
         variance = np.einsum("ip,pq,iq->i", shape.basis_normal, shape.covariance, shape.basis_normal)
         at = photo_fit(observation, fitted, photo, shape)
         std = np.sqrt(np.maximum(variance, 0.0))
-        found[step.step] = PhotoResidual(_list(at.kappa), _list(at.distance), _list(std))
+        found[step.step] = PhotoResidual(at.kappa.tolist(), at.distance.tolist(), std.tolist())
     return found
 
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
-def _list(values: Array) -> list[float]:
-    return [float(v) for v in values]

@@ -13,7 +13,6 @@ from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
 from pipeline.settings import ReportSettings
 
-K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
 
@@ -70,7 +69,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
         verdict=verdict,
         tone=tone,
         pre_curvatures=tuple(
-            (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
+            (words.known(f"k0_{way}", way), words.measured(value, std))
             for way, (value, std) in pre_curvatures(result).items()
             if result.answer.usable or result.status == "failed"
         ),
