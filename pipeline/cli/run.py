@@ -73,7 +73,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
     from pipeline.intake.access import is_folder
-    from pipeline.intake.folder import find_specimens, find_too_deep, find_undescribed, misnamed
+    from pipeline.intake.folder import find_specimens, find_undescribed, folders_of_kind, misnamed
 
     specimens: dict[Path, None] = {}
     refused = []
@@ -84,7 +84,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
             refused.append(error)
             refuse(error)
     there = [folder for folder in folders if is_folder(folder)]
-    if deep := find_too_deep(there, settings):
+    if deep := folders_of_kind("deep", there, settings):
         note(Message("cli.too-deep", levels=settings.search_depth, count=len(deep), first=deep[0]))
     for folder in find_undescribed(there, settings):
         other = misnamed(folder)

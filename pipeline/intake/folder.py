@@ -48,7 +48,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     found: dict[Path, None] = {}
     for path in paths:
         _check_folder(path)
-        here = _of_kind("specimen", [path], settings)
+        here = folders_of_kind("specimen", [path], settings)
         if not here:
             other = misnamed(path)
             if other is not None:
@@ -81,16 +81,11 @@ def misnamed(folder: Path) -> InputError | None:
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Folders that hold photos and a table but no ``specimen.toml``: specimens somebody forgot to describe."""
-    return [folder for folder in _of_kind("none", paths, settings) if _looks_like_one(folder, settings)]
+    return [folder for folder in folders_of_kind("none", paths, settings) if _looks_like_one(folder, settings)]
 
 
-def find_too_deep(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
-    """Folders so far below the given ones that they are not searched."""
-    return _of_kind("deep", paths, settings)
-
-
-def _of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
-    """Folders of one kind among and below the given ones, without doubles."""
+def folders_of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
+    """Folders of one kind among and below the given ones, without doubles; ``deep`` ones are not searched."""
     searched = (step for path in paths for step in _search(path, set(), settings.search_depth))
     return list(dict.fromkeys(folder for folder, found in searched if found == kind))
 
