@@ -131,9 +131,7 @@ def without_advice(identified: Iterable[Finding], diagnosis: DiagnosisPart | Non
         return list(identified)
     lacking = Message("way.inverse-extended")
     return [
-        one
-        if one.code in OF_THE_DATA
-        else Finding(one.code, "info", lacking if one.code.startswith("identify/inverse-") else one.said)
+        one if one.code in OF_THE_DATA else Finding(one.code, "info", lacking if one.level == "error" else one.said)
         for one in identified
     ]
 

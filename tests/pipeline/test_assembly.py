@@ -95,9 +95,11 @@ def test_a_fit_that_failed_for_want_of_a_cause_advises_nothing_else(verdict, ext
     contradicted = Finding("identify/inverse-opposite-forces", "error", "no cable does that")
     misfit = Finding("identify/misfit-force", "warning", Message("identify/misfit-force", rms=7.0))
     part = SimpleNamespace(verdict=verdict, extended=extended)
-    told = without_advice([failed, contradicted, misfit], part)
+    open_ = Finding("identify/inverse-not-visible", "warning", "f_EI is open at 9 1/m")
+    told = without_advice([failed, contradicted, misfit, open_], part)
     explained = "info" if level == "info" else "warning"
-    assert [one.level for one in told] == [level, "error", explained] and told[1] == contradicted
+    assert [one.level for one in told] == [level, "error", explained, explained] and told[1] == contradicted
+    assert told[3].said == open_.said
     assert ("length_mm" in str(told[0].said)) == (level == "error")
 
 
