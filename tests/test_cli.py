@@ -12,15 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 from pipeline.assembly import provenance
-from pipeline.batch import Tally
 from pipeline.batch.specimen import Stages
 from pipeline.cli import main
 from pipeline.cli.configuration import commented_settings, read_settings
 from pipeline.cli.group import COMMANDS
-from pipeline.cli.run import echo_json
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.messages import Message
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -118,14 +115,6 @@ def test_log_that_cannot_be_written_costs_no_result(cheap):
     done = call("run", "batch", "-o", "taken", *IN_PROCESS)
     assert done.exit_code == 2
     assert "taken: cannot be written (is a directory)" in done.stderr
-
-
-def test_what_else_is_to_say_stands_in_the_document_too(tmp_path, capsys):
-    fault = Message("fault.none-of-its-type", times=1000.0, others=3, type="HV 35")
-    tally = Tally(1, ("a",), measured=1, trouble=(Message("cli.outlying", name="a", said=fault),))
-    echo_json(iter([]), tally, tmp_path)
-    (told,) = json.loads(capsys.readouterr().out)["trouble"]
-    assert told.startswith("a: f_EI is 1000 times that of the other 3 specimens")
 
 
 def test_one_specimen_folder(cheap):
@@ -400,6 +389,5 @@ def test_folders_without_description_are_told(cheap):
     assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
     assert "0 of 2 specimens would run" in done.stdout
     (cheap / "batch/b").rename(cheap / "batch/b\x1b[2J")
-    assert (
-        "batch/b\\x1b[2J: has photos" in call("check", "batch", *IN_PROCESS).stderr
-    )  # a name does not command the terminal
+    done = call("check", "batch", *IN_PROCESS)  # a name does not command the terminal
+    assert "batch/b\\x1b[2J: has photos" in done.stderr

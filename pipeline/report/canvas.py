@@ -70,7 +70,6 @@ STYLE: dict[RcKeyType, Any] = {
     "grid.color": LIGHT["grid"],
     "grid.linewidth": 0.8,
     "axes.linewidth": 0.8,
-    "axes.axisbelow": True,
     "lines.linewidth": 2.0,
     "hatch.linewidth": 0.6,
     "figure.facecolor": "none",

@@ -1,4 +1,4 @@
-"""Axes have round numbers in the reader's format, or names at given places; letters are as wide as in matplotlib."""
+"""Axes ruled with few artists look as matplotlib's own: the same round numbers, letters as wide as it measures them."""
 
 import numpy as np
 import pytest
@@ -12,21 +12,19 @@ from pipeline.report.ruling import FONT, Ruling, numbers, rule, text_width
 
 
 def ruled(side, ruling, *, limits, decimal="."):
-    """Places and texts of an axis that was ruled."""
+    """Texts of an axis that was ruled, without its name."""
     with style():
         axes = Figure(figsize=(4.0, 3.0), dpi=72).add_axes((0.2, 0.2, 0.7, 0.7))
         (axes.set_xlim if side == "bottom" else axes.set_ylim)(*limits)
         rule(axes, side, ruling, decimal=decimal)
-        axes.figure.draw_without_rendering()
-    along = axes.xaxis if side == "bottom" else axes.yaxis
-    assert along.get_label_text() == ruling.name
-    return [(place, text.get_text()) for place, text in zip(along.get_ticklocs(), along.get_ticklabels(), strict=True)]
+    return [text for text in axes.texts if text.get_text() != ruling.name]
 
 
 @pytest.mark.parametrize("limits", [(0.0, 181.0), (-0.25, 18.3), (-3.1e-4, 2.9e-4), (7.0, 0.0), (1e6, 5e6)])
 @pytest.mark.parametrize("side", ["bottom", "left", "right"])
 def test_labels_stand_at_round_numbers_within_the_limits(side, limits):
-    places = [place for place, _ in ruled(side, Ruling("f [N]"), limits=limits)]
+    texts = ruled(side, Ruling("f [N]"), limits=limits)
+    places = [text.get_position()[0 if side == "bottom" else 1] for text in texts]
     usual = MaxNLocator(6).tick_values(*limits)
     assert places == [v for v in usual if min(limits) <= v <= max(limits)]
     assert 2 <= len(places) <= 7
@@ -47,13 +45,13 @@ def test_numbers_of_an_axis_have_one_decimal_place(places, decimal, told):
 
 def test_given_labels_stand_at_given_places():
     texts = ruled("left", Ruling(at=(0, 1), labels=("slack", "bent")), limits=(1.5, -0.5))
-    assert texts == [(0, "slack"), (1, "bent")]
-    assert {text for _, text in ruled("left", Ruling(labelled=False), limits=(0.0, 1.0))} == {""}
+    assert [(text.get_text(), text.get_position()[1]) for text in texts] == [("slack", 0), ("bent", 1)]
+    assert ruled("left", Ruling(labelled=False), limits=(0.0, 1.0)) == []
 
 
 def test_whole_numbers_on_request():
     texts = ruled("bottom", Ruling("step", whole=True), limits=(0.0, 3.0))
-    assert [text for _, text in texts] == ["0", "1", "2", "3"]
+    assert [text.get_text() for text in texts] == ["0", "1", "2", "3"]
 
 
 @pytest.mark.parametrize("text", ["−12.5", "bending stiffness f_EI = dm/dκ [mN m²]", "veränderliche Vorkrümmung"])
