@@ -34,18 +34,15 @@ from pipeline.result import (
     SpecimenPart,
     Widening,
 )
+from pipeline.result.answer import OF_NO_CABLE
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.headline import headline
+from pipeline.rounding import digits
 from pipeline.settings import Settings
 
 PROGRAM = "cablebend"
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "opencv-python-headless", "scikit-image", "pydantic", "pillow")
 SIGNIFICANT_DIGITS = 9  # of an array in result.json: finer than any error bar, a third of the size of full precision
-
-
-def listed(values: Iterable[float] | np.ndarray) -> list[float]:
-    """Array as a list of numbers with `SIGNIFICANT_DIGITS`."""
-    return [float(f"{value:.{SIGNIFICANT_DIGITS}g}") for value in np.asarray(values, float).ravel()]
 
 
 def provenance(specimen: Specimen, settings: Settings, command: str) -> dict[str, Any]:
@@ -80,7 +77,7 @@ def assemble(
     specimen, traces, identification
         The stages' records.
     diagnosis : DiagnosisPart or None
-        None where identification left nothing to diagnose.
+        None where a fault of the data makes the numbers none of the cable's.
     findings : iterable of Finding
         Faults of the data, and what the diagnosis noticed; those of the other stages are in their records.
     settings : Settings
@@ -124,21 +121,19 @@ def with_all_believed(part: Way, widening: Widening | None) -> Way:
     return part.model_copy(update={"curve": widening.of(part.curve), "pre_curvature_std_per_m": rest})
 
 
-WANT_OF_A_CAUSE = {f"identify/inverse-{outcome}" for outcome in ("no-equilibrium", "stalled", "limit-point")}
-"""Ways in which a fit ends for want of a cause: beside the model with it, what else they may mean is no advice."""
+OF_THE_DATA = {"identify/force-zero", "identify/chord-displacement", "identify/inverse-opposite-forces"}
+"""What identification notices without a model."""
 
 
-EXPLAINED = {"identify/misfit-force", "identify/misfit-shape", "identify/branches"}
-"""What the simulation without a cause leaves: no warning where the cause was found."""
-
-
-def without_advice(earlier: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
-    """Findings, those of a fit that lacked a cause told as that where the curve is that with the cause."""
+def without_advice(identified: Iterable[Finding], diagnosis: DiagnosisPart | None) -> list[Finding]:
+    """Findings of identification: beside a curve with the cause, what both ways without it lead to is no warning."""
     if diagnosis is None or diagnosis.extended is None or diagnosis.verdict not in CAUSES_NAMED:
-        return list(earlier)
-    said = Message("way.inverse-extended")
-    told = [replace(one, level="info") if one.code in EXPLAINED else one for one in earlier]
-    return [Finding(one.code, "info", said) if one.code in WANT_OF_A_CAUSE else one for one in told]
+        return list(identified)
+    lacking = Message("way.inverse-extended")
+    return [
+        one if one.code in OF_THE_DATA else Finding(one.code, "info", lacking if one.level == "error" else one.said)
+        for one in identified
+    ]
 
 
 def _gathered(
@@ -149,13 +144,14 @@ def _gathered(
     diagnosis: DiagnosisPart | None,
 ) -> list[FindingPart]:
     """Findings of all stages in their order, each fault told once."""
-    earlier = [
-        *specimen.findings,
-        *traces.findings,
-        *photo_findings(traces.photos),
-        *without_advice(parts.findings, diagnosis),
-    ]
-    found = unique([*without_those_told_better(earlier, diagnosed), *diagnosed])
+    photos, identified = photo_findings(traces.photos), without_advice(parts.findings, diagnosis)
+    if traces.photos and all(isinstance(photo, Rejected) for photo in traces.photos):
+        # that is why nothing is measured, not what both ways lack for it
+        photos, identified = [replace(one, level="error") for one in photos], []
+    if any(one.code in OF_NO_CABLE for one in (*specimen.findings, *diagnosed)):  # what follows from it is no warning
+        identified = [replace(one, level="info") for one in identified]
+    earlier = [*specimen.findings, *traces.findings, *photos, *identified]
+    found = dict.fromkeys([*without_those_told_better(earlier, diagnosed), *diagnosed])  # two may have seen the same
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 
 
@@ -189,15 +185,11 @@ def photo_findings(photos: Iterable[Centerline | Rejected]) -> list[Finding]:
     )
 
 
-def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings in their order, each once: two stages may have seen the same thing."""
-    return list(dict.fromkeys(findings))
-
-
 TOLD_BETTER = {
     "photo/doubled": {"photo/doubled"},
     "log/unit": {"scale/displacement"},
     "length/traced": {"scale/length", "identify/length", "identify/scale"},
+    "length/other-cable": {"scale/length", "identify/length", "identify/scale"},
 }
 """Faults of the data, and findings by which other rooms noticed the same without knowing what it is."""
 
@@ -206,6 +198,13 @@ def without_those_told_better(earlier: Iterable[Finding], faults: Iterable[Findi
     """Earlier findings but for those that are told as faults."""
     named = set[str]().union(*(TOLD_BETTER.get(finding.code, set()) for finding in faults))
     return [finding for finding in earlier if finding.code not in named]
+
+
+MEASURED = (
+    *("chord_m", "chord_std_m", "traced_length_m", "traced_length_std_m", "width_m", "width_std_m"),
+    *("left_px", "right_px", "mirrored"),
+)
+"""Of a centerline, as the result keeps it."""
 
 
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
@@ -224,32 +223,18 @@ def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: P
             preview=_preview_part(photo.preview),
         )
     shape = photo.shape
-    fitted = {} if residual is None else asdict(residual)
+    along = {"s_m": shape.s, "x_m": shape.x, "y_m": shape.y, "theta_rad": shape.theta, "kappa_per_m": shape.kappa}
+    along |= {"u_px": photo.u_px, "v_px": photo.v_px, "kappa_std_per_m": photo.kappa_std}
     return PhotoPart(
         image=image,
         step=step.step,
         status="traced",
-        chord_m=photo.chord_m,
-        chord_std_m=photo.chord_std_m,
-        traced_length_m=photo.traced_length_m,
-        traced_length_std_m=photo.traced_length_std_m,
-        width_m=photo.width_m,
-        width_std_m=photo.width_std_m,
-        left_px=photo.left_px,
-        right_px=photo.right_px,
-        mirrored=photo.mirrored,
-        s_m=listed(shape.s),
-        x_m=listed(shape.x),
-        y_m=listed(shape.y),
-        u_px=listed(photo.u_px),
-        v_px=listed(photo.v_px),
-        theta_rad=listed(shape.theta),
-        kappa_per_m=listed(shape.kappa),
-        kappa_std_per_m=listed(photo.kappa_std),
-        seen=[bool(seen) for seen in shape.seen],
+        **{name: getattr(photo, name) for name in MEASURED},
+        **{name: digits(values, SIGNIFICANT_DIGITS) for name, values in along.items()},
+        seen=shape.seen.tolist(),
         quality={name: float(value) for name, value in photo.quality.items()},
         preview=_preview_part(photo.preview),
-        **fitted,
+        **({} if residual is None else asdict(residual)),
     )
 
 

@@ -27,16 +27,19 @@ from pipeline.messages import Message
 from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import Result, Visited, leading
 from pipeline.result.visited import html_table
-from pipeline.settings.compare import CompareSettings
 
 Array = NDArray[np.float64]
 
 # Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it; besides them the
 # one that comes before all its numbers.
 DOUBTS = ("identify/scale", "identify/length", "identify/misfit-shape", "identify/misfit-force", "length/traced")
-# Misfit of the base model is no doubt about the answer of an extended one.
-EXPLAINED = ("identify/misfit-shape", "identify/misfit-force")
 TESTS = 2
+
+LEAST_OVERLAP = 0.5
+"""Share of the larger visited range; below it most of a curve is not compared."""
+
+OTHER_LENGTH = 0.02
+"""Relative; lengths that differ by more are another set-up: covers and rigid ends then weigh differently."""
 
 
 @dataclass(frozen=True)
@@ -108,23 +111,23 @@ class Comparison:
         return html_table(f"{self.a} and {self.b}", rows)
 
 
-def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) -> Comparison:
+def compare(a: Result, b: Result, *, level: float = 0.05) -> Comparison:
     """Compare two results that were measured apart.
 
     Parameters
     ----------
     a, b : Result
-    settings : CompareSettings, optional
+    level : float
+        Of both tests together, of f_EI and of K0: one false difference in twenty.
 
     Returns
     -------
     Comparison
         ``not comparable`` where a characteristic is missing or not usable, or no curvature was visited by both.
     """
-    settings = settings or CompareSettings()
     one, two = a.answer.curve, b.answer.curve
     names = (a.specimen.id, b.specimen.id)
-    nothing = partial(Comparison, *names, verdict="not comparable", level=settings.level)
+    nothing = partial(Comparison, *names, verdict="not comparable", level=level)
     if one is None or two is None:
         lacking = [r.specimen.id for r, curve in ((a, one), (b, two)) if curve is None]
         return nothing(methods=("", ""), said=Message("comparison.no-curve", names=lacking))
@@ -149,7 +152,7 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
     apart = float(np.hypot(one.pre_curvature_std, two.pre_curvature_std))
     rest = _difference(one.pre_curvature, two.pre_curvature, apart)
     mean = _mean(first, second, grid, bands)
-    verdict, said = _verdict(names, p, rest, mean, ratio, settings)
+    verdict, said = _verdict(names, p, rest, mean, ratio, level)
     return Comparison(
         *names,
         methods=methods,
@@ -164,8 +167,8 @@ def compare(a: Result, b: Result, *, settings: CompareSettings | None = None) ->
         mean_stiffness=mean,
         p_characteristic=p,
         pre_curvature=rest,
-        level=settings.level,
-        findings=tuple(_findings(a, b, (one, two), mean, settings)),
+        level=level,
+        findings=tuple(_findings(a, b, (one, two), mean)),
     )
 
 
@@ -190,16 +193,16 @@ def _difference(a: float, b: float, std: float) -> Difference:
 
 
 def _verdict(
-    names: tuple[str, str], p: float | None, rest: Difference, mean: Difference, ratio: Array, settings: CompareSettings
+    names: tuple[str, str], p: float | None, rest: Difference, mean: Difference, ratio: Array, level: float
 ) -> tuple[str, Message]:
     """Verdict and statement, by the p of the whole curves (None where it is not known), K0 and the mean stiffness."""
     sizes = {"rms": np.sqrt(np.mean((ratio - 1.0) ** 2)), "most": np.max(np.abs(ratio - 1.0))}
     if p is None:
         return "not comparable", Message("comparison.no-covariance", **sizes)
     seen = []
-    if min(1.0, TESTS * p) < settings.level:
+    if min(1.0, TESTS * p) < level:
         seen.append(Message("comparison.curve", p=p, stiffer=names[mean.difference > 0.0]))
-    if min(1.0, TESTS * rest.p_value) < settings.level:
+    if min(1.0, TESTS * rest.p_value) < level:
         seen.append(Message("comparison.rest", by_per_m=(rest.difference, rest.std), p=rest.p_value))
     if seen:
         return "differ", Message("comparison.differ", seen=seen, a=names[0], b=names[1], **sizes)
@@ -207,25 +210,21 @@ def _verdict(
     return "no difference seen", Message("comparison.alike", p=p, least=least, a=names[0], b=names[1], **sizes)
 
 
-def _findings(
-    a: Result, b: Result, curves: tuple[Visited, Visited], mean: Difference, settings: CompareSettings
-) -> Iterator[Finding]:
+def _findings(a: Result, b: Result, curves: tuple[Visited, Visited], mean: Difference) -> Iterator[Finding]:
     """What makes the comparison doubtful."""
     yield from _scale_findings(a, b, mean)
     lengths = [r.specimen.length_m for r in (a, b) if r.specimen.length_m is not None]
-    if len(lengths) == len(curves) and max(lengths) > (1.0 + settings.length_relative) * min(lengths):
+    if len(lengths) == len(curves) and max(lengths) > (1.0 + OTHER_LENGTH) * min(lengths):
         yield doubtful("compare/length", lengths_m=[Message("length", value_m=length) for length in lengths])
     spans = [float(c.kappa[-1] - c.kappa[0]) for c in curves]
     common = min(float(c.kappa[-1]) for c in curves) - max(float(c.kappa[0]) for c in curves)
-    if common < settings.least_overlap * max(spans):
+    if common < LEAST_OVERLAP * max(spans):
         yield doubtful("compare/range", share=common / max(spans))
     if curves[0].method != curves[1].method:
         yield doubtful("compare/method", a=curves[0].method, b=curves[1].method)
     for result in (a, b):
-        settled = EXPLAINED if result.diagnosis is not None and result.diagnosis.extended is not None else ()
         fault = leading(result.findings)
-        noticed = [f for f in result.findings if f is fault or (f.code in DOUBTS and f.code not in settled)]
-        doubts = [f.said for f in noticed]
+        doubts = [f.said for f in result.findings if f is fault or (f.code in DOUBTS and f.level != "info")]
         if result.diagnosis is not None and result.diagnosis.verdict == "unexplained":
             doubts.append(Message("compare/doubt.unexplained"))
         if doubts:

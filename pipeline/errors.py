@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
-from pipeline.messages import Message, free_text, printable, shortened
+from pipeline.messages import Message, printable
 
 Given = ParamSpec("Given")
 Read = TypeVar("Read")
@@ -22,37 +22,31 @@ class InputError(Exception):
 
     Parameters
     ----------
-    said : Message or str
-        What is wrong and what to do; as a text what is wrong, without the path and without a final full stop.
+    said : Message
+        What is wrong and what to do; each code has a folder in ``fixtures/broken``.
     path : Path or str or None
         The file or folder.
     line : int or None
         Line of the file, from 1.
-    code : str
-        Stable code such as ``toml/unknown-key``, that of the message by default; each has a folder in
-        ``fixtures/broken``.
-    remedy : str
-        Beside a text: what to do, as an order: "rename it to length_mm".
     others : tuple of InputError
         What else is wrong with the same specimen.
     """
 
     def __init__(
         self,
-        said: Message | str,
+        said: Message,
         *,
         path: Path | str | None = None,
         line: int | None = None,
-        code: str = "",
-        remedy: str = "",
         others: tuple[InputError, ...] = (),
     ) -> None:
-        self.said = free_text(f"{shortened(said)}; {shortened(remedy)}") if isinstance(said, str) else said
-        self.message, self.remedy = (said, remedy) if isinstance(said, str) else (said.parts()[0], said.parts()[-1])
-        self.path, self.line, self.code, self.others = path, line, code or self.said.code, others
-        self._said = said
-        self._given: dict[str, Any] = {"path": path, "line": line, "code": code, "remedy": remedy}
+        self.said, self.path, self.line, self.others = said, path, line, others
         super().__init__(self.sentence)
+
+    @property
+    def code(self) -> str:
+        """Stable code of what is wrong, such as ``toml/unknown-key``."""
+        return self.said.code
 
     @property
     def placed(self) -> Message:
@@ -68,7 +62,7 @@ class InputError(Exception):
         return printable(str(self.placed))
 
     def __reduce__(self) -> tuple[object, ...]:  # keyword-only arguments survive the way back from a worker process
-        return partial(InputError, **self._given, others=self.others), (self._said,)
+        return partial(InputError, path=self.path, line=self.line, others=self.others), (self.said,)
 
 
 class Complaints:

@@ -20,7 +20,7 @@ Signs and units: chord frame, SI; force positive in compression; displacement po
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -33,7 +33,6 @@ from pipeline.records import Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
-from pipeline.settings.predict import PredictSettings
 from pipeline.units import quantity
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
@@ -42,22 +41,16 @@ from rod.sensitivity import derivatives
 Array = NDArray[np.float64]
 Status = Literal["predicted", "extrapolated", "refused", "no equilibrium"]
 
-# Arrays of a predicted step along the cable.
-PREDICTED = (
-    "s_m",
-    "x_m",
-    "x_std_m",
-    "y_m",
-    "y_std_m",
-    "theta_rad",
-    "theta_std_rad",
-    "kappa_per_m",
-    "kappa_std_per_m",
-)
-
 DIFFERENCE = 0.1
 """Standard deviations of an amount or form by which it is moved to see what that does: within its band, well above
 rounding."""
+
+ELEMENTS = 400
+"""Of the simulated rod; its height is within 1e-6 of the length, a fifth of a good band."""
+
+SLACK = 0.01
+"""Share of the visited range by which a curvature may lie outside it: a repeated step may come out sharper by the noise
+of its photo, and f_EI does not change on that distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +95,10 @@ class PredictedStep:
             return f"{self.status}: {self.reason}"
         bent = f"{quantity(self.force_N, 'N', self.force_std_N)}, bent to {plain(self.kappa_max_per_m or 0.0)} 1/m"
         return f"{bent} ({self.status}: {self.reason})" if self.reason else bent
+
+
+PREDICTED = tuple(one.name for one in fields(PredictedStep) if one.default == ())
+"""Arrays of a predicted step along the cable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +146,7 @@ def predict(
     length_m: float | None = None,
     zero: Zero = "natural",
     extrapolate: bool = False,
-    settings: PredictSettings | None = None,
+    elements: int = ELEMENTS,
 ) -> Prediction | None:
     """Forces and shapes of a new experiment by the identified model.
 
@@ -164,7 +161,8 @@ def predict(
         Displacement is counted from the mounted, force-free cable, or from the chord that equals the length.
     extrapolate : bool
         Compute steps beyond the visited range too, marked ``extrapolated``, instead of refusing them.
-    settings : PredictSettings, optional
+    elements : int
+        Of the simulated rod.
 
     Returns
     -------
@@ -177,7 +175,6 @@ def predict(
         For no displacement, one that is not finite or as long as the cable, a length of no cable, a result that is not
         usable, or one whose numbers are none of a cable.
     """
-    settings = settings or PredictSettings()
     length = result.specimen.length_m if length_m is None else length_m
     if not len(displacements_m) or not np.all(np.isfinite(displacements_m)):
         raise ValueError(Message("misuse.displacements"))
@@ -189,8 +186,8 @@ def predict(
     if length is None:
         raise ValueError(Message("cli.no-length"))
     _check_sizes(length, displacements_m, model)
-    test = model.bending_test(length, zero=zero, elements=settings.elements)
-    steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate, settings)
+    test = model.bending_test(length, zero=zero, elements=elements)
+    steps = _steps(test, model, [float(d) for d in displacements_m], extrapolate)
     limit = reachable(test, model) if any(step.status != "predicted" for step in steps) else None
     return Prediction(
         specimen=result.specimen.id,
@@ -236,39 +233,32 @@ def reachable(test: BendingTest, model: IdentifiedModel) -> float | None:
 
 
 def _steps(
-    test: BendingTest, model: IdentifiedModel, displacements: list[float], extrapolate: bool, settings: PredictSettings
+    test: BendingTest, model: IdentifiedModel, displacements: list[float], extrapolate: bool
 ) -> tuple[PredictedStep, ...]:
     """All steps; where the cable remembers, those after one that cannot be predicted cannot either."""
     if not model.remembers:
         paths = [simulate(test, [d], branch="up") for d in displacements]
-        return tuple(
-            _step(test, model, path, d, extrapolate, settings) for path, d in zip(paths, displacements, strict=True)
-        )
+        return tuple(_step(test, model, path, d, extrapolate) for path, d in zip(paths, displacements, strict=True))
     whole, steps, lost = simulate(test, displacements, branch="up"), [], None
     for count, displacement in enumerate(displacements, start=1):
         if lost:
             steps.append(PredictedStep(displacement, "refused", lost))
             continue
-        steps.append(_step(test, model, whole[:count], displacement, extrapolate, settings))
+        steps.append(_step(test, model, whole[:count], displacement, extrapolate))
         if steps[-1].force_N is None:
             lost = Message("prediction.lost", displacement_m=displacement)
     return tuple(steps)
 
 
 def _step(
-    test: BendingTest,
-    model: IdentifiedModel,
-    path: tuple[Equilibrium, ...],
-    displacement: float,
-    extrapolate: bool,
-    settings: PredictSettings,
+    test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...], displacement: float, extrapolate: bool
 ) -> PredictedStep:
     """The last step of a path."""
     step = path[-1]
     if not step.good:
         return PredictedStep(displacement, "no equilibrium", ended(step.outcome))
     (low, high), sharpest = model.visited, float(step.kappa.max())
-    slack = settings.range_slack * (high - low)
+    slack = SLACK * (high - low)
     status: Status = "predicted"
     said = None
     if sharpest > high + slack or step.kappa.min() < min(low, float(test.rod.section.pre_curvature.min())) - slack:
@@ -285,6 +275,12 @@ def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
     if step.status != "no equilibrium" or limit is None or step.displacement_m <= limit:
         return step
     return replace(step, status="refused", said=Message("prediction.unknown"))
+
+
+ALONG = {"x": "m", "y": "m", "theta": "rad", "kappa": "per_m"}
+"""What of an equilibrium has a band along the cable, and its unit."""
+
+BANDED = ("force", *ALONG)
 
 
 def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> PredictedStep:
@@ -307,14 +303,8 @@ def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibri
         force_std_N=float(std("force")),
         kappa_max_per_m=float(step.kappa.max()),
         s_m=step.s.tolist(),
-        x_m=step.x.tolist(),
-        x_std_m=std("x").tolist(),
-        y_m=step.y.tolist(),
-        y_std_m=std("y").tolist(),
-        theta_rad=step.theta.tolist(),
-        theta_std_rad=std("theta").tolist(),
-        kappa_per_m=step.kappa.tolist(),
-        kappa_std_per_m=std("kappa").tolist(),
+        **{f"{name}_{unit}": getattr(step, name).tolist() for name, unit in ALONG.items()},
+        **{f"{name}_std_{unit}": std(name).tolist() for name, unit in ALONG.items()},
     )
 
 
@@ -336,10 +326,6 @@ def _by_causes(
         if rows:
             found.append((np.array(rows), {name: np.stack([c[name] for c in columns], axis=-1) for name in BANDED}))
     return found
-
-
-BANDED = ("force", "x", "y", "theta", "kappa")
-"""What of an equilibrium has a band."""
 
 
 def _again(

@@ -54,6 +54,11 @@ def doubtful(key: str, /, **values: object) -> Finding:
     return Finding(said.code, "warning", said)
 
 
+def failed(key: str, /, **values: object) -> Finding:
+    """Something that makes the numbers none of the cable's, or without which there are none."""
+    return replace(doubtful(key, **values), level="error")
+
+
 def said_once(noticed: Iterable[tuple[str, Finding]]) -> list[Finding]:
     """What was noticed on photos, each beside the photo's name; what is the same on several is one sentence."""
     groups: dict[str, list[tuple[str, Finding]]] = {}

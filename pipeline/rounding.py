@@ -8,6 +8,7 @@ from 950 it is rounded up to 1000 and keeps two; the value is rounded to the sam
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 # Beyond these powers of ten a fixed-point number is mostly zeros and a reader miscounts them.
 LARGEST_FIXED = 5
@@ -70,6 +71,11 @@ def plain(value: float, digits: int = 3, *, decimal: str = ".", zeros: bool = Fa
         text = text.rstrip("0").rstrip(".") if "." in text and not zeros else text
         return text.replace(".", decimal)
     return f"{fixed(value / 10.0**power, digits - 1, decimal)}·10{_superscript(power)}"
+
+
+def digits(values: Iterable[float], count: int) -> list[float]:
+    """Numbers cut to so many significant digits."""
+    return [float(f"{value:.{count}g}") for value in values]
 
 
 def p_value(value: float, *, decimal: str = ".") -> str:

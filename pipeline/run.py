@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from pipeline.assembly import assemble
@@ -20,6 +21,7 @@ from pipeline.messages import Message
 from pipeline.records import Finding, Specimen
 from pipeline.report.tables import write_result, write_tables
 from pipeline.result import DiagnosisPart, Result
+from pipeline.result.answer import OF_NO_CABLE
 from pipeline.settings import Settings
 from pipeline.vision.series import trace_series
 
@@ -32,6 +34,8 @@ def measure(
     on_stage: Callable[[str], None] = lambda stage: None,
 ) -> Result:
     """Measure one specimen folder.
+
+    Where a fault of the data makes the numbers none of the cable's, nothing is concluded from them: no diagnosis.
 
     Parameters
     ----------
@@ -61,11 +65,16 @@ def measure(
     specimen = in_order(specimen, faults)
     images = {step.step: step.image for step in specimen.steps if step.image is not None}
     identification = identify(faults, images, settings.identify)
+    told = partial(assemble, specimen, traces, settings=settings, command=command)
+    if any(finding.code in OF_NO_CABLE for finding in (*specimen.findings, *faults.findings)):
+        return told(identification, None, findings=faults.findings)
     on_stage("diagnosis")
     diagnosis, findings, found = _diagnosed(faults, identification, settings)
     if found is not faults:
         identification = identify(found, images, settings.identify)
-    return assemble(specimen, traces, identification, diagnosis, findings=findings, settings=settings, command=command)
+    result = told(identification, diagnosis, findings=findings)
+    measured, usable = result.answer.curve is not None, result.answer.usable
+    return told(identification, None, findings=findings) if measured and not usable else result
 
 
 def in_order(specimen: Specimen, faults: Faults) -> Specimen:

@@ -235,12 +235,12 @@ def test_check_measures_nothing_and_says_what_is_wrong(cheap):
     for name in "abc":  # with photos that show a cable
         shutil.rmtree(cheap / "batch" / name)
         shutil.copytree(ROOT / "fixtures/specimens/three", cheap / "batch" / name)
-    done = call("check", "batch")
+    done = call("check", "batch", *IN_PROCESS)
     assert done.exit_code == 0
     assert "3 of 3 specimens would run" in done.stdout
     (cheap / "batch/b/force.csv").write_text("step,displacement_mm,force_N\n1,2,abc\n")
     (cheap / "batch/c/images/step_01.jpg").unlink()
-    done = call("check", "batch", "--json")
+    done = call("check", "batch", "--json", *IN_PROCESS)
     assert done.exit_code == 1
     rows = json.loads(done.stdout)["specimens"]
     assert [row["status"] for row in rows] == ["ok", "error", "warning"]
@@ -281,7 +281,7 @@ def test_all_settings_can_be_written_and_read_back(tmp_path):
 def test_every_setting_says_what_it_is_and_why():
     lines = commented_settings(Settings()).splitlines()
     values = [number for number, line in enumerate(lines) if " = " in line and not line.startswith("# ")]
-    assert len(values) > 50
+    assert len(values) > 40
     assert [lines[number] for number in values if not lines[number - 1].startswith("# ")] == []
 
 
@@ -305,7 +305,7 @@ def test_settings_from_file_and_assignments(tmp_path):
         # integers of 6,000 digits: Python does not write them, be it into a message or into a result
         (f"[intake]\nphotos_max = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "photos_max = ..."),
         (f"intake = 0x{'F' * 5000}\n", "settings/wrong-value", None, "intake = ..."),
-        (f"[intake]\nlength_range_mm = [0x{'F' * 5000}, 1]\n", "settings/wrong-value", None, "..."),
+        (f"[intake]\nmodulus_range_mpa = [0x{'F' * 5000}, 1]\n", "settings/wrong-value", None, "..."),
         (f"[report]\nlanguage = 0x{'F' * 5000}\n", "settings/wrong-value", 2, "language = ..."),
     ],
 )
@@ -372,7 +372,7 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
     deep = cheap / "batch/1/2/3"
     (deep / "empty").mkdir(parents=True)
     (cheap / "b").rename(deep / "b")
-    assert call("check", "batch").stderr == ""
+    assert call("check", "batch", *IN_PROCESS).stderr == ""
     done = call("check", "batch", "--set", "intake.search_depth=3")
     assert done.stderr == (
         "cablebend: folders more than 3 levels below the one given were not searched (2, first batch/1/2/3/b); "
@@ -385,8 +385,9 @@ def test_folders_too_deep_to_be_searched_are_told_in_one_sentence(cheap):
 
 def test_folders_without_description_are_told(cheap):
     (cheap / "batch/b/specimen.toml").unlink()
-    done = call("check", "batch")
+    done = call("check", "batch", *IN_PROCESS)
     assert "batch/b: has photos and a table but no specimen.toml" in done.stderr
     assert "0 of 2 specimens would run" in done.stdout
     (cheap / "batch/b").rename(cheap / "batch/b\x1b[2J")
-    assert "batch/b\\x1b[2J: has photos" in call("check", "batch").stderr  # a name does not command the terminal
+    done = call("check", "batch", *IN_PROCESS)  # a name does not command the terminal
+    assert "batch/b\\x1b[2J: has photos" in done.stderr

@@ -1,5 +1,6 @@
 """What commands say: German where it was asked for, no line wider than the terminal, who is at which stage."""
 
+import json
 import re
 from pathlib import Path
 
@@ -7,12 +8,13 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from pipeline.batch import run_batch
+from pipeline.batch import Tally, run_batch
 from pipeline.cli import main, speech
 from pipeline.cli.design import echo_outlook
 from pipeline.cli.group import COMMANDS
+from pipeline.cli.run import echo_json
 from pipeline.diagnosis.plans.design import Plan, design
-from pipeline.messages import catalogue
+from pipeline.messages import Message, catalogue
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -148,3 +150,11 @@ def test_the_stage_of_each_specimen_is_told(batch, tmp_path):
         on_stage=lambda name, stage: told.append((name, stage)),
     )
     assert sorted(told) == [("a", "reports"), ("b", "reports"), ("c", "reports")]  # of a measurement of one's own
+
+
+def test_what_else_is_to_say_stands_in_the_document_too(tmp_path, capsys):
+    fault = Message("fault.none-of-its-type", times=1000.0, others=3, type="HV 35")
+    tally = Tally(1, ("a",), measured=1, trouble=(Message("cli.outlying", name="a", said=fault),))
+    echo_json(iter([]), tally, tmp_path)
+    (told,) = json.loads(capsys.readouterr().out)["trouble"]
+    assert told.startswith("a: f_EI is 1000 times that of the other 3 specimens")

@@ -1,8 +1,7 @@
 """Many specimens: `pipeline.run` around each folder, in processes of this machine or on a cluster.
 
-`orders` says what is measured and under which name, `specimen` measures one folder and stores it, `engine` hands
-specimens to `processes` of this machine or to a dask `cluster`, `store` owns the folder of results, `batch` puts them
-together.
+`orders` says what is measured and under which name, `specimen` measures one folder and stores it, `batch` hands
+specimens to `processes` of this machine or to a dask `cluster`, `store` owns the folder of results.
 """
 
 from __future__ import annotations

@@ -17,17 +17,17 @@ from collections.abc import Iterator, Sequence
 from distributed import Client, Future, KilledWorker
 
 from pipeline.batch.orders import Order
-from pipeline.batch.specimen import Outcome, Stages, measure_order, store_death
+from pipeline.batch.specimen import ATTEMPTS, Outcome, Stages, measure_order, store_death
 from pipeline.errors import InputError
 from pipeline.messages import Message
-from pipeline.settings.batch import BatchSettings
 
 LOOK_S = 0.2  # between two looks whether Ctrl-C was pressed while nothing ended
+AT_ONCE = 2  # specimens handed out a worker: one is measured, the next waits, memory stays flat
 CONNECT_S = 5.0  # to a scheduler given by its address; those that answer do so within a second
 
 
 def measure_on_cluster(
-    scheduler: str, orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
+    scheduler: str, orders: Sequence[Order], stages: Stages, interrupted: threading.Event
 ) -> Iterator[Outcome]:
     """Measure orders on a dask cluster; outcomes in the order in which they end.
 
@@ -43,7 +43,7 @@ def measure_on_cluster(
     except (OSError, ValueError) as error:
         raise InputError(Message("batch/no-scheduler", address=repr(scheduler))) from error
     with client:
-        yield from _stream(client, orders, settings, stages, interrupted)
+        yield from _stream(client, orders, stages, interrupted)
 
 
 def _next(ended: queue.SimpleQueue[Future[Outcome]], interrupted: threading.Event) -> Future[Outcome]:
@@ -55,9 +55,7 @@ def _next(ended: queue.SimpleQueue[Future[Outcome]], interrupted: threading.Even
             return ended.get(timeout=LOOK_S)
 
 
-def _stream(
-    client: Client, orders: Sequence[Order], settings: BatchSettings, stages: Stages, interrupted: threading.Event
-) -> Iterator[Outcome]:
+def _stream(client: Client, orders: Sequence[Order], stages: Stages, interrupted: threading.Event) -> Iterator[Outcome]:
     """Keep a few orders per worker under way.
 
     Where the scheduler blames an order for workers that died around it, it is handed out again: whether it is to blame
@@ -74,13 +72,13 @@ def _stream(
 
     workers = max(1, sum(client.ncores().values()))
     waiting = iter(orders)
-    for order in itertools.islice(waiting, workers * settings.waiting_per_worker):
+    for order in itertools.islice(waiting, workers * AT_ONCE):
         hand_out(order)
     while doing:
         future = _next(ended, interrupted)
         _, order, started, again = doing.pop(str(future.key))
         trouble = None if future.status == "finished" else future.exception()
-        if isinstance(trouble, KilledWorker) and again < settings.attempts:
+        if isinstance(trouble, KilledWorker) and again < ATTEMPTS:
             hand_out(order, again + 1)
             continue
         following = next(waiting, None)

@@ -146,22 +146,18 @@ def _cores() -> int:
 
 
 def _bytes_per_worker(settings: BatchSettings, count: int) -> float:
-    """Bytes of memory beyond which a worker is ended, before the system ends something else."""
+    """Bytes of memory beyond which a worker is ended, before the system ends something else.
+
+    Of this machine, or of the container it is: as `distributed.system` tells it, which takes half a second and 17 MB of
+    this process to load.
+    """
     if settings.memory_per_worker_gb:
         return 1e9 * settings.memory_per_worker_gb
-    return SHARED * _memory() / count
-
-
-def _memory() -> int:
-    """Bytes of memory of this machine, or of the container it is.
-
-    As `distributed.system` tells it, which takes half a second and 17 MB of this process to load.
-    """
     limits = [int(psutil.virtual_memory().total)]
     for path in CONTAINER:
         with contextlib.suppress(OSError, ValueError):  # not there; "max", which is none
             limits.append(int(path.read_text()))
-    return min(limits)
+    return SHARED * min(limits) / count
 
 
 def _begun(by_value: bytes) -> _Worker:

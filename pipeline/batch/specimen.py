@@ -33,6 +33,8 @@ Doing = Callable[[str], None]
 WriteIndex = Callable[
     [Path, Settings], Iterable[Message] | None
 ]  # what is said on specimens that contradict each other
+ATTEMPTS = 2
+"""Times that a specimen may lose its worker; once may be bad luck with memory, not twice."""
 ENTRY_SCHEMA = "cablebend/entry/1"
 
 
@@ -111,11 +113,11 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
     store = Store(order.out)
     try:
         if guarded:
-            limit = order.settings.batch
-            refused = _earlier_attempts(store, order, limit.attempts, limit.timeout_s)
+            timeout_s = order.settings.batch.timeout_s
+            refused = _earlier_attempts(store, order, timeout_s)
             if refused is not None:
                 return store_failure(order, [refused], started)
-            with deadline(limit.timeout_s, store.overdue(order.name).touch):
+            with deadline(timeout_s, store.overdue(order.name).touch):
                 outcome = _measured(store, order, stages, started, doing)
             store.end(order.name)
             return outcome
@@ -140,12 +142,12 @@ def refusals(error: Exception) -> list[FindingPart]:
     return [FindingPart.of("error", said)]
 
 
-def _earlier_attempts(store: Store, order: Order, attempts: int, timeout_s: float) -> FindingPart | None:
+def _earlier_attempts(store: Store, order: Order, timeout_s: float) -> FindingPart | None:
     """Why a specimen is not tried (again); None if it may be."""
     if store.overdue(order.name).exists():
         return overdue(timeout_s)
-    if store.begin(order.name) >= attempts:
-        return FindingPart.of("error", Message("specimen/worker-died", attempts=attempts))
+    if store.begin(order.name) >= ATTEMPTS:
+        return FindingPart.of("error", Message("specimen/worker-died", attempts=ATTEMPTS))
     return None
 
 

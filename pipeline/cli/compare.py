@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pipeline.cli.options import chosen_settings, language_option, settings_options
+from pipeline.cli.options import language_option
 from pipeline.cli.predict import MISSING, echo_findings
 from pipeline.cli.speech import entry, say, told
 from pipeline.cli.spoken import Spoken
@@ -23,15 +23,13 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True)
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False))
 @language_option
-@settings_options
 @click.pass_context
 def compare(ctx: click.Context, a: Path, b: Path, as_json: bool, out: Path | None) -> None:
     """Say whether the results A and B differ beyond their bands."""
     from pipeline.compare import compare as compared
     from pipeline.result import read_result
 
-    settings = chosen_settings()
-    comparison = compared(read_result(a), read_result(b), settings=settings.compare)
+    comparison = compared(read_result(a), read_result(b))
     if out is not None:
         from pipeline.report.frames import comparison_frame
         from pipeline.report.tables import write_csv

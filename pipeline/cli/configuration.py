@@ -37,7 +37,7 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
         tables = source.tables
         _check_tables(tables, Settings, (), source)
     for assignment in assignments:
-        tables = _assigned(tables, assignment)
+        _assign(tables, assignment)
     try:
         return Settings.model_validate(tables)
     except ValidationError as error:
@@ -86,8 +86,8 @@ def _check_tables(
             _check_tables(value, inner, (*above, name), source)
 
 
-def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
-    """The tables with one value changed."""
+def _assign(tables: dict[str, Any], assignment: str) -> None:
+    """Change one value in the tables."""
     name, equals, text = assignment.partition("=")
     keys = [key.strip() for key in name.split(".")]
     if not equals or len(keys) < 2 or not all(keys):
@@ -100,15 +100,10 @@ def _assigned(tables: dict[str, Any], assignment: str) -> dict[str, Any]:
     for key in reversed(keys[:-1]):
         change = {key: change}
     _check_tables(change, Settings, (), None)
-    return _merged(tables, change)
-
-
-def _merged(tables: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
-    result = dict(tables)
-    for key, value in change.items():
-        old = result.get(key)
-        result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
-    return result
+    inner = tables
+    for key in keys[:-1]:
+        inner[key] = inner = inner[key] if isinstance(inner.get(key), dict) else {}
+    inner[keys[-1]] = value
 
 
 def as_options(file: Path | None, assignments: Sequence[str]) -> str:

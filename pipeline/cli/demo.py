@@ -90,9 +90,8 @@ def _stiffness(way: Visited, truth: dict[str, Any]) -> Iterator[tuple[Message, f
 
 def _shown(value: float, std: float, true: float) -> tuple[str, str, str]:
     """Cells of a row: the measured value with its uncertainty, the truth to the same place, the difference in std."""
-    from pipeline.rounding import fixed, rounded
+    from pipeline.rounding import alike, fixed, rounded
 
     sign = DECIMAL[language()]
-    text = rounded(value, std, decimal=sign)
-    places = len(text.partition(" ")[0].partition(sign)[2])
-    return text, fixed(true, places, sign), f"{fixed((value - true) / std, 1, sign)} σ" if std > 0.0 else ""
+    off = f"{fixed((value - true) / std, 1, sign)} σ" if std > 0.0 else ""
+    return rounded(value, std, decimal=sign), alike(true, std, decimal=sign), off

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import click
@@ -26,6 +25,7 @@ LABEL = re.compile(r"\w[\w ]{,16}: +")
 def explain(name: str | None) -> None:
     """Explain a cause of deviations, or the code of a message."""
     from pipeline.diagnosis.causes import CATALOGUE
+    from pipeline.intake.tomltable import nearest
     from pipeline.report.words import Words, documented_codes
 
     words = Words(language())
@@ -42,10 +42,8 @@ def explain(name: str | None) -> None:
     else:
         meant = words.code(name)
         if meant is None:
-            near = get_close_matches(name, (*causes, *codes), n=1)
-            raise (
-                wrong_use("cli.no-name-near", name=name, near=near[0]) if near else wrong_use("cli.no-name", name=name)
-            )
+            near = nearest(name, (*causes, *codes))
+            raise wrong_use("cli.no-name-near" if near else "cli.no-name", name=name, near=near)
         click.echo("\n".join((name, *map(_line, meant))))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
+from pipeline.cli.options import POSITIVE, language_option
 from pipeline.cli.speech import complaint, entry, note, say, told
 from pipeline.cli.spoken import Spoken, wrong_use
 from pipeline.messages import Message
@@ -40,7 +40,6 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
 @click.option("--json", "as_json", is_flag=True)
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False))
 @language_option
-@settings_options
 @click.pass_context
 def predict(
     ctx: click.Context,
@@ -56,7 +55,6 @@ def predict(
     from pipeline.predict import predict as predicted
     from pipeline.result import read_result
 
-    settings = chosen_settings()
     measured = read_result(result)
     name, answer = measured.specimen.id, measured.answer
     if answer.method is not None and not answer.usable:
@@ -70,7 +68,6 @@ def predict(
             length_m=None if length_mm is None else 1e-3 * length_mm,
             zero=zero,
             extrapolate=extrapolate,
-            settings=settings.predict,
         )
     except ValueError as error:
         raise click.UsageError(complaint(error)) from error

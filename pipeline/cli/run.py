@@ -73,7 +73,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
     """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
     from pipeline.batch.orders import quoted
     from pipeline.intake.access import is_folder
-    from pipeline.intake.folder import find_specimens, find_too_deep, find_undescribed, misnamed
+    from pipeline.intake.folder import find_specimens, find_undescribed, folders_of_kind, misnamed
 
     specimens: dict[Path, None] = {}
     refused = []
@@ -84,7 +84,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
             refused.append(error)
             refuse(error)
     there = [folder for folder in folders if is_folder(folder)]
-    if deep := find_too_deep(there, settings):
+    if deep := folders_of_kind("deep", there, settings):
         note(Message("cli.too-deep", levels=settings.search_depth, count=len(deep), first=deep[0]))
     for folder in find_undescribed(there, settings):
         other = misnamed(folder)
@@ -110,21 +110,20 @@ def exit_code(tally: Tally, refused: int = 0) -> int:
 
 
 def echo_json(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:
-    """One JSON document, written piece by piece so that memory does not grow with the batch."""
+    """One JSON document."""
     keys = ("name", "id", "folder", "status", "headline", "code")
-    click.echo('{"specimens": [', nl=False)
-    for number, stored in enumerate(entries):
-        shown = {key: stored.get(key) for key in keys} | {"usable": stored.get("state") in ("measured", "partial")}
-        click.echo(("" if number == 0 else ",") + "\n " + json.dumps(shown), nl=False)
-    counts = {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused}
-    rest = {
-        "counts": counts,
+    document = {
+        "specimens": [
+            {key: stored.get(key) for key in keys} | {"usable": stored.get("state") in ("measured", "partial")}
+            for stored in entries
+        ],
+        "counts": {"total": tally.total, "measured": tally.measured, "failed": tally.failed, "kept": tally.reused},
         "unusable": tally.unusable,
         "interrupted": tally.interrupted,
         "out": str(out),
-        "trouble": list(tally.trouble),
+        "trouble": list(map(str, tally.trouble)),
     }
-    click.echo("],\n " + json.dumps(rest)[1:])
+    click.echo(json.dumps(document, indent=1))
 
 
 def echo_table(entries: Iterator[dict[str, Any]], tally: Tally, out: Path) -> None:

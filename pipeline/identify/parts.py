@@ -79,16 +79,16 @@ def curve(way: Estimate | BalanceGraph) -> Curve | None:
     root = np.sqrt(values[keep])
     factor = law.tangent[:, None] * vectors[:, keep] * root
     return Curve(
-        kappa_per_m=_list(law.kappa),
-        moment_Nm=_list(law.moment),
-        moment_std_Nm=_list(law.moment_std),
-        tangent_Nm2=_list(law.tangent),
-        tangent_std_Nm2=_list(law.tangent_std),
-        secant_Nm2=_list(law.secant),
-        secant_std_Nm2=_list(law.secant_std),
+        kappa_per_m=law.kappa.tolist(),
+        moment_Nm=law.moment.tolist(),
+        moment_std_Nm=law.moment_std.tolist(),
+        tangent_Nm2=law.tangent.tolist(),
+        tangent_std_Nm2=law.tangent_std.tolist(),
+        secant_Nm2=law.secant.tolist(),
+        secant_std_Nm2=law.secant_std.tolist(),
         supported=[True] * law.kappa.size,
-        tangent_factor_Nm2=[_list(row) for row in factor],
-        pre_curvature_factor_per_m=_list(vectors[:, keep].T @ law.rest_covariance / root),
+        tangent_factor_Nm2=factor.tolist(),
+        pre_curvature_factor_per_m=(vectors[:, keep].T @ law.rest_covariance / root).tolist(),
     )
 
 
@@ -127,31 +127,20 @@ def _readings(law: MeasuredLaw, fitted: FreeLaw) -> list[KnotPart]:
 
 def misfit_part(way: Estimate) -> MisfitPart | None:
     """Residuals in units and in sigma; None without a fit."""
-    observation, fitted, test = way.observation, way.fitted, way.test
-    if observation is None or fitted is None or test is None or fitted.run.prediction is None:
+    observation, fitted = way.observation, way.fitted
+    if observation is None or fitted is None or fitted.run.prediction is None:
         return None
     holds = zip(observation.forces, fitted.run.prediction.samples, strict=True)
     forces = [float(np.mean(data - model[: len(data)])) for data, model in holds if len(data)]
-    distances, bends = [], []
-    for photo in observation.photos:
-        if (shape := test.steps[photo.step].shape) is not None:
-            distances.append(photo_fit(observation, fitted, photo, photo.sections).distance)
-            bends.append((shape.kappa - photo_fit(observation, fitted, photo, shape).kappa)[shape.seen])
-    by_block = {
-        f"{kind}/{step.step}": found
-        for i, step in enumerate(test.steps)
-        for kind in KINDS[:-1]
-        if (found := way.chi2(kind, i))[1]
-    }
+    distances = [photo_fit(observation, fitted, photo, photo.sections).distance for photo in observation.photos]
+    kinds = [way.chi2(kind) for kind in KINDS[:-1]]
     base = fitted.extension.base
     return MisfitPart(
         force_rmse_N=_rms(np.array(forces)),
         shape_rmse_m=_rms(np.concatenate(distances)) if distances else 0.0,
-        curvature_rmse_per_m=_rms(np.concatenate(bends)) if bends else None,
-        chi2=sum(chi2 for chi2, _ in by_block.values()),
+        chi2=sum(chi2 for chi2, _ in kinds),
         # each prior adds a row and takes an unknown; law and K0 are what the data pay
-        degrees_of_freedom=sum(n for _, n in by_block.values()) - base.law.size - 1,
-        chi2_by_block=by_block,
+        degrees_of_freedom=sum(n for _, n in kinds) - base.law.size - 1,
     )
 
 
@@ -166,7 +155,7 @@ def balance_part(way: BalanceGraph) -> BalancePart:
             kappa, ratio = pointwise_graph(points.step)
             good = np.isfinite(ratio)
             pointwise.append(
-                PointwisePart(step=points.step.step, kappa_per_m=_list(kappa[good]), tangent_Nm2=_list(ratio[good]))
+                PointwisePart(step=points.step.step, kappa_per_m=kappa[good].tolist(), tangent_Nm2=ratio[good].tolist())
             )
     return BalancePart(
         **BalancePart.ending(way.outcome),
@@ -174,8 +163,8 @@ def balance_part(way: BalanceGraph) -> BalancePart:
         pre_curvature_std_per_m=law.pre_curvature_std,
         supported_per_m=(float(law.kappa[0]), float(law.kappa[-1])),
         curve=curve(way),
-        points_kappa_per_m=_list(np.concatenate([p.kappa[p.seen][::POINTS] for p in way.points])),
-        points_moment_Nm=_list(np.concatenate([p.moment[p.seen][::POINTS] for p in way.points])),
+        points_kappa_per_m=np.concatenate([p.kappa[p.seen][::POINTS] for p in way.points]).tolist(),
+        points_moment_Nm=np.concatenate([p.moment[p.seen][::POINTS] for p in way.points]).tolist(),
         pointwise=pointwise,
         checks=way.checks,
     )
@@ -230,13 +219,9 @@ def _photos(way: Estimate) -> dict[int, PhotoResidual]:
         variance = np.einsum("ip,pq,iq->i", shape.basis_normal, shape.covariance, shape.basis_normal)
         at = photo_fit(observation, fitted, photo, shape)
         std = np.sqrt(np.maximum(variance, 0.0))
-        found[step.step] = PhotoResidual(_list(at.kappa), _list(at.distance), _list(std))
+        found[step.step] = PhotoResidual(at.kappa.tolist(), at.distance.tolist(), std.tolist())
     return found
 
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
-def _list(values: Array) -> list[float]:
-    return [float(v) for v in values]

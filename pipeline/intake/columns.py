@@ -15,7 +15,6 @@ from pipeline.errors import InputError
 from pipeline.intake.dialect import SEPARATORS, Rows, column_names, head_rows, looks_like_number
 from pipeline.intake.specimenfile import MEASURED, ROLES, LogSpec
 from pipeline.messages import Message
-from pipeline.settings.intake import IntakeSettings
 
 UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "mN": 1e-3, "cN": 1e-2, "daN": 10.0, "kN": 1e3, "MN": 1e6, "µN": 1e-6, "uN": 1e-6}
@@ -58,6 +57,9 @@ UNIT_IN_NAME = re.compile(
 UNIT_AS_SUFFIX = re.compile(r"(?P<base>.*\S)[_\s](?P<unit>[^_\s]+)")
 NO_UNIT = ("", "-", "1", "--")
 
+HEAD = 300
+"""Lines among which the header is looked for; the metadata blocks of testing machines have up to about 100."""
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -78,7 +80,7 @@ class Columns:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettings) -> tuple[Columns, Rows]:
+def find_columns(text: str, spec: LogSpec, *, path: Path) -> tuple[Columns, Rows]:
     """Find the separator, the header and the meaning of the columns.
 
     Parameters
@@ -99,7 +101,7 @@ def find_columns(text: str, spec: LogSpec, *, path: Path, settings: IntakeSettin
         ``log/empty``, ``log/no-header``, ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
     """
     separators = (spec.separator,) if spec.separator else SEPARATORS
-    heads = {separator: head_rows(text, separator, settings.header_search_lines) for separator in separators}
+    heads = {separator: head_rows(text, separator, HEAD) for separator in separators}
     best: tuple[int, int, str] | None = None
     for separator, head in heads.items():
         if not head:

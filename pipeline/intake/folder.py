@@ -11,6 +11,7 @@ import math
 import os
 import stat
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +21,7 @@ from pipeline.intake.forcelog import read_force_log
 from pipeline.intake.photohints import obeyed
 from pipeline.intake.photos import NO_PHOTO, checked_photo, list_photos, match_photos, natural_key, no_photos
 from pipeline.intake.plausibility import size_findings
-from pipeline.intake.specimenfile import NAME, LogSpec, SpecimenFile, asked_of_log, described, read_source
+from pipeline.intake.specimenfile import NAME, LogSpec, asked_of_log, described, read_source
 from pipeline.intake.tomltable import TomlFile
 from pipeline.messages import Message
 from pipeline.records import Finding, Specimen, inferred
@@ -47,7 +48,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     found: dict[Path, None] = {}
     for path in paths:
         _check_folder(path)
-        here = _of_kind("specimen", [path], settings)
+        here = folders_of_kind("specimen", [path], settings)
         if not here:
             other = misnamed(path)
             if other is not None:
@@ -80,16 +81,11 @@ def misnamed(folder: Path) -> InputError | None:
 
 def find_undescribed(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
     """Folders that hold photos and a table but no ``specimen.toml``: specimens somebody forgot to describe."""
-    return [folder for folder in _of_kind("none", paths, settings) if _looks_like_one(folder, settings)]
+    return [folder for folder in folders_of_kind("none", paths, settings) if _looks_like_one(folder, settings)]
 
 
-def find_too_deep(paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
-    """Folders so far below the given ones that they are not searched."""
-    return _of_kind("deep", paths, settings)
-
-
-def _of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
-    """Folders of one kind among and below the given ones, without doubles."""
+def folders_of_kind(kind: Kind, paths: Iterable[Path], settings: IntakeSettings) -> list[Path]:
+    """Folders of one kind among and below the given ones, without doubles; ``deep`` ones are not searched."""
     searched = (step for path in paths for step in _search(path, set(), settings.search_depth))
     return list(dict.fromkeys(folder for folder, found in searched if found == kind))
 
@@ -175,7 +171,7 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     source = wrong.kept(read_source, folder, settings)
     file = wrong.kept(described, source, folder, settings) if source else None
     # what is wrong with it is told with the rest of the description
-    asked = file.log if file else Complaints().kept(asked_of_log, source, settings) if source else None
+    asked = Complaints().kept(asked_of_log, source) if source else None
     place = wrong.kept(_log_path, folder, asked, source, settings) if source and asked else None
     length = file.length_m if file else math.inf
     log = wrong.kept(read_force_log, place[0], asked, settings, length) if place and asked else None
@@ -189,7 +185,7 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
         )
     elif not list_photos(folder, without=calibration, settings=settings):
         wrong.note(no_photos(folder, settings))
-    calibrating = wrong.kept(_calibration_photos, folder, file, settings) if file else None
+    calibrating = wrong.kept(_calibration_photos, folder, calibration, source, settings) if source else None
     wrong.settle()
     assert file and place and log and photos and calibrating
     (log_path, noted), (calibrated, doubts) = place, calibrating
@@ -197,19 +193,12 @@ def _specimen(folder: Path, settings: IntakeSettings) -> Specimen:
     scale = file.camera.scale_px_per_m
     sizes = size_findings(file.length_m, file.diameter_m, photos.steps, scale_px_per_m=scale, settings=settings)
     names = {NAME: folder / NAME, log_path.relative_to(folder).as_posix(): log_path}
-    return Specimen(
-        id=file.id,
-        folder=folder,
-        length_m=file.length_m,
-        diameter_m=file.diameter_m,
-        camera=file.camera,
-        rig=file.rig,
+    return replace(
+        file,
         steps=steps,
         images=photos.paths,
-        description=file.description,
         findings=(*noted, *log.findings, *photos.findings, *hinted, *doubts, *sizes),
         hashes={name: sha256(path) for name, path in names.items()} | photos.hashes | calibrated,
-        hints=file.hints,
     )
 
 
@@ -242,7 +231,7 @@ def candidate_logs(folder: Path) -> list[str]:
 
 
 def _calibration_photos(
-    folder: Path, file: SpecimenFile, settings: IntakeSettings
+    folder: Path, place: Path | None, source: TomlFile, settings: IntakeSettings
 ) -> tuple[dict[str, str], list[Finding]]:
     """Hashes of the calibration photos, and what is wrong with some of them.
 
@@ -251,12 +240,11 @@ def _calibration_photos(
     InputError
         ``camera/no-calibration-photos``, ``file/outside``.
     """
-    place = file.camera.calibration
     if place is None:
         return {}, []
     names = list_photos(place, without=None, settings=settings)
     if not names:
-        raise file.source.error(Message("camera/no-calibration-photos"), table="camera", key="calibration")
+        raise source.error(Message("camera/no-calibration-photos"), table="camera", key="calibration")
     hashes: dict[str, str] = {}
     findings: list[Finding] = []
     for name in names:

@@ -56,10 +56,10 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: 
     text, encoding = decode(
         read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
     )
-    columns, rows = find_columns(text, spec, path=path, settings=settings)
-    samples, columns = read_samples(rows, columns, spec, path=path, settings=settings, length=length)
+    columns, rows = find_columns(text, spec, path=path)
+    samples, columns = read_samples(rows, columns, spec, path=path, length=length)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
-    check_response(steps, path=path, settings=settings)
+    check_response(steps, path=path)
     return ForceLog(steps, (*_reading(columns, encoding, path), *samples.findings, *findings))
 
 

@@ -21,6 +21,12 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.settings.intake import IntakeSettings
 
+HIGHEST_DEGREE = 4
+"""Of the polynomial in time; relaxation over a hold is followed to 1 % by it."""
+
+LEVEL = 0.01
+"""Significance at which the holds together ask for one degree more: few false ones."""
+
 
 @dataclass(frozen=True)
 class Hold:
@@ -62,7 +68,7 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
     floor = max(
         resolution / math.sqrt(12.0), 1e-9 * largest, 1e-12
     )  # the last two: a log of zeros or of endless digits
-    degree = _degree(holds, settings)
+    degree = _degree(holds)
     fits = [_Fit.of(hold, degree) for hold in holds]
     freedom = sum(fit.freedom for fit in fits)
     if freedom == 0:
@@ -122,18 +128,16 @@ def _possible(hold: Hold, degree: int) -> int:
     return max(0, min(degree, len(hold.times) - 3, len(np.unique(hold.times)) - 2))
 
 
-def _degree(holds: Sequence[Hold], settings: IntakeSettings) -> int:
+def _degree(holds: Sequence[Hold]) -> int:
     """The lowest degree to which neither one nor two more degrees add significantly, over all holds."""
-    highest = settings.trend_degree_max + 2
+    highest = HIGHEST_DEGREE + 2
     rss = np.sum([_left_squares(hold, highest) for hold in holds], axis=0)
     freedom = [sum(len(h.times) - 1 - _possible(h, degree) for h in holds) for degree in range(highest + 1)]
-    for degree in range(settings.trend_degree_max):
+    for degree in range(HIGHEST_DEGREE):
         steps = (degree + 1, degree + 2)
-        if all(
-            _p_value(rss[degree], freedom[degree], rss[more], freedom[more]) > settings.trend_level for more in steps
-        ):
+        if all(_p_value(rss[degree], freedom[degree], rss[more], freedom[more]) > LEVEL for more in steps):
             return degree
-    return settings.trend_degree_max
+    return HIGHEST_DEGREE
 
 
 def _left_squares(hold: Hold, highest: int) -> Array:

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.settings.intake import IntakeSettings
 
 MEDIAN_OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal number."""
@@ -31,6 +30,13 @@ still on its way (of noise alone one in 370)."""
 MOVED = 5.0
 """Standard deviations: a photo whose sample lies further from the middle of its hold was taken elsewhere."""
 
+LEAST_CHANGES = 8
+"""From sample to sample, over all holds; fewer tell the scatter of the displacement worse than to a third."""
+
+WANDER = 1.5
+"""Times the scatter from sample to sample: a hold whose samples lie wider about their median moves, and only the sample
+at the photo says where the bearing stood."""
+
 
 @dataclass(frozen=True)
 class HoldPlaces:
@@ -41,9 +47,7 @@ class HoldPlaces:
     sigma: float
 
 
-def hold_places(
-    holds: Sequence[Array], at_photo: Sequence[NDArray[np.bool_]], *, settings: IntakeSettings
-) -> HoldPlaces:
+def hold_places(holds: Sequence[Array], at_photo: Sequence[NDArray[np.bool_]]) -> HoldPlaces:
     """Displacements at the times of the photos.
 
     Parameters
@@ -52,7 +56,6 @@ def hold_places(
         Samples of each hold; at least one.
     at_photo : sequence of (n,) bool
         Those that name the photo; none if the log does not say which.
-    settings : IntakeSettings
 
     Returns
     -------
@@ -61,21 +64,21 @@ def hold_places(
     """
     own = [float(np.median(hold[photo] if photo.any() else hold)) for hold, photo in zip(holds, at_photo, strict=True)]
     changes = np.concatenate([np.abs(np.diff(hold)) for hold in holds])
-    if changes.size < settings.place_min_changes or (middle := float(np.median(changes))) <= 0.0:
+    if changes.size < LEAST_CHANGES or (middle := float(np.median(changes))) <= 0.0:
         return HoldPlaces(tuple(own), (None,) * len(own), 0.0)
     sigma = middle / (MEDIAN_OF_NORMAL * math.sqrt(2.0))
-    still = _stand_still(holds, sigma, settings)
+    still = _stand_still(holds, sigma)
     found = [
         _place(hold, photo, one, sigma, still=still) for hold, photo, one in zip(holds, at_photo, own, strict=True)
     ]
     return HoldPlaces(tuple(place for place, _ in found), tuple(std for _, std in found), sigma)
 
 
-def _stand_still(holds: Sequence[Array], sigma: float, settings: IntakeSettings) -> bool:
+def _stand_still(holds: Sequence[Array], sigma: float) -> bool:
     """Whether the samples lie about the median of their hold no wider than they scatter from one to the next."""
     long = [hold for hold in holds if hold.size > 2]
     apart = np.concatenate([np.abs(hold - np.median(hold)) for hold in long]) if long else np.zeros(0)
-    return apart.size == 0 or float(np.median(apart)) < settings.place_wander * MEDIAN_OF_NORMAL * sigma
+    return apart.size == 0 or float(np.median(apart)) < WANDER * MEDIAN_OF_NORMAL * sigma
 
 
 def _place(hold: Array, photo: NDArray[np.bool_], own: float, sigma: float, *, still: bool) -> tuple[float, float]:

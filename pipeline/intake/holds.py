@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.intake.holdforce import Hold, HoldForces, hold_forces
 from pipeline.intake.holdplace import HoldPlaces, hold_places
-from pipeline.intake.order import order_findings
 from pipeline.intake.samples import Samples
-from pipeline.intake.signs import force_sign, from_mounted, inferred_branches, signed_displacements
+from pipeline.intake.signs import FREE, force_sign, from_mounted, inferred_branches, signed_displacements
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.messages import Message
 from pipeline.records import Array, Branch, Finding, LoadStep, doubtful, inferred
@@ -29,6 +28,21 @@ from pipeline.settings.intake import IntakeSettings
 SPREAD = 8.0
 """Standard deviations of the scatter that the samples of a hold may lie apart: 1,000 of them do so by 6.5."""
 
+ONE_PLACE = 2e-3
+"""Of the travel; encoders scatter below 0.1 %, steps are above 1 % of the travel."""
+
+LEAST_SAMPLES = 3
+"""Of a hold, in a log without step numbers; shorter plateaus are part of the ramp."""
+
+OVER_RAMP = 3.0
+"""Times the median stretch of a ramp; in a log without step numbers, sampled often enough to show stretches of constant
+displacement on the way, too, longer ones are holds."""
+
+RAMP = 5
+"""Stretches in a row, each just beside the last, of a ramp; fewer are holds at almost one displacement."""
+
+WILD = 1.0
+"""Of the largest median force of a hold; a sample further from those of its hold is no noise and no relaxation."""
 
 WILD_ROUNDS = 10
 """Times that wild forces are left out; without them the largest hold may have a smaller median, and show more."""
@@ -64,7 +78,7 @@ def load_steps(
     name = path.name
     displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
     left_out: list[Finding] = []
-    while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs, settings)):
+    while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs)):
         line, force = samples.lines[wild[0]], float(samples.forces[wild[0]])
         left_out.append(doubtful("log/wild-force", file=name, count=len(wild), line=line, force_N=force))
         samples = samples.without(wild)
@@ -72,17 +86,16 @@ def load_steps(
     places = hold_places(
         [displacements[run.rows] for run in runs],
         [np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run)) for run in runs],
-        settings=settings,
     )
     positions = places.place
     same = max(tolerance, SAME * max((std for std in places.std if std is not None), default=0.0))
     means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
-    sign, signed = force_sign(means, np.array(positions), spec, name=name, settings=settings)
+    sign, signed = force_sign(means, np.array(positions), spec, name=name)
     forces = sign * samples.forces
     holds = [_hold(samples, forces, run) for run in runs]
     fitted = hold_forces(holds, resolution=samples.resolution, settings=settings)
     if samples.branches is None:
-        branches, directed = inferred_branches(positions, fitted.force, same, name=name, settings=settings)
+        branches, directed = inferred_branches(positions, fitted.force, same, name=name)
     else:
         branches, directed = [samples.branches[run.first] for run in runs], []
     steps = _steps(samples, runs, branches, places, holds, fitted)
@@ -105,11 +118,11 @@ def _grouped(
     """Signed displacements (n,) m, how close to each other they are one place (m), the holds, and what was inferred."""
     name = path.name
     travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
-    tolerance = settings.same_displacement_relative * travel
-    mounted = _mounted(samples, tolerance, settings)
+    tolerance = ONE_PLACE * travel
+    mounted = _mounted(samples, tolerance)
     displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
     displacements, turned = signed_displacements(displacements, name)
-    runs, found = _runs(samples, displacements, tolerance, name=name, settings=settings)
+    runs, found = _runs(samples, displacements, tolerance, name=name)
     if len(runs) > settings.steps_max:  # a ramp without holds, or a step column that counts the rows
         raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
     _check_swapped(samples, runs, path)
@@ -146,20 +159,18 @@ def _steps(
     )
 
 
-def _mounted(samples: Samples, tolerance: float, settings: IntakeSettings) -> NDArray[np.bool_]:
+def _mounted(samples: Samples, tolerance: float) -> NDArray[np.bool_]:
     """Rows (n,) of the mounted cable: as the log calls them, else a first hold without force."""
     if samples.branches is not None:
         return np.array([branch == "mounted" for branch in samples.branches])
     away = np.abs(samples.displacements - samples.displacements[0]) > tolerance
     first = np.logical_and.accumulate(~away)
     middle = abs(float(np.median(samples.forces[first])))
-    free = middle <= settings.zero_force_relative * float(np.max(np.abs(samples.forces)))
+    free = middle <= FREE * float(np.max(np.abs(samples.forces)))
     return np.asarray(first & free)
 
 
-def _runs(
-    samples: Samples, displacements: Array, tolerance: float, *, name: str, settings: IntakeSettings
-) -> tuple[list[Run], list[Finding]]:
+def _runs(samples: Samples, displacements: Array, tolerance: float, *, name: str) -> tuple[list[Run], list[Finding]]:
     """Holds in the order of the log, with unique step numbers."""
     branches = samples.branches or ("",) * len(samples.lines)
     if samples.steps is not None:
@@ -172,7 +183,7 @@ def _runs(
         if moved or branches[row] != branches[row - 1]:
             starts.append(row)
     stretches = list(pairwise([*starts, len(displacements)]))
-    long = _held(stretches, displacements, tolerance, settings)
+    long = _held(stretches, displacements, tolerance)
     named = [any(samples.images[slice(*pair)]) for pair in stretches]
     held = [pair for pair, keep in zip(stretches, long | named, strict=True) if keep] if long.any() else stretches
     key = "log/steps-inferred.way" if len(held) < len(stretches) else "log/steps-inferred"
@@ -180,9 +191,7 @@ def _runs(
     return runs, [inferred(key, file=name, steps=len(held), others=len(stretches) - len(held))]
 
 
-def _held(
-    stretches: Sequence[tuple[int, int]], displacements: Array, tolerance: float, settings: IntakeSettings
-) -> NDArray[np.bool_]:
+def _held(stretches: Sequence[tuple[int, int]], displacements: Array, tolerance: float) -> NDArray[np.bool_]:
     """Which stretches of constant displacement are holds and no part of a ramp, (n,).
 
     A slow ramp, or a fast one sampled often, is a chain of stretches a little more than the tolerance apart: what has
@@ -190,11 +199,11 @@ def _held(
     """
     firsts = np.array([first for first, _ in stretches])
     lengths = np.array([last - first for first, last in stretches])
-    held = lengths >= settings.hold_min_samples
+    held = lengths >= LEAST_SAMPLES
     breaks = np.flatnonzero(np.abs(np.diff(displacements[firsts])) > 2.0 * tolerance) + 1
     for chain in np.split(np.arange(lengths.size), breaks):
-        if chain.size >= settings.ramp_min_stretches:
-            held[chain] &= lengths[chain] > settings.hold_over_ramp * np.median(lengths[chain])
+        if chain.size >= RAMP:
+            held[chain] &= lengths[chain] > OVER_RAMP * np.median(lengths[chain])
     return held
 
 
@@ -253,13 +262,13 @@ def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
         raise InputError(Message("log/swapped-columns", holds=len(holds), scatter_m=max(scatter)), path=path)
 
 
-def _wild(forces: Array, runs: Sequence[Run], settings: IntakeSettings) -> list[int]:
+def _wild(forces: Array, runs: Sequence[Run]) -> list[int]:
     """Rows whose force no cable could have: a slipped digit, a damaged transmission.
 
     Only where the other samples of the hold agree that it is wrong, which takes four of them.
     """
     middles = np.array([float(np.median(forces[run.rows])) for run in runs])
-    limit = settings.wild_force_relative * float(np.max(np.abs(middles)))
+    limit = WILD * float(np.max(np.abs(middles)))
     found = []
     for run, middle in zip(runs, middles, strict=True):
         off = np.flatnonzero(np.abs(forces[run.rows] - middle) > limit)
@@ -295,3 +304,31 @@ def _hold_findings(
         if len(images) > 1:
             taken, other = map(repr, images[:2])
             yield doubtful("photo/several", count=len(images), taken=taken, other=other, **place)
+
+
+def order_findings(steps: Sequence[LoadStep], tolerance: float, *, name: str) -> Iterator[Finding]:
+    """Contradictions between neighbouring steps.
+
+    Parameters
+    ----------
+    steps : sequence of LoadStep
+        In the order of the log.
+    tolerance : float
+        m, displacements that close are equal.
+    name : str
+        Of the log, for the messages.
+    """
+    for before, after in pairwise(steps):
+        change = after.displacement_m - before.displacement_m
+        place = {"file": name, "line": after.line, "step": after.step, "before": before.step}
+        way = {"from_m": before.displacement_m, "to_m": after.displacement_m}
+        if after.branch == before.branch and abs(change) <= tolerance:
+            yield doubtful("steps/doubled.place", **place, **way)
+        elif {"loading": -change, "unloading": change}.get(after.branch, 0.0) > tolerance:
+            yield doubtful("steps/branch", branch=after.branch, **place, **way)
+        if abs(after.step - before.step) > 1:
+            yield doubtful("steps/missing", **place)
+    for step in steps:
+        if step.branch == "mounted" and abs(step.displacement_m) > tolerance:
+            at = step.displacement_m
+            yield doubtful("steps/branch.mounted", file=name, line=step.line, step=step.step, displacement_m=at)

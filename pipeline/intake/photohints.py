@@ -52,25 +52,20 @@ def obeyed(
     return kept, tuple(findings)
 
 
-def _points(least: int, wanted: str) -> Check:
+def points(least: int, wanted: str, *, most: int = MOST_POINTS) -> Check:
+    """At least so many different points, and no more than ``most``."""
+
     def check(value: Any) -> tuple[Point, ...]:
-        if not isinstance(value, list) or not least <= len(value) <= MOST_POINTS:
+        if not isinstance(value, list) or not least <= len(value) <= most:
             raise ValueError(Message(wanted))
         if any(not isinstance(point, list) or len(point) != 2 for point in value):
             raise ValueError(Message(wanted))
-        points = tuple((number(point[0]), number(point[1])) for point in value)
-        if len(set(points)) < least or max(abs(x) for point in points for x in point) > 1e6:
+        found = tuple((number(point[0]), number(point[1])) for point in value)
+        if len(set(found)) < least or max(abs(x) for point in found for x in point) > 1e6:
             raise ValueError(Message("wanted.points", least=least, wanted=Message(wanted)))
-        return points
+        return found
 
     return check
-
-
-def _ends(value: Any) -> tuple[Point, Point]:
-    points = _points(2, "wanted.ends")(value)
-    if len(points) != 2:
-        raise ValueError(Message("wanted.ends"))
-    return points[0], points[1]
 
 
 def _region(value: Any) -> tuple[float, float, float, float]:
@@ -87,14 +82,14 @@ def _polygons(value: Any) -> tuple[tuple[Point, ...], ...]:
     wanted = "wanted.polygons"
     if not isinstance(value, list):
         raise ValueError(Message(wanted))
-    return tuple(_points(3, wanted)(polygon) for polygon in value)
+    return tuple(map(points(3, wanted), value))
 
 
 CHECKS: dict[str, Check] = {
     "image": path_text,
     "use": flag,
-    "ends_px": _ends,
-    "path_px": _points(2, "wanted.clicks"),
+    "ends_px": points(2, "wanted.ends", most=2),
+    "path_px": points(2, "wanted.clicks"),
     "region_px": _region,
     "exclude_px": _polygons,
 }

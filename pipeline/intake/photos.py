@@ -276,4 +276,4 @@ def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
     names: dict[str, list[str]] = {}
     for name, digest in hashes.items():
         names.setdefault(digest, []).append(name)
-    return [doubtful("photo/doubled.same", names=_some(more), first=first) for first, *more in names.values() if more]
+    return [doubtful("photo/doubled.same", names=_some(same)) for same in names.values() if len(same) > 1]

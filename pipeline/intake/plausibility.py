@@ -19,6 +19,13 @@ from pipeline.messages import Message
 from pipeline.records import Finding, LoadStep, doubtful
 from pipeline.settings.intake import IntakeSettings
 
+THIN_PX = 4.0
+"""Diameter times the scale given: a thinner cable has no two edges to measure, and the scale was probably
+written as mm per px."""
+
+SLENDER = 5.0
+"""Length over diameter; below, a cable is no rod in bending and a unit is probably wrong."""
+
 STEEL_MPA = 210_000.0
 """Modulus of steel: nothing that a cable is made of in bulk has more."""
 
@@ -52,11 +59,11 @@ def size_findings(
     """Warnings, with the figures, about sizes that do not fit together."""
     findings = []
     width = None if scale_px_per_m is None else scale_px_per_m * diameter_m
-    if width is not None and width < settings.cable_width_min_px:
+    if width is not None and width < THIN_PX:
         findings.append(doubtful("size/scale", width_px=width))
     slenderness = length_m / diameter_m
-    if slenderness < settings.slenderness_min:
-        findings.append(doubtful("size/slenderness", slenderness=slenderness, least=settings.slenderness_min))
+    if slenderness < SLENDER:
+        findings.append(doubtful("size/slenderness", slenderness=slenderness, least=SLENDER))
     largest = max(step.displacement_m for step in steps)
     share = largest / length_m
     if share >= 1.0 or 0.0 < share < 1e-3:

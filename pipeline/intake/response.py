@@ -16,10 +16,17 @@ from pipeline.errors import InputError
 from pipeline.intake.holdplace import MEDIAN_OF_NORMAL
 from pipeline.messages import Message
 from pipeline.records import LoadStep
-from pipeline.settings.intake import IntakeSettings
+
+STILL = 4.0
+"""Standard deviations; a log none of whose forces differs by more from one and the same tells of no cable: of a test
+that could be used the largest force has hundreds."""
+
+FLAT = 2e-3
+"""Of the largest force; without a mounted step forces must change by more over three steps: half the travel over the
+length, for a travel of 2 % at least three times this."""
 
 
-def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSettings) -> None:
+def check_response(steps: Sequence[LoadStep], *, path: Path) -> None:
     """Refuse a log whose force stands still while the bearing moves.
 
     Raises
@@ -28,16 +35,16 @@ def check_response(steps: Sequence[LoadStep], *, path: Path, settings: IntakeSet
         ``log/force-stands-still``.
     """
     loaded = [step for step in steps if step.branch != "mounted"]
-    still = steps if len(loaded) < len(steps) and _one_force(steps, settings) else loaded
+    still = steps if len(loaded) < len(steps) and _one_force(steps) else loaded
     places = [step.displacement_m for step in still]
-    if still is loaded and not _too_flat(loaded, places, settings):
+    if still is loaded and not _too_flat(loaded, places):
         return
     force = float(np.mean([step.force_N for step in still]))
     way = {"from_mm": 1e3 * min(places), "to_mm": 1e3 * max(places)}
     raise InputError(Message("log/force-stands-still", steps=len(still), force_N=force, **way), path=path)
 
 
-def _one_force(steps: Sequence[LoadStep], settings: IntakeSettings) -> bool:
+def _one_force(steps: Sequence[LoadStep]) -> bool:
     """Whether one force explains several steps at several places within their noise.
 
     Medians, and the scatter about them: a wild sample that could not be left out is no noise that hides a cable.
@@ -50,12 +57,12 @@ def _one_force(steps: Sequence[LoadStep], settings: IntakeSettings) -> bool:
     if repeated:
         sigma = float(np.median(np.abs(np.concatenate(repeated)))) / MEDIAN_OF_NORMAL
         std = sigma / np.sqrt([step.forces_N.size for step in steps])
-    return bool(np.all(np.abs(middles - np.median(middles)) <= settings.still_force_sigma * std))
+    return bool(np.all(np.abs(middles - np.median(middles)) <= STILL * std))
 
 
-def _too_flat(loaded: Sequence[LoadStep], places: Sequence[float], settings: IntakeSettings) -> bool:
+def _too_flat(loaded: Sequence[LoadStep], places: Sequence[float]) -> bool:
     """Whether the forces of three bent steps and more differ less than those of a cable would."""
     forces = np.array([step.force_N for step in loaded])
-    if len(set(places)) < 3 or not _one_force(loaded, settings):
+    if len(set(places)) < 3 or not _one_force(loaded):
         return False
-    return float(np.ptp(forces)) <= settings.still_force_relative * float(np.max(np.abs(forces)))
+    return float(np.ptp(forces)) <= FLAT * float(np.max(np.abs(forces)))

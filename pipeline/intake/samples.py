@@ -25,7 +25,6 @@ from pipeline.intake.specimenfile import LogSpec
 from pipeline.intake.table import read_table
 from pipeline.messages import Message
 from pipeline.records import Array, Branch, Finding, doubtful, inferred
-from pipeline.settings.intake import IntakeSettings
 
 BRANCHES: dict[Branch, str] = {
     "mounted": "mounted|mount|force-free|start|montiert|eingebaut|kraftfrei|nullmessung",
@@ -33,6 +32,12 @@ BRANCHES: dict[Branch, str] = {
     "unloading": "unloading|unload|down|backward|back|return|entlastung|entlasten|zurück|rück|ab",
 }
 BRANCH_OF: dict[str, Branch] = {word: branch for branch, words in BRANCHES.items() for word in words.split("|")}
+
+LARGEST = 1e9
+"""N, mm, s or count; beyond any test, so a number that large is a slipped digit or damage."""
+
+EPOCH_S = 1e7
+"""Times beyond 115 days count from an epoch and are made relative."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,7 @@ class Samples:
 
 
 def read_samples(
-    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, settings: IntakeSettings, length: float = math.inf
+    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, length: float = math.inf
 ) -> tuple[Samples, Columns]:
     """Convert the rows below the header; ``length`` (m) of the cable is farther than it was pushed.
 
@@ -115,10 +120,10 @@ def read_samples(
         travels=displacement,
         farthest=length / columns.factor["displacement"],
     )
-    numbers = _Numbers(decimal, columns, path, lines, settings.number_limit)
+    numbers = _Numbers(decimal, columns, path, lines)
     steps = _carry_down(table["step"])[0] if "step" in table else []
     branches = _branches(table["branch"], lines, path) if "branch" in table else None
-    times, noted = _times(table["time"], kept, numbers, settings) if "time" in table else (None, [])
+    times, noted = _times(table["time"], kept, numbers) if "time" in table else (None, [])
     images = _kept_images(table.get("image"), kept, len(lines))
     forces = numbers.column("force", force, kept)  # refuses what is no number, and has no decimals
     places = max(decimals(force[row], decimal) for row in kept)
@@ -165,7 +170,7 @@ class _Numbers:
     columns: Columns
     path: Path
     lines: Sequence[int]
-    limit: float
+    limit: float = LARGEST
 
     def value(self, role: str, cell: str, row: int) -> float:
         number = to_number(cell, self.decimal)
@@ -219,9 +224,7 @@ def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Br
     return branches
 
 
-def _times(
-    cells: Sequence[str], kept: Sequence[int], numbers: _Numbers, settings: IntakeSettings
-) -> tuple[Array | None, list[Finding]]:
+def _times(cells: Sequence[str], kept: Sequence[int], numbers: _Numbers) -> tuple[Array | None, list[Finding]]:
     """Times of the kept rows in s, relative to the first if they are clock times or count from an epoch."""
     name, lines = numbers.path.name, numbers.lines
     empty = [row for row in kept if is_missing(cells[row])]
@@ -237,7 +240,7 @@ def _times(
         wide = replace(numbers, limit=1e15)  # epochs in milliseconds have 13 digits
         times = wide.column("time", cells, kept)
     noted = []
-    if clock or float(np.max(np.abs(times))) > settings.epoch_s:
+    if clock or float(np.max(np.abs(times))) > EPOCH_S:
         noted.append(inferred("log/clock-time", file=name))
         times = times - times[0]
     if np.any(np.diff(times) < 0.0):

@@ -14,9 +14,14 @@ from numpy.typing import NDArray
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.messages import Message
 from pipeline.records import Array, Branch, Finding, doubtful, inferred
-from pipeline.settings.intake import IntakeSettings
 
 BENT = 0.2  # of the largest displacement; beyond, a pinned cable carries most of its buckling load whatever its law
+
+FREE = 0.05
+"""Of the largest force; at displacement 0 a cable with more is not force-free."""
+
+AGREED = 0.75
+"""Of the loaded steps; so many of one sign decide the sign of the log."""
 
 
 def from_mounted(
@@ -48,9 +53,7 @@ def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[F
     return -displacements, [doubtful("log/displacement-sign", file=name, reach_m=reach)]
 
 
-def force_sign(
-    forces: Array, displacements: Array, spec: LogSpec, *, name: str, settings: IntakeSettings
-) -> tuple[float, list[Finding]]:
+def force_sign(forces: Array, displacements: Array, spec: LogSpec, *, name: str) -> tuple[float, list[Finding]]:
     """Factor 1 or -1 that makes compression positive: as the user says, unless a bent cable would pull by it.
 
     Parameters
@@ -62,11 +65,11 @@ def force_sign(
     """
     said = {"compression": 1.0, "tension": -1.0, None: 1.0}[spec.force_sign]
     bent = displacements > BENT * np.max(displacements)
-    loud = bent & (np.abs(forces) > settings.zero_force_relative * np.max(np.abs(forces)))
+    loud = bent & (np.abs(forces) > FREE * np.max(np.abs(forces)))
     if not np.any(loud):
         return said, []
     pulling = said * forces[loud] < 0.0
-    if np.mean(pulling) < settings.sign_share:
+    if np.mean(pulling) < AGREED:
         return said, []
     told = {
         "file": name,
@@ -80,7 +83,7 @@ def force_sign(
 
 
 def inferred_branches(
-    displacements: Sequence[float], forces: Sequence[float], tolerance: float, *, name: str, settings: IntakeSettings
+    displacements: Sequence[float], forces: Sequence[float], tolerance: float, *, name: str
 ) -> tuple[list[Branch], list[Finding]]:
     """Branch of each hold by the order of the displacements.
 
@@ -96,7 +99,7 @@ def inferred_branches(
     for number, position in enumerate(displacements):
         change = position - (displacements[number - 1] if number else 0.0)
         if number == 0 and abs(position) <= tolerance:
-            free = abs(forces[0]) <= settings.zero_force_relative * largest
+            free = abs(forces[0]) <= FREE * largest
             branches.append("mounted" if free else "loading")
         elif branches and abs(change) <= tolerance:
             branches.append("loading" if branches[-1] == "mounted" else branches[-1])

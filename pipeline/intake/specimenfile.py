@@ -1,4 +1,4 @@
-"""``specimen.toml`` -> `SpecimenFile`: what the user says about cable, camera, rig and force log, checked, in SI units.
+"""``specimen.toml`` -> a `Specimen` without steps and a `LogSpec`: what the user says, checked, in SI units.
 
 The keys carry their unit in the name (``length_mm``); records carry metres. Every refusal names file and line.
 """
@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from pipeline.errors import Complaints
 from pipeline.intake.access import inside, is_folder, outside
-from pipeline.intake.photohints import read_hints
+from pipeline.intake.photohints import points, read_hints
 from pipeline.intake.tomltable import (
     Check,
     TomlFile,
@@ -30,7 +30,7 @@ from pipeline.intake.tomltable import (
     whole,
 )
 from pipeline.messages import Message
-from pipeline.records import Board, CameraSpec, PhotoHints, RigSpec
+from pipeline.records import Board, CameraSpec, RigSpec, Specimen
 from pipeline.settings.intake import IntakeSettings
 
 NAME = "specimen.toml"
@@ -57,22 +57,11 @@ class LogSpec:
     force_sign: Literal["compression", "tension"] | None = None
 
 
-@dataclass(frozen=True)
-class SpecimenFile:
-    """The contents of ``specimen.toml``. ``source`` finds the line of a key for later complaints."""
-
-    id: str
-    length_m: float
-    diameter_m: float
-    camera: CameraSpec
-    rig: RigSpec
-    log: LogSpec
-    description: dict[str, str]
-    source: TomlFile
-    hints: dict[str, PhotoHints] = field(default_factory=dict)
+# Outside, a size is surely in another unit: from a fine wire to a submarine cable, a phone at 10 m to a microscope.
+LENGTH, DIAMETER, SCALE = (5.0, 20_000.0, "(mm)"), (0.05, 500.0, "(mm)"), (0.05, 5_000.0, "(px/mm)")
 
 
-def read_specimen_file(folder: Path, settings: IntakeSettings) -> SpecimenFile:
+def read_specimen_file(folder: Path, settings: IntakeSettings) -> Specimen:
     """Read ``specimen.toml`` of a folder; see `read_source` and `described` for what is raised."""
     return described(read_source(folder, settings), folder, settings)
 
@@ -91,40 +80,40 @@ def read_source(folder: Path, settings: IntakeSettings) -> TomlFile:
     return read_toml(path, limit=settings.toml_max_bytes)
 
 
-def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> SpecimenFile:
-    """The contents of a ``specimen.toml``.
+def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Specimen:
+    """What a ``specimen.toml`` says of its specimen; of what the force log is, `asked_of_log` tells.
 
     Raises
     ------
     InputError
         ``toml/...``, ``file/outside``, ``camera/...``: unknown or missing key, value that cannot be meant; all at once.
     """
-    tables, wrong = _checks(settings), Complaints()
-    wrong.kept(check_names, source, source.tables, (*tables, "photos"))
-    values = {table: wrong.kept(checked_table, source, table, checks) or {} for table, checks in tables.items()}
+    wrong = Complaints()
+    wrong.kept(check_names, source, source.tables, (*CHECKS, "photos"))
+    values = {table: wrong.kept(checked_table, source, table, checks) or {} for table, checks in CHECKS.items()}
     wrong.kept(_check_sizes_given, source)
     camera = wrong.kept(_camera, source, values["camera"], folder, settings)
     hints = wrong.kept(read_hints, source)
     wrong.settle()
     assert camera is not None and hints is not None
     cable = values["specimen"]
-    return SpecimenFile(
+    return Specimen(
         id=cable.get("id", folder_name(folder)),
+        folder=folder,
         length_m=cable["length_mm"] * 1e-3,
         diameter_m=cable["diameter_mm"] * 1e-3,
         camera=camera,
         rig=_rig(values["rig"]),
-        log=LogSpec(**values["force_log"], force_sign=values["rig"].get("force_sign")),
+        steps=(),
+        images={},
         description={key: cable[key] for key in DESCRIPTION if key in cable},
-        source=source,
         hints=hints,
     )
 
 
-def asked_of_log(source: TomlFile, settings: IntakeSettings) -> LogSpec:
+def asked_of_log(source: TomlFile) -> LogSpec:
     """What the user says about the force log in a file of which other parts may be wrong; raises as `described`."""
-    tables = _checks(settings)
-    log, rig = (checked_table(source, table, tables[table]) for table in ("force_log", "rig"))
+    log, rig = (checked_table(source, table, CHECKS[table]) for table in ("force_log", "rig"))
     return LogSpec(**log, force_sign=rig.get("force_sign"))
 
 
@@ -139,41 +128,6 @@ def _check_sizes_given(source: TomlFile) -> None:
         add = [Message(f"toml/missing-key.{key}") for key in missing]
         key = "toml/missing-key" if len(missing) == 1 else "toml/missing-key.several"
         raise source.error(Message(key, names=missing, add=add), table="specimen")
-
-
-def _checks(settings: IntakeSettings) -> dict[str, dict[str, Check]]:
-    """Known tables, their keys and the values these may hold."""
-    return {
-        "specimen": {
-            "id": _identifier,
-            "length_mm": number_in(*settings.length_range_mm, "(mm)"),
-            "diameter_mm": number_in(*settings.diameter_range_mm, "(mm)"),
-            "type": free_text,
-            "batch": free_text,
-            "notes": free_text,
-            "temperature_C": lambda value: f"{number(value):g}",
-        },
-        "camera": {
-            "scale_px_per_mm": number_in(*settings.scale_range_px_per_mm, "(px/mm)"),
-            "calibration": path_text,
-            "board": _board,
-            "distance_mm": number_in(1.0, 1e6, "(mm)"),
-        },
-        "rig": {
-            "moving_bearing": one_of("left", "right"),
-            "bearing_marker_mm": number_in(*settings.diameter_range_mm, "(mm)"),
-            "bearings_px": _bearings,
-            "force_sign": one_of("compression", "tension"),
-        },
-        "force_log": {
-            "file": path_text,
-            "columns": _columns,
-            "units": _units,
-            "separator": one_of(";", ",", "\t"),
-            "decimal": one_of(".", ","),
-            "encoding": one_of("utf-8", "cp1252", "utf-16"),
-        },
-    }
 
 
 def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: IntakeSettings) -> CameraSpec:
@@ -244,15 +198,6 @@ def _board(value: Any) -> Board:
     )
 
 
-def _bearings(value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    if not isinstance(value, list) or len(value) != 2 or any(not isinstance(p, list) or len(p) != 2 for p in value):
-        raise ValueError(Message("wanted.bearings"))
-    (x0, y0), (x1, y1) = ((number(p[0]), number(p[1])) for p in value)
-    if (x0, y0) == (x1, y1) or max(map(abs, (x0, y0, x1, y1))) > 1e6:
-        raise ValueError(Message("wanted.bearings.different"))
-    return (x0, y0), (x1, y1)
-
-
 def _columns(value: Any) -> dict[str, str | int]:
     if not isinstance(value, dict) or not value.keys() <= set(ROLES):
         raise ValueError(Message("wanted.columns", roles=ROLES))
@@ -267,3 +212,37 @@ def _units(value: Any) -> dict[str, str]:
     if not isinstance(value, dict) or not value.keys() <= set(MEASURED):
         raise ValueError(Message("wanted.units"))
     return {role: text(unit) for role, unit in value.items()}
+
+
+CHECKS: dict[str, dict[str, Check]] = {
+    "specimen": {
+        "id": _identifier,
+        "length_mm": number_in(*LENGTH),
+        "diameter_mm": number_in(*DIAMETER),
+        "type": free_text,
+        "batch": free_text,
+        "notes": free_text,
+        "temperature_C": lambda value: f"{number(value):g}",
+    },
+    "camera": {
+        "scale_px_per_mm": number_in(*SCALE),
+        "calibration": path_text,
+        "board": _board,
+        "distance_mm": number_in(1.0, 1e6, "(mm)"),
+    },
+    "rig": {
+        "moving_bearing": one_of("left", "right"),
+        "bearing_marker_mm": number_in(*DIAMETER),
+        "bearings_px": points(2, "wanted.bearings", most=2),
+        "force_sign": one_of("compression", "tension"),
+    },
+    "force_log": {
+        "file": path_text,
+        "columns": _columns,
+        "units": _units,
+        "separator": one_of(";", ",", "\t"),
+        "decimal": one_of(".", ","),
+        "encoding": one_of("utf-8", "cp1252", "utf-16"),
+    },
+}
+"""Known tables, their keys and the values these may hold."""

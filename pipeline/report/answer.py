@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +13,6 @@ from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
 from pipeline.settings import ReportSettings
 
-K0_WAYS = ("photo", "balance", "inverse", "all", "extended")
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
 
@@ -54,7 +52,6 @@ class FirstScreen:
 
 def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
     """The answer of a result in the language of the words."""
-    model, adequate = _model(result, words, settings)
     diagnosis = result.diagnosis
     if result.status == "failed":
         verdict, tone = words("status_failed"), "bad"
@@ -63,17 +60,17 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
     elif diagnosis is not None:
         verdict, tone = words(f"verdict_{diagnosis.verdict}"), TONES.get(diagnosis.verdict, "bad")
     else:
-        verdict, tone = "", "good" if adequate else "warn"
+        verdict, tone = "", "warn"
     return FirstScreen(
         sentence=words.said(opening(result)).sentence,
         agreement=_agreement(result, words),
-        model=model,
+        model=words("model_unknown") if diagnosis is None else words.said(diagnosis.said).text,
         advice=_advice(result, words),
         verdict=verdict,
         tone=tone,
         pre_curvatures=tuple(
-            (words(f"k0_{way}") if way in K0_WAYS else way, words.measured(value, std))
-            for way, (value, std) in _all_pre_curvatures(result).items()
+            (words.known(f"k0_{way}", way), words.measured(value, std))
+            for way, (value, std) in pre_curvatures(result).items()
             if result.answer.usable or result.status == "failed"
         ),
         hidden=_hidden(result, words, settings),
@@ -97,23 +94,15 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
 
 
 def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
-    """K0 and its standard deviation by every way that gave one, in 1/m."""
-    found: dict[str, tuple[float, float | None]] = {}
-    if result.agreement is not None:
-        found.update(result.agreement.pre_curvature)
+    """K0 and its standard deviation, 1/m, by independent sources, then by the answer if it saw more than they."""
+    found: dict[str, tuple[float, float | None]] = dict(result.agreement.pre_curvature) if result.agreement else {}
     for way, part in (("balance", result.balance), ("inverse", result.inverse)):
         if part is not None and part.pre_curvature_per_m is not None:
             found.setdefault(way, (part.pre_curvature_per_m, part.pre_curvature_std_per_m))
+    curve = result.answer.curve
+    if curve is not None and (curve.method == "extended" or (curve.method == "inverse" and "photo" in found)):
+        found["extended" if curve.method == "extended" else "all"] = curve.pre_curvature, curve.pre_curvature_std
     return found
-
-
-def _all_pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
-    """K0 by sources that are independent of each other, then by the curve of the answer if it saw more than they."""
-    sources, curve = pre_curvatures(result), result.answer.curve
-    if curve is not None and (curve.method == "extended" or (curve.method == "inverse" and "photo" in sources)):
-        name = "extended" if curve.method == "extended" else "all"
-        return {**sources, name: (curve.pre_curvature, curve.pre_curvature_std)}
-    return sources
 
 
 WIDE = 0.5
@@ -125,35 +114,17 @@ def _agreement(result: Result, words: Words) -> str:
     part, found = result.agreement, trusted(result)
     if part is None or part.rms_relative is None or not {"inverse", "balance"} <= found.keys():
         return words("agree_none")
+    rms = words.number(100.0 * part.rms_relative, 2)
+    if "extended" in found:
+        return words("agree_without", rms=rms)
     one, two = found["inverse"], found["balance"]
     low, high = part.range_per_m or (max(one.kappa[0], two.kappa[0]), min(one.kappa[-1], two.kappa[-1]))
     grid = np.linspace(low, high, 50)
     mean = 0.5 * (np.interp(grid, one.kappa, one.tangent) + np.interp(grid, two.kappa, two.tangent))
     noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
-    key = {True: "agree_yes", False: "agree_no", None: "agree_open"}[part.compatible]
-    if expected > 1.0:
-        key = "agree_lost"
-    elif part.compatible and expected > WIDE:
-        key = "agree_wide"
-    text = words(key, rms=words.number(100.0 * part.rms_relative, 2), expected=words.number(100.0 * expected, 2))
-    return f"{text} {words('before_extension')}" if "extended" in found else text
-
-
-MISFIT = 3.0
-"""Standard deviations by which chi-square exceeds its expectation where it counts as a misfit; 1 in 700 by chance."""
-
-
-def _model(result: Result, words: Words, settings: ReportSettings) -> tuple[str, bool]:
-    """Whether the model explains the data, by the diagnosis or, without one, by chi-square."""
-    if result.diagnosis is not None:
-        return words.said(result.diagnosis.said).text, result.diagnosis.verdict == "adequate"
-    misfit = result.inverse.misfit if result.inverse else None
-    if misfit is None or misfit.degrees_of_freedom <= 0:
-        return words("model_unknown"), False
-    ratio, std = misfit.chi2 / misfit.degrees_of_freedom, math.sqrt(2.0 / misfit.degrees_of_freedom)
-    good = ratio < 1.0 + MISFIT * std
-    return words("model_ok" if good else "model_bad", chi2=words.number(ratio), std=words.number(std, 2)), good
+    key = "agree_no" if not part.compatible else "agree_wide" if expected > WIDE else "agree_yes"
+    return words(key, rms=rms, expected=words.number(100.0 * expected, 2))
 
 
 def _advice(result: Result, words: Words) -> str:

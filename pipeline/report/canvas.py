@@ -75,9 +75,7 @@ STYLE: dict[RcKeyType, Any] = {
     "figure.facecolor": "none",
     "axes.facecolor": "none",
     "savefig.facecolor": "none",
-    "axes.unicode_minus": True,
     "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-    "path.simplify": True,
     "path.simplify_threshold": 0.2,
 }
 

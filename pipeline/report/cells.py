@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
@@ -23,12 +24,16 @@ def neutral(cell: object) -> object:
     return f"'{text}" if cell.startswith(FORMULA_STARTS) else text
 
 
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else FLOATS % value
+
+
 def csv_lines(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    """Lines of a table, one row at a time; None is an empty cell."""
+    """Lines of a table, one row at a time; None and NaN are empty cells."""
     line = io.StringIO()
     writer = csv.writer(line, lineterminator="\n")
     for row in chain([heads], rows):
-        writer.writerow([FLOATS % cell if isinstance(cell, float) else neutral(cell) for cell in row])
+        writer.writerow([_number(cell) if isinstance(cell, float) else neutral(cell) for cell in row])
         yield line.getvalue()
         line.seek(0)
         line.truncate()

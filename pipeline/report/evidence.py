@@ -19,12 +19,14 @@ from pipeline.report.curves import seen_range
 from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves, set_aside, trusted
+from pipeline.rounding import digits
 from pipeline.settings import ReportSettings
 from pipeline.units import Unit, suited
 
 Size = tuple[float, float]
 TALL = (400.0, 350.0)
 POINTS = 5
+SENT = 5  # digits of numbers for the pointer: more than any band here supports, and a third of the bytes
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,10 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
         {
             "method": method,
             "name": words(f"way_{method}"),
-            "kappa": _short(curve.kappa),
-            "value": _short(unit.factor * curve.tangent),
-            "std": _short(unit.factor * curve.tangent_std),
-            "factor": [_short(unit.factor * column) for column in curve.factor.T],
+            "kappa": digits(curve.kappa, SENT),
+            "value": digits(unit.factor * curve.tangent, SENT),
+            "std": digits(unit.factor * curve.tangent_std, SENT),
+            "factor": [digits(unit.factor * column, SENT) for column in curve.factor.T],
             "aside": method in aside,
         }
         for method, curve in curves(result).items()
@@ -92,11 +94,6 @@ def pointer_data(result: Result, main: Drawing | None, words: Words, settings: R
         "photos": [{"step": step, "low": r[0], "high": r[1]} for step, r in ranges.items() if r],
         "words": {key: words(f"hover_{key}") for key in ("photos", "no_photos", "band", "unvisited")},
     }
-
-
-def _short(values: np.ndarray) -> list[float]:
-    """Numbers cut to five digits: more than any band here supports, and a third of the bytes."""
-    return [float(f"{v:.5g}") for v in values]
 
 
 def titled(

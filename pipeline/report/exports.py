@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.messages import Message
@@ -33,27 +34,8 @@ STRAIGHT = 2.0
 """Standard deviations of K0 within which a cable is straight at rest, and so bends alike to both sides."""
 
 
-@dataclass(frozen=True, eq=False)
-class BeamTable:
-    """Moment over the bend away from rest, K - K0, starting at zero.
-
-    Attributes
-    ----------
-    bend : (n,) 1/m
-        Increasing.
-    moment, moment_std : (n,) N m
-    measured : (n,) bool
-        False for the side to which the cable was not bent, taken to be alike.
-    """
-
-    bend: Array
-    moment: Array
-    moment_std: Array
-    measured: NDArray[np.bool_]
-
-
-def beam_table(curve: Visited, *, both_sides: bool | None = None) -> BeamTable:
-    """The moment curve of a cable as a beam element wants it.
+def beam_table(curve: Visited, *, both_sides: bool | None = None) -> pd.DataFrame:
+    """The moment curve of a cable as a beam element wants it: moment over the bend away from rest, from zero on.
 
     Parameters
     ----------
@@ -61,20 +43,27 @@ def beam_table(curve: Visited, *, both_sides: bool | None = None) -> BeamTable:
     both_sides : bool, optional
         Whether to add the other side, taken to be alike; by default where the cable is straight at rest, because then
         nothing tells one side from the other.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns bend_per_m (K - K0, increasing), moment_Nm, moment_std_Nm, and measured: 0 for the side to which the
+        cable was not bent.
     """
     if both_sides is None:
         both_sides = abs(curve.pre_curvature) <= STRAIGHT * curve.pre_curvature_std
     bend = curve.kappa - curve.pre_curvature
     # a first point hardly away from rest would make a first segment of any slope
     kept = bend > 0.5 * float(np.min(np.diff(bend)))
-    one, moment, std = (np.concatenate([[0.0], values[kept]]) for values in (bend, curve.moment, curve.moment_std))
-    other = one.size - 1 if both_sides else 0
+    columns = (np.concatenate([[0.0], values[kept]]) for values in (bend, curve.moment, curve.moment_std))
+    table = pd.DataFrame(dict(zip(BEAM, (*columns, 1), strict=True)))
+    if not both_sides:
+        return table
+    other = table[:0:-1] * np.array([-1.0, -1.0, 1.0, 0.0])
+    return pd.concat([other, table], ignore_index=True).astype({"measured": int})
 
-    def mirrored(values: Array, sign: float) -> Array:
-        return np.concatenate([sign * values[:0:-1][:other], values])
 
-    known = np.concatenate([np.zeros(other, bool), np.ones(one.size, bool)])
-    return BeamTable(mirrored(one, -1.0), mirrored(moment, -1.0), mirrored(std, 1.0), known)
+BEAM = ("bend_per_m", "moment_Nm", "moment_std_Nm", "measured")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +149,14 @@ def _one_line(text: str) -> str:
 def _table(cable: Cable) -> str:
     """Bend from rest and moment, both sides, in two columns."""
     table = beam_table(cable.curve, both_sides=True)
-    rows = (f"{_n(k)}\t{_n(m)}" for k, m in zip(table.bend, table.moment, strict=True))
+    rows = (f"{_n(k)}\t{_n(m)}" for k, m in zip(table.bend_per_m, table.moment_Nm, strict=True))
     return _lines("# ", (*cable.head, OTHER_SIDE), "bend_per_m\tmoment_Nm", *rows)
 
 
 def _abaqus(cable: Cable) -> str:
     """A general beam section with a nonlinear, elastic moment-curvature curve, for a beam drawn in its rest shape."""
     table = beam_table(cable.curve, both_sides=True)
-    rows = [f"{_n(m)}, {_n(k)}" for k, m in zip(table.bend, table.moment, strict=True)]
+    rows = [f"{_n(m)}, {_n(k)}" for k, m in zip(table.bend_per_m, table.moment_Nm, strict=True)]
     bar, inertia = cable.modulus * cable.area, _n(cable.inertia)
     return _lines(
         "** ",

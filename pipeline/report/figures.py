@@ -214,7 +214,7 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
         role = "extended" if result.answer.method == "extended" else "inverse"
         _simulated(axes, fitted, unit, LIGHT[role], words)
         rest = plot_area(figure, top=0.68 * height)
-        rest.sharex(axes)
+        rest.set_xlim(axes.get_xlim())
         _force_rest(rest, given, words)
     finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
     return axes

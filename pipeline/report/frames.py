@@ -10,7 +10,7 @@ import pandas as pd
 from pipeline.compare import Comparison
 from pipeline.predict import PREDICTED, Prediction
 from pipeline.report.curves import equivalent, smallest_radius
-from pipeline.report.exports import beam_table
+from pipeline.report.exports import BEAM, beam_table
 from pipeline.result import Curve, Result
 
 CHARACTERISTIC = (
@@ -118,13 +118,8 @@ def beam_frame(result: Result) -> pd.DataFrame:
     ``measured`` is 0 for the side to which a straight cable was not bent, and which is taken to be alike. No rows where
     the numbers are not usable.
     """
-    curve = result.answer.curve
-    names = ("bend_per_m", "moment_Nm", "moment_std_Nm", "measured")
-    if curve is None or not result.answer.usable:
-        return pd.DataFrame(columns=list(names))
-    table = beam_table(curve)
-    columns = (table.bend, table.moment, table.moment_std, table.measured.astype(int))
-    return pd.DataFrame(dict(zip(names, columns, strict=True)))
+    curve = result.answer.curve if result.answer.usable else None
+    return pd.DataFrame(columns=list(BEAM)) if curve is None else beam_table(curve)
 
 
 def prediction_frame(prediction: Prediction) -> pd.DataFrame:

@@ -17,20 +17,18 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
+from pipeline.report.cells import csv_lines
 from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
-from pipeline.report.summary import summary_lines
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
+from pipeline.rounding import digits
 from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit, suited
 
@@ -57,17 +55,12 @@ def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tup
 
 def result_folders(folder: Path) -> list[str]:
     """Folders below a folder that hold a result, relative to it, in the order in which people count."""
-    found, open_ = [], [""]
-    while open_:
-        below = open_.pop()
-        try:
-            entries = list(os.scandir(folder / below))
-        except OSError:  # a folder that may not be read holds nothing for us
-            continue
-        if below and any(entry.name == "result.json" for entry in entries):
-            found.append(below)
-        inside = (e.name for e in entries if not e.name.startswith(".") and e.is_dir(follow_symlinks=bool(below == "")))
-        open_ += [f"{below}/{name}" if below else name for name in inside]
+    found = []
+    for top in (path for path in folder.iterdir() if not path.name.startswith(".")):
+        for below, names, files in os.walk(top):  # what may not be read holds nothing for us
+            names[:] = (name for name in names if not name.startswith("."))
+            if "result.json" in files:
+                found.append(Path(below).relative_to(folder).as_posix())
     return sorted(found, key=natural_key)
 
 
@@ -129,7 +122,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
-    pooled = list(repeats(rows, unit, words, settings))
+    pooled = list(repeats(rows, unit, words))
     shown = {row.state for row in rows}
     # rows are drawn by a script too, from texts as they are; and narrow columns must break somewhere
     engine = environment().overlay(finalize=lambda value: value)
@@ -175,7 +168,8 @@ def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
     of them and its language if it is another one, shapes, causes.
     """
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
-    rms = None if row.rms_relative is None else 100.0 * row.rms_relative
+    # both ways lack a cause that was found and is in the answer: how far they differ says nothing
+    rms = None if row.rms_relative is None or row.method == "extended" else 100.0 * row.rms_relative
     said = words.said(row.fault or row.reason or Message("text", text=""))
     state, verdict = row.state, _verdict(row)
     numbers: list[tuple[float | None, str]] = [(value, unit.number(value, std)) for value, std in ends]
@@ -243,16 +237,34 @@ def _curve(row: IndexRow, unit: Unit) -> str:
     if row.curve is None:
         return "null"
     parts = (row.curve.kappa[[0, -1]], unit.factor * row.curve.tangent, unit.factor * row.curve.tangent_std)
-    return "[" + ",".join(_list(part) for part in parts) + "]"
+    return _json([digits(part, 4) for part in parts])
 
 
 def _figure(entry: Repeats, unit: Unit) -> dict[str, Any]:
     """The mean of a type for its figure."""
     mean = entry.pooled
     parts = {"mean": mean.mean, "std": mean.std, "scatter": mean.scatter}
-    scaled = {name: [float(f"{unit.factor * value:.4g}") for value in values] for name, values in parts.items()}
-    return {"alt": entry.alt, "members": entry.members, "kappa": [float(f"{k:.4g}") for k in mean.kappa], **scaled}
+    scaled = {name: digits(unit.factor * values, 4) for name, values in parts.items()}
+    return {"alt": entry.alt, "members": entry.members, "kappa": digits(mean.kappa, 4), **scaled}
 
 
-def _list(values: NDArray[np.float64]) -> str:
-    return f"[{','.join(map('{:.4g}'.format, values.tolist()))}]"
+HEADS = (
+    *("id", "status", "usable", "verdict", "causes", "answer_method", "K0_per_m", "K0_std_per_m"),
+    *("kappa_low_per_m", "f_EI_low_Nm2", "f_EI_low_std_Nm2", "kappa_high_per_m", "f_EI_high_Nm2", "f_EI_high_std_Nm2"),
+    *("worst_finding", "reason", "type", "agreement_rms_relative", "compatible"),
+    *("photos_used", "photos_given", "warnings", "errors", "report"),
+)
+
+
+def summary_lines(rows: Iterable[IndexRow]) -> Iterator[str]:
+    """Lines of ``summary.csv``; nothing stands where nothing was measured."""
+    return csv_lines(HEADS, map(_summed, rows))
+
+
+def _summed(row: IndexRow) -> tuple[object, ...]:
+    none = (None, None, None)
+    rest, ends = row.pre_curvature or (None, None), (*(row.low or none), *(row.high or none))
+    told = (row.worst, str(row.fault or row.reason or ""), row.type, row.rms_relative, row.compatible)
+    counts = (row.photos_used, row.photos_given, row.warnings, row.errors)
+    about = (row.id, row.status, row.usable, row.verdict, ";".join(row.causes), row.method)
+    return (*about, *rest, *ends, *told, *counts, row.report)

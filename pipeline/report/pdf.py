@@ -232,10 +232,10 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
     rows = [
         *specimen_rows(result, words),
         *fit_rows(result, words),
-        (words("reproduce"), source.command),
-        *source.facts,
+        (words("reproduce"), source["command"]),
+        *source["facts"],
     ]
-    rows += [(name, digest[:16]) for name, digest in source.inputs]
+    rows += [(name, digest[:16]) for name, digest in source["inputs"]]
     sheet.pairs(rows, size=8.0)
     return sheet
 

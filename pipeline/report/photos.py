@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import io
-from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -49,14 +48,19 @@ def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
 
 def _path(u: np.ndarray, v: np.ndarray, chosen: np.ndarray, every: int) -> str:
     """Runs of chosen points as sub-paths; a run reaches to the neighbour on its right so that runs touch."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     parts = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        stop = min(int(last) + 1, u.size)
-        index = sorted({*range(int(first), stop, every), stop - 1})
+    for first, last in _runs(chosen):
+        stop = min(last + 1, u.size)
+        index = sorted({*range(first, stop, every), stop - 1})
         if len(index) > 1:
             parts.append("M" + "L".join(f"{u[i]:.1f} {v[i]:.1f}" for i in index))
     return "".join(parts)
+
+
+def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
+    """Where runs of chosen points begin, and end (exclusive)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def bearing_marks(photo: PhotoPart) -> list[tuple[float, float]]:
@@ -124,12 +128,6 @@ def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, setti
 
 def _along_the_cable(axes: Axes, s: np.ndarray, seen: np.ndarray) -> None:
     """From bearing to bearing, what the photo does not show shaded."""
-    for left, right in _hidden(s, seen):
-        axes.axvspan(left, right, color=LIGHT["unvisited"], alpha=0.18, lw=0.0)
+    for first, last in _runs(~seen):
+        axes.axvspan(s[first], s[min(last, s.size - 1)], color=LIGHT["unvisited"], alpha=0.18, lw=0.0)
     axes.set_xlim(s[0], s[-1])
-
-
-def _hidden(s: np.ndarray, seen: np.ndarray) -> list[tuple[float, float]]:
-    """Intervals of s that the photo does not show."""
-    edges = [0, *(np.flatnonzero(np.diff(seen.astype(int))) + 1).tolist(), seen.size]
-    return [(float(s[a]), float(s[min(b, s.size - 1)])) for a, b in pairwise(edges) if a < seen.size and not seen[a]]

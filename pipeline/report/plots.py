@@ -32,28 +32,23 @@ def plot_characteristic(result: Result, *, settings: ReportSettings | None = Non
     settings : ReportSettings, optional
         Language and width of the bands.
     """
-    settings, words = _how(settings)
-    if not curves(result):
-        raise _refused(words, Message("misuse.no-curve", name=result.specimen.id))
-    return _figure(lambda area: figures.draw_characteristic(area, result, words, settings), (420.0, 310.0))
+    lacking = None if curves(result) else Message("misuse.no-curve", name=result.specimen.id)
+    size = (420.0, 310.0)
+    return _figure(lambda area, *how: figures.draw_characteristic(area, result, *how), size, settings, lacking)
 
 
 def plot_forces(result: Result, *, settings: ReportSettings | None = None) -> Figure:
     """Draw measured and simulated forces over the displacement; parameters as `plot_characteristic`."""
-    settings, words = _how(settings)
-    if not result.steps:
-        raise _refused(words, Message("misuse.no-forces", name=result.specimen.id))
-    return _figure(lambda area: figures.draw_forces(area, result, words, settings), (400.0, 350.0))
+    lacking = None if result.steps else Message("misuse.no-forces", name=result.specimen.id)
+    return _figure(lambda area, *how: figures.draw_forces(area, result, *how), (400.0, 350.0), settings, lacking)
 
 
 def plot_residuals(result: Result, *, settings: ReportSettings | None = None) -> Figure:
     """Draw what the model of the answer leaves of the shapes, in standard deviations, over arc length and step."""
-    settings, words = _how(settings)
-    residuals = maps.answer_map(result)
-    if residuals is None:
-        raise _refused(words, Message("misuse.no-residuals", name=result.specimen.id))
-    size = (400.0, maps.map_height(residuals))
-    return _figure(lambda area: maps.draw_map(area, residuals, words), size)
+    left = maps.answer_map(result)
+    if left is None:
+        raise _refused(settings, Message("misuse.no-residuals", name=result.specimen.id))
+    return _figure(lambda area, words, _: maps.draw_map(area, left, words), (400.0, maps.map_height(left)), settings)
 
 
 def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = None) -> Figure:
@@ -64,31 +59,33 @@ def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = N
     ValueError
         Where the result holds no picture of that step.
     """
-    _, words = _how(settings)
-    photo = next((one for one in result.photos if one.step == step and one.preview is not None), None)
-    if photo is None or photo.preview is None:
-        pictured = ", ".join(str(one.step) for one in result.photos if one.preview is not None) or "-"
-        raise _refused(words, Message("misuse.no-picture", name=result.specimen.id, step=step, pictured=pictured))
-    width = 500.0
-    height = photos.PICTURE_HEAD + width * photo.preview.height / photo.preview.width
-    return _figure(lambda area: photos.draw_photo(area, photo, words), (width, height))
+    pictures = {one.step: (one, one.preview) for one in result.photos if one.preview is not None}
+    if step not in pictures:
+        pictured = ", ".join(map(str, pictures)) or "-"
+        raise _refused(settings, Message("misuse.no-picture", name=result.specimen.id, step=step, pictured=pictured))
+    photo, preview = pictures[step]
+    size = (500.0, photos.PICTURE_HEAD + 500.0 * preview.height / preview.width)
+    return _figure(lambda area, words, _: photos.draw_photo(area, photo, words), size, settings)
 
 
-def _how(settings: ReportSettings | None) -> tuple[ReportSettings, Words]:
-    chosen = settings or ReportSettings()
-    return chosen, Words(chosen.language)
-
-
-def _refused(words: Words, said: Message) -> ValueError:
+def _refused(settings: ReportSettings | None, said: Message) -> ValueError:
     """The error in the language of the figure."""
-    return ValueError(words.said(said).text)
+    return ValueError(said.said((settings or ReportSettings()).language))
 
 
-def _figure(draw: Callable[[Area], Axes], size: tuple[float, float]) -> Figure:
-    """A figure of so many px at 72 dots per inch that shows itself in a notebook."""
+def _figure(
+    draw: Callable[[Area, Words, ReportSettings], Axes],
+    size: tuple[float, float],
+    settings: ReportSettings | None,
+    lacking: Message | None = None,
+) -> Figure:
+    """A figure of so many px at 72 dots per inch that shows itself in a notebook; what it lacks is an error."""
+    settings = settings or ReportSettings()
+    if lacking is not None:
+        raise _refused(settings, lacking)
     with style():
         figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72, facecolor="white")
-        draw(figure)
+        draw(figure, Words(settings.language), settings)
     figure.set_dpi(DOTS_PER_INCH)
     figure._repr_png_ = lambda: _png(figure)  # type: ignore[attr-defined]  # what notebooks ask an object for
     return figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import Any
 
 from pipeline.report.figures import force_unit
@@ -18,31 +17,25 @@ UNITS = {"scale": "-", "parallax": "-", "lens": "-", "tilt_along": "1/m", "tilt_
 """What is fitted besides the law as a share of itself; all else of that kind is in m."""
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """Command, plain facts, input hashes and settings of a result.
+def provenance_rows(result: Result, words: Words) -> dict[str, Any]:
+    """Command, plain facts, input hashes and settings of a result as the page shows them.
 
-    ``clock`` is apart, for it is all that differs when the same input is measured again: report.pdf leaves it out.
+    Entries without a word for them are listed by their own names. ``clock`` is apart, for it is all that differs when
+    the same input is measured again: report.pdf leaves it out.
     """
-
-    command: str
-    facts: list[tuple[str, str]]
-    clock: list[tuple[str, str]]
-    inputs: list[tuple[str, str]]
-    settings: str
-
-
-def provenance_rows(result: Result, words: Words) -> Provenance:
-    """Provenance as the page shows it; entries without a word for them are listed by their own names."""
     source = result.provenance
     plain = {key: value for key, value in source.items() if key not in APART}
-    return Provenance(
-        command=_text(source.get("command", "")),
-        facts=[(words.known(f"fact_{key}", key), _text(value)) for key, value in plain.items()],
-        clock=[(words.known(f"fact_{key}", key), _text(value)) for key, value in source.get("clock", {}).items()],
-        inputs=list(source.get("inputs_sha256", {}).items()),
-        settings=json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
+    facts, clock = (
+        [(words.known(f"fact_{key}", key), _text(value)) for key, value in entries.items()]
+        for entries in (plain, source.get("clock", {}))
     )
+    return {
+        "command": _text(source.get("command", "")),
+        "facts": facts,
+        "clock": clock,
+        "inputs": list(source.get("inputs_sha256", {}).items()),
+        "settings": json.dumps(source["settings"], indent=1, ensure_ascii=False) if "settings" in source else "",
+    }
 
 
 def _text(value: Any) -> str:

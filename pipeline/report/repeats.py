@@ -16,8 +16,10 @@ from pipeline.report.pooling import Pooled, Scatter, outlying, pool, scattered
 from pipeline.report.words import Words
 from pipeline.result import none_of_its_type
 from pipeline.result.row import IndexRow, RowCurve
-from pipeline.settings.report import ReportSettings
 from pipeline.units import Unit
+
+DIFFERENT = 0.05
+"""p value below which repeat specimens differ; the usual one in twenty."""
 
 LINES = 40  # single curves of a figure: more are a blot
 
@@ -73,7 +75,7 @@ DRAWN = 24
 """Types of cable with a figure in the index; more would make it slow to open."""
 
 
-def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSettings) -> Iterable[Repeats]:
+def repeats(rows: list[IndexRow], unit: Unit, words: Words) -> Iterable[Repeats]:
     """Repeat specimens by type, most specimens first; ``unit`` is that of bending stiffness for all of an index."""
     drawn = 0
     for name, group in by_type(rows):
@@ -87,7 +89,7 @@ def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSett
         scatters = {"f_EI": together.stiffness} | ({"K0": scattered(known)} if len(known) == len(rests) else {})
         yield Repeats(
             type=name,
-            text=_text(together, scatters, [rows[number].id for number, _ in group], words, settings),
+            text=_text(together, scatters, [rows[number].id for number, _ in group], words),
             table=tuple(_cells(name, s, unit if name == "f_EI" else PER_M, words) for name, s in scatters.items()),
             pooled=together,
             members=tuple(number for number, _ in group[:LINES]),
@@ -98,11 +100,9 @@ def repeats(rows: list[IndexRow], unit: Unit, words: Words, settings: ReportSett
 PER_M = Unit(1.0, "1/m")
 
 
-def _text(
-    pooled: Pooled, scatters: dict[str, Scatter], names: list[str], words: Words, settings: ReportSettings
-) -> str:
+def _text(pooled: Pooled, scatters: dict[str, Scatter], names: list[str], words: Words) -> str:
     """Whether the specimens may be the same cable, and which of them is farthest off."""
-    level = settings.pooled_p_value / len(scatters)  # Bonferroni: all tests together have the level
+    level = DIFFERENT / len(scatters)  # Bonferroni: all tests together have the level
     wide = [name for name, scatter in scatters.items() if scatter.p_value < level]
     text = words(
         "index_pooled_text",

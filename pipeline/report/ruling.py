@@ -1,8 +1,8 @@
-"""Grid, marks, labels and names of axes, drawn as few artists.
+"""Grid, marks, labels and names of axes, drawn as few artists: round numbers in the reader's format, or given names.
 
-matplotlib makes five artists for every tick and measures them several times: half the processor time of a figure with
-two curves. Here an axis is a collection of lines for the grid, one line of marks, and a text for each label. Positions
-are in px (1/72 inch) from the frame, as matplotlib's own: marks, then a gap, the labels, a gap, the name.
+matplotlib makes five artists for every tick and measures them several times: a quarter of the processor time of a
+report. Here an axis is a collection of lines for the grid, one line of marks, and a text for each label. Lengths are in
+px (1/72 inch) from the frame, as matplotlib's own: marks, then a gap, the labels, a gap, the name.
 
 The limits of the axes are final when they are ruled.
 """
@@ -19,6 +19,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ft2font import LoadFlags
+from matplotlib.lines import Line2D
+from matplotlib.markers import TICKDOWN, TICKLEFT, TICKRIGHT
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
@@ -33,7 +35,6 @@ FONT = "DejaVu Sans"
 MARK = 3.0  # length of a mark, px
 GAP, NAME_GAP = 3.5, 4.0  # from marks to labels, from labels to the name, px
 LINE = 1.0  # height of a line of labels over its size
-MARKERS = {"bottom": "|", "left": "_", "right": "_"}
 BELOW = 0.5  # drawing order of the grid: under everything drawn
 
 
@@ -71,19 +72,52 @@ class Ruling:
     lean: float = 0.0
 
 
+OUT = {"bottom": (0.0, -1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
+MARKS = {"bottom": TICKDOWN, "left": TICKLEFT, "right": TICKRIGHT}
+UPRIGHT: dict[str, Any] = {"rotation": "vertical", "rotation_mode": "anchor", "ha": "center"}
+LABELS = {
+    "bottom": {"va": "top", "ha": "center"},
+    "left": {"va": "center_baseline", "ha": "right"},
+    "right": {"va": "center_baseline", "ha": "left"},
+}
+NAMES = {"bottom": LABELS["bottom"], "left": UPRIGHT | {"va": "bottom"}, "right": UPRIGHT | {"va": "top"}}
+
+
 def rule(axes: Axes, side: Side, ruling: Ruling, *, decimal: str) -> None:
     """Rule one axis on one side of the frame."""
-    along = axes.xaxis if side == "bottom" else axes.yaxis
+    flat, look = side == "bottom", mpl.rcParams
+    along, over = (axes.xaxis, axes.get_xaxis_transform()) if flat else (axes.yaxis, axes.get_yaxis_transform())
     along.set_visible(False)
-    low, high = sorted(axes.get_xlim() if side == "bottom" else axes.get_ylim())
+    low, high = sorted(along.get_view_interval())
     places = _round_places(low, high, ruling) if ruling.at is None else np.asarray(ruling.at, float)
-    frame = 1.0 if side == "right" else 0.0
-    if ruling.grid:
-        _grid(axes, side, places)
-    if ruling.mark:
-        _marks(axes, side, places, frame, ruling.mark)
     labels = (ruling.labels or numbers(places, decimal)) if ruling.labelled else ()
-    _labels(axes, side, places, frame, labels, ruling)
+    frame = 1.0 if side == "right" else 0.0
+    size = FontProperties(size=look["xtick.labelsize"]).get_size_in_points()
+    gap, widest = ruling.mark + GAP, LINE if flat else max(map(text_width, labels), default=0.0)
+
+    def at(place: Any, across: Any) -> tuple[Any, Any]:
+        return (place, across) if flat else (across, place)
+
+    def moved(by: float) -> ScaledTranslation:
+        """Away from the frame by so many px."""
+        right, up = OUT[side]
+        return ScaledTranslation(by / 72.0 * right, by / 72.0 * up, axes.figure.dpi_scale_trans)
+
+    if ruling.grid:
+        grid = {"colors": look["grid.color"], "linewidths": look["grid.linewidth"], "zorder": BELOW}
+        lines = [(at(place, 0.0), at(place, 1.0)) for place in places]
+        axes.add_collection(LineCollection(lines, transform=over, **grid), autolim=False)
+    if ruling.mark:
+        ticks = {"marker": MARKS[side], "ms": ruling.mark, "mew": look["xtick.major.width"], "clip_on": False}
+        across = np.full(places.size, frame)
+        axes.add_artist(Line2D(*at(places, across), ls="none", color=look["xtick.color"], transform=over, **ticks))
+    lean = {"ha": "right", "rotation": ruling.lean, "rotation_mode": "anchor"} if ruling.lean else {}
+    text = {"color": look["xtick.labelcolor"], "size": size, "transform": over + moved(gap)} | LABELS[side] | lean
+    for place, label in zip(places, labels, strict=False):
+        axes.text(*at(place, frame), label, **text)
+    name = {"color": look["axes.labelcolor"], "size": look["axes.labelsize"]} | NAMES[side]
+    beyond = moved((gap + size * widest if labels else 0.0) + NAME_GAP)
+    axes.text(*at(0.5, frame), ruling.name, transform=axes.transAxes + beyond, **name)
 
 
 def _round_places(low: float, high: float, ruling: Ruling) -> Array:
@@ -101,66 +135,6 @@ def numbers(places: Array, decimal: str) -> tuple[str, ...]:
         return tuple(plain(value, 4, decimal=decimal) for value in values)
     digits = max((len(text.partition(".")[2]) for text in texts), default=0)
     return tuple(fixed(value, digits, decimal) for value in values)
-
-
-def _grid(axes: Axes, side: Side, places: Array) -> None:
-    """Lines through the whole frame, under the curves."""
-    if side == "bottom":
-        lines, over = [((place, 0.0), (place, 1.0)) for place in places], axes.get_xaxis_transform()
-    else:
-        lines, over = [((0.0, place), (1.0, place)) for place in places], axes.get_yaxis_transform()
-    look = {"colors": mpl.rcParams["grid.color"], "linewidths": mpl.rcParams["grid.linewidth"]}
-    axes.add_collection(LineCollection(lines, transform=over, zorder=BELOW, **look), autolim=False)
-
-
-def _marks(axes: Axes, side: Side, places: Array, frame: float, length: float) -> None:
-    """Marks outside the frame."""
-    out = {"bottom": (0.0, -0.5 * length), "left": (-0.5 * length, 0.0), "right": (0.5 * length, 0.0)}[side]
-    edge = np.full(places.size, frame)
-    x, y = (places, edge) if side == "bottom" else (edge, places)
-    look = {"color": mpl.rcParams["xtick.color"], "mew": mpl.rcParams["xtick.major.width"]}
-    line = mpl.lines.Line2D(
-        x, y, ls="none", marker=MARKERS[side], ms=length, transform=_moved(axes, side, out), clip_on=False, **look
-    )
-    axes.add_artist(line)
-
-
-def _labels(axes: Axes, side: Side, places: Array, frame: float, labels: tuple[str, ...], ruling: Ruling) -> None:
-    """Labels beside their places and the name beyond them."""
-    size = FontProperties(size=mpl.rcParams["xtick.labelsize"]).get_size_in_points()
-    gap = ruling.mark + GAP
-    beyond = gap + size * (LINE if side == "bottom" else max(map(text_width, labels), default=0.0))
-    beyond = (beyond if labels else 0.0) + NAME_GAP
-    look: dict[str, Any] = {"color": mpl.rcParams["xtick.labelcolor"], "size": size}
-    name: dict[str, Any] = {"color": mpl.rcParams["axes.labelcolor"], "size": mpl.rcParams["axes.labelsize"]}
-    if side == "bottom":
-        over = _moved(axes, side, (0.0, -gap))
-        look |= {"va": "top", "ha": "right" if ruling.lean else "center"}
-        look |= {"rotation": ruling.lean, "rotation_mode": "anchor"} if ruling.lean else {}
-        for place, label in zip(places, labels, strict=False):
-            axes.text(place, 0.0, label, transform=over, **look)
-        if ruling.name:
-            at = axes.transAxes + _offset(axes, (0.0, -beyond))
-            axes.text(0.5, 0.0, ruling.name, transform=at, va="top", ha="center", **name)
-        return
-    out = 1.0 if side == "right" else -1.0
-    over = _moved(axes, side, (out * gap, 0.0))
-    look |= {"va": "center_baseline", "ha": "left" if side == "right" else "right"}
-    for place, label in zip(places, labels, strict=False):
-        axes.text(frame, place, label, transform=over, **look)
-    if ruling.name:
-        at = axes.transAxes + _offset(axes, (out * beyond, 0.0))
-        upright: dict[str, Any] = {"rotation": "vertical", "rotation_mode": "anchor", "ha": "center"}
-        axes.text(frame, 0.5, ruling.name, transform=at, va="top" if side == "right" else "bottom", **upright, **name)
-
-
-def _moved(axes: Axes, side: Side, by: tuple[float, float]) -> Any:
-    """Transform of places along an axis and shares of the frame across it, moved by so many px."""
-    return (axes.get_xaxis_transform() if side == "bottom" else axes.get_yaxis_transform()) + _offset(axes, by)
-
-
-def _offset(axes: Axes, by: tuple[float, float]) -> ScaledTranslation:
-    return ScaledTranslation(by[0] / 72.0, by[1] / 72.0, axes.figure.dpi_scale_trans)
 
 
 def text_width(text: str) -> float:

@@ -1,8 +1,7 @@
 """The tables beside the report, as any spreadsheet or program reads them: comma, decimal point, UTF-8, SI units.
 
 ``characteristic.csv``, ``beam_table.csv`` and ``centerlines.csv`` are fixed by the contract; ``simulation.csv`` has
-constants with errors. Text that a spreadsheet would run as
-a formula is disarmed, see `cells`.
+constants with errors. Text that a spreadsheet would run as a formula is disarmed, see `cells`.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline.report.cells import FLOATS, neutral
+from pipeline.report.cells import csv_lines
 from pipeline.report.files import write_atomic
 from pipeline.report.frames import beam_frame, centerlines_frame, characteristic_frame, simulation_frame
 from pipeline.result import Result, to_json
@@ -47,9 +46,5 @@ def write_csv(frame: pd.DataFrame, path: Path) -> Path:
 
 
 def csv_text(frame: pd.DataFrame) -> str:
-    """Text of a table, safe to open in a spreadsheet; numbers are left as they are."""
-    safe = frame.copy()
-    for name in safe.columns:
-        if not pd.api.types.is_numeric_dtype(safe[name]):
-            safe[name] = safe[name].map(neutral)
-    return safe.to_csv(index=False, float_format=FLOATS, lineterminator="\n")
+    """Text of a table, safe to open in a spreadsheet."""
+    return "".join(csv_lines(list(map(str, frame)), frame.itertuples(index=False, name=None)))

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.messages import PER, Message, catalogue, entry, sentence, word
+from pipeline.messages import DECIMAL, PER, Message, catalogue, entry, sentence, word
 from pipeline.rounding import fixed, p_value, plain, rounded
 from pipeline.units import Unit, amount_unit
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 CODES = TABLE.with_name("codes.toml")
-LANGUAGES = {"en": (0, "."), "de": (1, ",")}
 
 
 @cache
@@ -71,22 +70,27 @@ class Words:
     language: str = "en"
 
     def __post_init__(self) -> None:
-        if self.language not in LANGUAGES:
-            raise ValueError(f"language {self.language!r}: one of {', '.join(LANGUAGES)}")
+        if self.language not in DECIMAL:
+            raise ValueError(f"language {self.language!r}: one of {', '.join(DECIMAL)}")
 
     @property
     def decimal(self) -> str:
         """Decimal sign."""
-        return LANGUAGES[self.language][1]
+        return DECIMAL[self.language]
+
+    @property
+    def _place(self) -> int:
+        """Of the language in an entry."""
+        return list(DECIMAL).index(self.language)
 
     def __call__(self, key: str, **values: object) -> str:
         """Words for a key with values put in; a key that is not in the table is a ``KeyError``."""
-        text = str(_table()["words"][key][LANGUAGES[self.language][0]])
+        text = str(_table()["words"][key][self._place])
         return text.format(**values) if values else text
 
     def tip(self, key: str) -> str:
         """Meaning of a term: symbol, unit, one sentence."""
-        return str(_table()["tips"][key][LANGUAGES[self.language][0]])
+        return str(_table()["tips"][key][self._place])
 
     def cause(self, name: str) -> str:
         """Cause of misfit by its name of the contract; an unknown one (added by a user) as its name with blanks."""
@@ -123,13 +127,13 @@ class Words:
         known = documented_codes()
         family = next((name for name in known if name.endswith("*") and code.startswith(name[:-1])), "")
         texts = known.get(code) or known.get(family)
-        first = 2 * LANGUAGES[self.language][0]
+        first = 2 * self._place
         return (texts[first], texts[first + 1]) if texts else None
 
     def known(self, key: str, name: str) -> str:
         """Words for a key made of a name; where the table does not have it, the name with blanks."""
         row = _table()["words"].get(key)
-        return str(row[LANGUAGES[self.language][0]]) if row else name.replace("_", " ")
+        return str(row[self._place]) if row else name.replace("_", " ")
 
     def number(self, value: float, digits: int = 3) -> str:
         """A chosen or exact number."""

@@ -128,16 +128,8 @@ def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
     return next(first, next((f for f in faults if f.code == "size/force"), None))
 
 
-WRONG_SCALE = {"size/force", "force/unit"}
-"""Findings after which f_EI has the scale or the sign of no cable, of whatever level."""
-
-OTHER_CABLE = 0.1
-"""Relative; a ruler or a chessboard errs by hundredths. By a tenth and more a length is that of something else, or in
-another unit, and f_EI, which grows with its square, is off by a fifth."""
-
-
-TOGETHER = 0.5
-"""Correlation of chords and displacements that noise about no motion at all hardly reaches; it is -1 in a test."""
+OF_NO_CABLE = {"size/force", "length/other-cable", "photo/moving-apart"}
+"""Findings after which f_EI is that of no cable, or of another, of whatever level: a diagnosis could not mend it."""
 
 
 def answer_of(result: Result) -> Answer:
@@ -181,35 +173,10 @@ def data_fault(result: Result, curve: Visited | None) -> Message | None:
     """
     diagnosis = result.diagnosis
     turned = diagnosis is not None and any(part.factor < 0.0 for part in diagnosis.corrected_forces)
-    wrong = WRONG_SCALE if turned else WRONG_SCALE | {"force/sign"}
+    wrong = OF_NO_CABLE if turned else OF_NO_CABLE | {"force/sign"}
     told = next((finding.said for finding in result.findings if finding.code in wrong), None)
-    return told or _other_length(result) or _moving_apart(result) or _negative(curve)
-
-
-def _other_length(result: Result) -> Message | None:
-    """The photos show a cable of quite another length than the one stated."""
-    seen = [photo.traced_length_m for photo in result.photos if photo.traced_length_m is not None]
-    stated = result.specimen.length_m
-    if not seen or not stated or abs(float(np.median(seen)) / stated - 1.0) < OTHER_CABLE:
-        return None
-    return Message("fault.other-length", seen_mm=1e3 * float(np.median(seen)), stated_mm=1e3 * stated)
-
-
-def _moving_apart(result: Result) -> Message | None:
-    """The bearings move apart on the photos that were used, where the log pushes them together."""
-    unused = result.diagnosis.left_out_photos if result.diagnosis else []
-    chords = {photo.step: photo.chord_m for photo in result.photos if photo.step not in unused}
-    both = [(s.displacement_m, chord) for s in result.steps if (chord := chords.get(s.step)) is not None]
-    if len(both) < 3:
-        return None
-    moved, chord = np.array(both).T - np.mean(both, axis=0)[:, None]
-    together = float(moved @ chord) > TOGETHER * float(np.linalg.norm(moved) * np.linalg.norm(chord))
-    return Message("fault.moving-apart") if together else None
-
-
-def _negative(curve: Visited | None) -> Message | None:
-    """The stiffness comes out negative: the cable would help to bend itself."""
-    return None if curve is None or float(np.mean(curve.tangent)) > 0.0 else Message("fault.negative")
+    negative = curve is not None and float(np.mean(curve.tangent)) <= 0.0  # the cable would help to bend itself
+    return told or (Message("fault.negative") if negative else None)
 
 
 def none_of_its_type(times: float, *, others: int, kind: str) -> Message:

@@ -182,7 +182,6 @@ class LeftoverPart(SaidPart):
     step: int | None = Field(None, description="step where it is strongest, number in the log")
     s_m: Floats = Field([], description="arc length of its pattern on the photo of that step, m")
     shape_m: Floats = Field([], description="its pattern: displacement along the normal, m")
-    spoken: str = Field("", description="kind of data where it is strongest, in words")
 
 
 class DiagnosisPart(SaidPart):

@@ -250,12 +250,8 @@ class MisfitPart(Part):
 
     force_rmse_N: Number = Field(description="measured minus simulated force, root mean square, N")
     shape_rmse_m: Number = Field(description="measured minus simulated position, root mean square, m")
-    curvature_rmse_per_m: Number | None = Field(
-        None, description="measured minus simulated curvature, root mean square, 1/m"
-    )
     chi2: Number = Field(description="sum of squares of all residuals in standard deviations")
     degrees_of_freedom: Number = Field(description="what chi2 is expected to be")
-    chi2_by_block: dict[str, tuple[Number, Number]] = Field({}, description="chi2 and number of data by block")
 
 
 class WayPart(SaidPart):

@@ -7,7 +7,6 @@ summary, mean of repeat specimens) reads rows alone: a result with its photos is
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -17,9 +16,10 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, PlainValidator, StrictBool, StrictInt, TypeAdapter
 
 from pipeline.messages import UNREADABLE, Message
+from pipeline.rounding import digits
 
 if TYPE_CHECKING:
-    from pipeline.result import FindingPart, Result, Visited
+    from pipeline.result import Result, Visited
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -120,7 +120,8 @@ class IndexRow:
 def index_row(result: Result) -> IndexRow:
     """Row of one result, without its report."""
     told, found = result.answer, result.diagnosis.causes if result.diagnosis else []
-    curve, worst = told.curve, _worst(result.findings)
+    curve, levels = told.curve, ("error", "warning")
+    worst = next((f for level in levels for f in result.findings if f.level == level), None)
     low, high = curve.ends() if curve else (None, None)
     return IndexRow(
         id=result.specimen.id,
@@ -146,12 +147,6 @@ def index_row(result: Result) -> IndexRow:
         shapes=_shapes(result),
         curve=None if curve is None else thinned(curve, POINTS),
     )
-
-
-def _worst(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The first error, else the first warning."""
-    levels = {level: next((f for f in findings if f.level == level), None) for level in ("error", "warning")}
-    return levels["error"] or levels["warning"]
 
 
 POINTS = 24
@@ -198,16 +193,12 @@ def as_entry(row: IndexRow) -> dict[str, Any]:
     plain = {name: value for name, value in asdict(row).items() if name not in ("curve", "report", "outlying")}
     curve = row.curve
     plain["curve"] = None if curve is None else {
-        "range": _digits([curve.kappa[0], curve.kappa[-1]], 9),
-        "tangent": _digits(curve.tangent, 9),
-        "tangent_std": _digits(curve.tangent_std, 9),
+        "range": digits([curve.kappa[0], curve.kappa[-1]], 9),
+        "tangent": digits(curve.tangent, 9),
+        "tangent_std": digits(curve.tangent_std, 9),
         "factor": b64encode(curve.factor[_below(*curve.factor.shape)].astype("<f4").tobytes()).decode(),
     }  # fmt: skip
     return {"version": ROW, **plain}
-
-
-def _digits(values: Iterable[float], digits: int) -> list[float]:
-    return [float(f"{value:.{digits}g}") for value in values]
 
 
 def from_entry(data: object) -> IndexRow:

@@ -1,4 +1,4 @@
-"""Every threshold of the pipeline, with unit, default and the reason for the default; one file a room.
+"""What a user may set, with unit, default and the reason for the default; one file a room.
 
 A room gets its own part only. ``Settings()`` holds the defaults; unknown keys are refused.
 """
@@ -8,21 +8,17 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from pipeline.settings.batch import BatchSettings
-from pipeline.settings.compare import CompareSettings
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.settings.identify import IdentifySettings
 from pipeline.settings.intake import IntakeSettings
-from pipeline.settings.predict import PredictSettings
 from pipeline.settings.report import ReportSettings
 from pipeline.settings.vision import VisionSettings
 
 __all__ = [
     "BatchSettings",
-    "CompareSettings",
     "DiagnosisSettings",
     "IdentifySettings",
     "IntakeSettings",
-    "PredictSettings",
     "ReportSettings",
     "Settings",
     "VisionSettings",
@@ -38,7 +34,5 @@ class Settings(BaseModel):
     vision: VisionSettings = Field(default_factory=VisionSettings)
     identify: IdentifySettings = Field(default_factory=IdentifySettings)
     diagnosis: DiagnosisSettings = Field(default_factory=DiagnosisSettings)
-    predict: PredictSettings = Field(default_factory=PredictSettings)
-    compare: CompareSettings = Field(default_factory=CompareSettings)
     report: ReportSettings = Field(default_factory=ReportSettings)
     batch: BatchSettings = Field(default_factory=BatchSettings)

@@ -19,17 +19,6 @@ class BatchSettings(BaseModel):
         gt=0,
         description="s for one specimen; fifteen times what a full diagnosis of six photos takes",
     )
-    attempts: int = Field(
-        2,
-        ge=1,
-        le=3,
-        description="times a specimen may lose its worker; once may be bad luck with memory, not twice",
-    )
-    waiting_per_worker: int = Field(
-        2,
-        ge=1,
-        description="specimens handed out a worker of a cluster; one is measured, the next waits, memory stays flat",
-    )
     reports: bool = Field(
         True,
         description="draw report.html and report.pdf of every specimen, about half of its time on three photos; "

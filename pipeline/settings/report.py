@@ -22,6 +22,3 @@ class ReportSettings(BaseModel):
     photos_in_pdf: int = Field(
         6, ge=0, description="photos drawn in report.pdf; six fill one page at a size where the line can be judged"
     )
-    pooled_p_value: float = Field(
-        0.05, gt=0.0, lt=1.0, description="repeat specimens differ below this p value; the usual one in twenty"
-    )

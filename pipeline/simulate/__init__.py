@@ -5,15 +5,13 @@
 `pipeline.simulate.effects` says how. All chance comes from the experiment's seed.
 """
 
-from pipeline.simulate.demo import demo_specimen
-from pipeline.simulate.effects import EFFECTS, Effect, parse_effect
+from pipeline.simulate.effects import EFFECTS, parse_effect
 from pipeline.simulate.experiment import Experiment, State, bend, protocol
 from pipeline.simulate.photography import Photography
-from pipeline.simulate.specimen import Written, simulate_specimen, write_specimen
+from pipeline.simulate.specimen import Written, demo_specimen, simulate_specimen, write_specimen
 
 __all__ = [
     "EFFECTS",
-    "Effect",
     "Experiment",
     "Photography",
     "State",

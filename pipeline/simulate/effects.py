@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.intake.tomltable import nearest
 from pipeline.messages import Message
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest
@@ -79,27 +79,11 @@ class Setup:
     bow: float = 0.0
 
 
-@dataclass(frozen=True)
-class Effect:
-    """A cause that can be hidden.
+class Effect(NamedTuple):
+    """A cause that can be hidden: how many values it may have, any number if none is told, and what they change."""
 
-    Attributes
-    ----------
-    name : str
-    counts : tuple of int
-        How many values are allowed.
-    apply : callable
-        (Setup, values) -> Setup.
-    """
-
-    name: str
     counts: tuple[int, ...]
     apply: Callable[[Setup, Values], Setup]
-
-    @property
-    def takes(self) -> Message:
-        """What its values are, with units."""
-        return Message(f"effect.{self.name}")
 
 
 def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
@@ -115,7 +99,7 @@ def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
         values = tuple(float(v) for v in np.atleast_1d(given))
         if effect.counts and len(values) not in effect.counts:
             counts = {"given": len(values), "counts": effect.counts}
-            raise ValueError(Message("misuse.values", name=name, takes=effect.takes, **counts))
+            raise ValueError(Message("misuse.values", name=name, takes=Message(f"effect.{name}"), **counts))
         setup = effect.apply(setup, values)
     return setup
 
@@ -128,21 +112,22 @@ def parse_effect(text: str) -> tuple[str, Values]:
     ValueError
         If it cannot be read, or no such value can be; the message names the nearest known name.
     """
-    name, _, rest = text.partition("=")
-    effect = _effect(name.strip())
-    told = {"text": repr(text), "name": effect.name, "takes": effect.takes}
+    given, _, rest = text.partition("=")
+    name = given.strip()
+    _effect(name)
+    told = {"text": repr(text), "name": name, "takes": Message(f"effect.{name}")}
     try:
         values = tuple(float(part) for part in rest.split(","))
-    except ValueError as error:
-        raise ValueError(Message("misuse.no-number", **told)) from error
+    except ValueError:
+        values = (np.nan,)
     if not np.all(np.isfinite(values)):
         raise ValueError(Message("misuse.no-number", **told))
-    low, high = POSSIBLE.get(effect.name, (-np.inf, np.inf))
-    if effect.name in ONE_SIDED and min(values) < 0.0:
+    low, high = POSSIBLE.get(name, (-np.inf, np.inf))
+    if name in ONE_SIDED and min(values) < 0.0:
         raise ValueError(Message("misuse.negative", **told))
     if not low < values[0] < high:
         raise ValueError(Message("misuse.impossible", **told, low=low, high=high))
-    return effect.name, values
+    return name, values
 
 
 def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, float | Values]) -> None:
@@ -166,9 +151,9 @@ def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, fl
 def _effect(name: str) -> Effect:
     if name in EFFECTS:
         return EFFECTS[name]
-    near = get_close_matches(name, EFFECTS, n=1)
+    near = nearest(name, EFFECTS)
     key = "misuse.no-cause-near" if near else "misuse.no-cause"
-    raise ValueError(Message(key, name=repr(name), known=near or EFFECTS))
+    raise ValueError(Message(key, name=repr(name), known=[near] if near else EFFECTS))
 
 
 def _along(values: Values) -> Callable[[Array], Array]:
@@ -204,68 +189,53 @@ def _load(setup: Setup, values: Values) -> Setup:
     return replace(setup, test=replace(setup.test, load=(values[0], values[1])))
 
 
-def _relaxation(setup: Setup, values: Values) -> Setup:
-    time = values[1] if len(values) > 1 else setup.readings.relaxation_time
-    return replace(setup, readings=replace(setup.readings, relaxation=values[0], relaxation_time=time))
-
-
 def _tilt(setup: Setup, values: Values) -> Setup:
-    terms = (values[0], values[1] if len(values) > 1 else 0.0)
-    return replace(setup, camera=replace(setup.camera, perspective_per_m=terms))
+    return replace(setup, camera=replace(setup.camera, perspective_per_m=(values[0], sum(values[1:]))))
 
 
-def _one(field: str, values: Values) -> dict[str, Any]:
-    return {field: values[0]}
+def _in(place: Literal["test", "readings", "camera"], *fields: str) -> Callable[[Setup, Values], Setup]:
+    """The values, in their order, are those of fields of a part of the set-up."""
 
-
-def _on_test(field: str) -> Callable[[Setup, Values], Setup]:
-    return lambda setup, values: replace(setup, test=replace(setup.test, **_one(field, values)))
-
-
-def _on_supports(field: str) -> Callable[[Setup, Values], Setup]:
     def apply(setup: Setup, values: Values) -> Setup:
-        left, right = (replace(end, **_one(field, values)) for end in (setup.test.left, setup.test.right))
+        part: Any = getattr(setup, place)
+        changes: dict[str, Any] = {place: replace(part, **dict(zip(fields, values, strict=False)))}
+        return replace(setup, **changes)
+
+    return apply
+
+
+def _in_bearings(field: str) -> Callable[[Setup, Values], Setup]:
+    """The value is that of a field of both bearings."""
+
+    def apply(setup: Setup, values: Values) -> Setup:
+        change: dict[str, Any] = {field: values[0]}
+        left, right = (replace(end, **change) for end in (setup.test.left, setup.test.right))
         return replace(setup, test=replace(setup.test, left=left, right=right))
 
     return apply
 
 
-def _on_readings(field: str) -> Callable[[Setup, Values], Setup]:
-    return lambda setup, values: replace(setup, readings=replace(setup.readings, **{field: values[0]}))
-
-
-def _lens(setup: Setup, values: Values) -> Setup:
-    return replace(setup, camera=replace(setup.camera, k1=values[0]))
-
-
-def _bow(setup: Setup, values: Values) -> Setup:
-    return replace(setup, bow=values[0])
-
-
 EFFECTS: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        Effect("nonlinear_stiffness", (), _stiffness),
-        Effect("pre_curvature", (1,), _on_test("pre_curvature")),
-        Effect("pre_curvature_varying", (1, 2), _varying_pre_curvature),
-        Effect("stiffness_varying", (1, 2), _varying_stiffness),
-        Effect("hysteresis", (1, 2), _hysteresis),
-        Effect("plastic_set", (1,), _on_test("plastic_rate")),
-        Effect("relaxation", (1, 2), _relaxation),
-        Effect("bearing_friction", (1,), _on_supports("friction_moment")),
-        Effect("bearing_stiffness", (1,), _on_supports("stiffness")),
-        Effect("rigid_ends", (1,), _on_supports("rigid_length")),
-        Effect("rig_compliance", (1,), _on_test("compliance")),
-        Effect("displacement_offset", (1,), _on_test("displacement_offset")),
-        Effect("length_error", (1,), _on_readings("length")),
-        Effect("force_offset", (1,), _on_readings("offset")),
-        Effect("force_drift", (1,), _on_readings("drift")),
-        Effect("force_gain", (1,), _on_readings("gain")),
-        Effect("in_plane_load", (2,), _load),
-        Effect("scale_error", (1,), _on_readings("scale")),
-        Effect("lens_distortion", (1,), _lens),
-        Effect("camera_tilt", (1, 2), _tilt),
-        Effect("out_of_plane_bow", (1,), _bow),
-        Effect("stiffness_drift", (1,), _on_readings("stiffer")),
-    )
+    "nonlinear_stiffness": Effect((), _stiffness),
+    "pre_curvature": Effect((1,), _in("test", "pre_curvature")),
+    "pre_curvature_varying": Effect((1, 2), _varying_pre_curvature),
+    "stiffness_varying": Effect((1, 2), _varying_stiffness),
+    "hysteresis": Effect((1, 2), _hysteresis),
+    "plastic_set": Effect((1,), _in("test", "plastic_rate")),
+    "relaxation": Effect((1, 2), _in("readings", "relaxation", "relaxation_time")),
+    "bearing_friction": Effect((1,), _in_bearings("friction_moment")),
+    "bearing_stiffness": Effect((1,), _in_bearings("stiffness")),
+    "rigid_ends": Effect((1,), _in_bearings("rigid_length")),
+    "rig_compliance": Effect((1,), _in("test", "compliance")),
+    "displacement_offset": Effect((1,), _in("test", "displacement_offset")),
+    "length_error": Effect((1,), _in("readings", "length")),
+    "force_offset": Effect((1,), _in("readings", "offset")),
+    "force_drift": Effect((1,), _in("readings", "drift")),
+    "force_gain": Effect((1,), _in("readings", "gain")),
+    "in_plane_load": Effect((2,), _load),
+    "scale_error": Effect((1,), _in("readings", "scale")),
+    "lens_distortion": Effect((1,), _in("camera", "k1")),
+    "camera_tilt": Effect((1, 2), _tilt),
+    "out_of_plane_bow": Effect((1,), lambda setup, values: replace(setup, bow=values[0])),
+    "stiffness_drift": Effect((1,), _in("readings", "stiffer")),
 }

@@ -8,7 +8,7 @@ kappa (1/m), moment (N m), position (mm) and the pixel path of the centerline, (
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
 from pipeline.simulate.effects import Readings, Setup
-from pipeline.simulate.experiment import Experiment, State, bend
+from pipeline.simulate.experiment import Experiment, State, bend, protocol
 from pipeline.simulate.photography import Photography
 from pipeline.vision.render import Camera, Picture, render, render_board
 from pipeline.vision.render.sensor import write_picture
@@ -48,6 +48,41 @@ def simulate_specimen(
     """Bend, photograph and log a cable; see `write_specimen`."""
     experiment = experiment or Experiment(id=folder.name)
     return write_specimen(folder, experiment, states=bend(experiment), photography=photography, truth_file=truth_file)
+
+
+def demo_specimen(folder: Path, seed: int = 0, *, truth_file: Path | None = None) -> Written:
+    """Simulate and photograph the specimen of ``cablebend demo``, a mounted cable and six loading steps; a few seconds.
+
+    The cable, its pre-curvature, the camera's roll and the print on the sheath differ from seed to seed within what is
+    usual on such a rig; nothing is hidden in it.
+
+    Parameters
+    ----------
+    folder : Path
+    seed : int
+        Chooses cable, camera and noise.
+    truth_file : Path or None
+        See `write_specimen`.
+    """
+    rng = np.random.default_rng([seed, 2])
+    length = rng.uniform(0.17, 0.21)
+    EI0 = float(np.exp(rng.uniform(np.log(4e-3), np.log(4e-2))))
+    experiment = Experiment(
+        id=folder.name,
+        length_m=round(length, 4),
+        diameter_m=round(rng.uniform(0.0042, 0.0062), 4),
+        EI0=EI0,
+        EI1=EI0 * rng.uniform(0.3, 0.6),
+        kc=rng.uniform(3.5, 6.0),
+        K0=rng.uniform(1.0, 2.5),
+        displacements_m=protocol("loading", 6, round(0.0125 * length, 4)),
+        seed=seed,
+    )
+    photography = Photography(roll_rad=rng.uniform(-0.02, 0.02))
+    printed = replace(photography.sheath, text=f"CABLEBEND DEMO {seed:04d}", text_pitch=30.0)
+    return simulate_specimen(
+        folder, experiment, photography=replace(photography, sheath=printed), truth_file=truth_file
+    )
 
 
 def write_specimen(
@@ -88,8 +123,8 @@ def write_specimen(
     lean = _lean(setup, states)
     for number, (name, state) in enumerate(zip(names, states, strict=True)):
         picture = render(photography.scene(experiment, state, setup.camera, number, lean=lean))
-        _save(folder / name, picture.pixels, photography)
-        pictures.append(_Traced(picture))
+        write_picture(folder / name, picture.pixels, jpeg_quality=photography.jpeg_quality)
+        pictures.append(replace(picture, pixels=picture.pixels[:0]))  # its truth alone
     if photography.scale == "board":
         _calibrate(folder, experiment, photography, setup.camera, states[0])
     shown, log = _force_log(experiment, setup.readings, states, names)
@@ -115,23 +150,12 @@ def _lean(setup: Setup, states: tuple[State, ...]) -> float:
     return setup.bow / bow
 
 
-class _Traced:
-    """What is kept of a picture: its truth without the pixels."""
-
-    def __init__(self, picture: Picture) -> None:
-        self.s, self.u, self.v = picture.curve.s, picture.u_px, picture.v_px
-        self.left, self.right = picture.left_px, picture.right_px
-
-
-def _save(path: Path, pixels: Any, photography: Photography) -> None:
-    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
-
-
 def _calibrate(folder: Path, experiment: Experiment, photography: Photography, camera: Camera, state: State) -> None:
     (folder / "calibration").mkdir(exist_ok=True)
     scene = photography.scene(experiment, state, camera, 10_000)  # a seed no step has
     pixels = render_board(scene, photography.fitted_board(experiment, camera))
-    _save(folder / "calibration" / f"board{photography.suffix}", pixels, photography)
+    path = folder / "calibration" / f"board{photography.suffix}"
+    write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
 
 
 def _force_log(
@@ -156,7 +180,7 @@ def _force_log(
     return shown, "\n".join(lines) + "\n"
 
 
-def _description(experiment: Experiment, setup: Setup, photography: Photography, first: _Traced) -> str:
+def _description(experiment: Experiment, setup: Setup, photography: Photography, first: Picture) -> str:
     """Text of ``specimen.toml``."""
     length = 1e3 * experiment.length_m * (1.0 + setup.readings.length)
     lines = [
@@ -182,7 +206,7 @@ def _description(experiment: Experiment, setup: Setup, photography: Photography,
     if len(covers) == 2:
         lines.append(f"bearing_marker_mm = {1e3 * covers[0].diameter_m:.3f}")
     else:
-        axes = ", ".join(f"[{u:.2f}, {v:.2f}]" for u, v in (first.left, first.right))
+        axes = ", ".join(f"[{u:.2f}, {v:.2f}]" for u, v in (first.left_px, first.right_px))
         lines.append(f"bearings_px = [{axes}]")
     return "\n".join(lines) + "\n"
 
@@ -191,7 +215,7 @@ def _truth(
     experiment: Experiment,
     setup: Setup,
     states: tuple[State, ...],
-    pictures: list[_Traced],
+    pictures: list[Picture],
     shown: list[float],
 ) -> dict[str, Any]:
     excess = np.linspace(-5.0, 20.0, 251)
@@ -218,9 +242,9 @@ def _truth(
     }
 
 
-def _step(number: int, experiment: Experiment, state: State, picture: _Traced, shown: float) -> dict[str, Any]:
+def _step(number: int, experiment: Experiment, state: State, picture: Picture, shown: float) -> dict[str, Any]:
     s = np.linspace(0.0, float(state.s[-1]), TRUTH_POINTS)
-    x, y, u, v = (CubicSpline(state.s, row)(s) for row in (state.x, state.y, picture.u, picture.v))
+    x, y, u, v = (CubicSpline(state.s, row)(s) for row in (state.x, state.y, picture.u_px, picture.v_px))
     kappa, m = (np.interp(s, state.s, row) for row in (state.kappa, state.moment))
     return {
         "step": number,
@@ -233,6 +257,6 @@ def _step(number: int, experiment: Experiment, state: State, picture: _Traced, s
         "m": m.tolist(),
         "xy_mm": (1e3 * np.column_stack([x, y])).tolist(),
         "px": np.column_stack([u, v]).tolist(),
-        "left_px": list(picture.left),
-        "right_px": list(picture.right),
+        "left_px": list(picture.left_px),
+        "right_px": list(picture.right_px),
     }

@@ -14,6 +14,7 @@ from unittest import mock
 
 from pipeline.batch import Store, redraw
 from pipeline.batch.specimen import Stages
+from pipeline.intake.folder import read_specimen
 from pipeline.report.files import write_atomic
 from pipeline.result import Result, to_json
 from pipeline.settings import Settings
@@ -25,7 +26,18 @@ WAYS = ("killed", "power", "reordered")
 
 
 MEASURED: dict[object, Result] = {}
-"""Of specimens and logs: to measure them changes no file, and a process that is to be cut off inherits it."""
+"""Of specimens and logs: to read and measure them changes no file, and a process to be cut off inherits it."""
+
+
+@functools.cache
+def read(folder, settings, log):
+    """What a specimen folder with that log holds."""
+    return read_specimen(folder, settings)
+
+
+def known(folder, settings):
+    """The same without a look at more than the log."""
+    return read(folder, settings, (folder / "force.csv").read_bytes())
 
 
 def drawing(edition: str) -> Stages:
@@ -50,7 +62,10 @@ def drawing(edition: str) -> Stages:
 
 def run(batch: Path, out: Path, edition: str) -> None:
     """Measure what changed."""
-    with mock.patch("tests.pipeline.cheap_batch.cheap_stages", return_value=drawing(edition)):
+    with (
+        mock.patch("tests.pipeline.cheap_batch.cheap_stages", return_value=drawing(edition)),
+        mock.patch("pipeline.batch.specimen.read_specimen", known),
+    ):
         run_cheaply(batch, out, in_process=True)
 
 

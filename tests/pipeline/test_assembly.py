@@ -1,7 +1,11 @@
 """What the stages saw is gathered into a result: nothing that cost a photo is missing among the findings."""
 
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
 
 from pipeline.assembly import photo_findings, without_advice, without_those_told_better
@@ -11,8 +15,11 @@ from pipeline.report.answer import first_screen
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, leading
 from pipeline.result.headline import headline
+from pipeline.run import measure
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_result import measured_result
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_rejected_photo_is_a_finding_with_its_own_code_and_its_name():
@@ -88,9 +95,11 @@ def test_a_fit_that_failed_for_want_of_a_cause_advises_nothing_else(verdict, ext
     contradicted = Finding("identify/inverse-opposite-forces", "error", "no cable does that")
     misfit = Finding("identify/misfit-force", "warning", Message("identify/misfit-force", rms=7.0))
     part = SimpleNamespace(verdict=verdict, extended=extended)
-    told = without_advice([failed, contradicted, misfit], part)
+    open_ = Finding("identify/inverse-not-visible", "warning", "f_EI is open at 9 1/m")
+    told = without_advice([failed, contradicted, misfit, open_], part)
     explained = "info" if level == "info" else "warning"
-    assert [one.level for one in told] == [level, "error", explained] and told[1] == contradicted
+    assert [one.level for one in told] == [level, "error", explained, explained] and told[1] == contradicted
+    assert told[3].said == open_.said
     assert ("length_mm" in str(told[0].said)) == (level == "error")
 
 
@@ -108,3 +117,15 @@ def test_what_several_photos_show_alike_is_said_once_with_all_their_names():
     german = Words("de").said(told[0].said)
     assert german.language == "de" and german.text.startswith("2 Fotos (a.png, c.png), auf a.png: Das ")
     assert Words("de").said(alike.said).language == "de"
+
+
+def test_where_all_photos_are_refused_that_is_the_error(tmp_path):
+    """Errors said that no step had a photo, and that the photos were black stood below as a warning."""
+    shutil.copytree(ROOT / "fixtures/specimens/three", tmp_path / "dark")
+    for photo in (tmp_path / "dark/images").iterdir():
+        cv2.imwrite(str(photo), np.zeros((300, 400), np.uint8))
+    result = measure(tmp_path / "dark")
+    assert result.status == "failed" and "could be used" in result.headline
+    told = {(finding.code, finding.level) for finding in result.findings if finding.level != "info"}
+    assert ("photo/blank", "error") in told
+    assert not [code for code, _ in told if code.startswith("identify/")]

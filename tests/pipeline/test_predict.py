@@ -14,10 +14,9 @@ from click.testing import CliRunner
 from scipy.stats import chi2
 
 from pipeline.cli import main
-from pipeline.predict import identified_model, predict
+from pipeline.predict import ELEMENTS, identified_model, predict
 from pipeline.report.frames import prediction_frame
 from pipeline.result import DiagnosisPart, to_json
-from pipeline.settings import PredictSettings
 from pipeline.units import quantity
 from rod.inverse import estimate
 from tests.pipeline.virtual_experiment import identified, without
@@ -27,7 +26,7 @@ from tests.rod.virtual_photo import bending_test, random_cable
 
 CABLES = int(os.environ.get("CABLEBEND_STUDY_CABLES", "8"))
 LENGTH = 0.2
-POINTS = PredictSettings().elements + 1
+POINTS = ELEMENTS + 1
 LAW = StickSlip(5e-3, 1.5e-3, 4.0, 2.0)
 NATURAL = force_free(LAW, LENGTH).chord
 STEPS = np.array([5e-3, 10e-3, 15e-3])
@@ -202,7 +201,7 @@ def test_command(result, tmp_path):
 
     done = call("--displacement-mm", "5,10", "-o", str(tmp_path / "out.csv"))
     assert done.exit_code == 0
-    assert done.stdout.count(" N, rise ") == 2
+    assert done.stdout.count(" N, bow ") == 2
     assert (tmp_path / "out.csv").read_text().count("\n") == 1 + 2 * POINTS
     document = json.loads(call("--displacement-mm", "5", "--length-mm", "210", "--json").stdout)
     assert document["length_m"] == pytest.approx(0.21)

@@ -21,13 +21,12 @@ from pipeline.faults import faults_of_input
 from pipeline.identified_model import identified_model
 from pipeline.predict import predict
 from pipeline.result import Result, SpecimenPart
-from pipeline.settings import PredictSettings
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.bending_test import simulate
 
 # forces to 1e-4: with 100 elements, a tenth of the noise of the load cell
 SETTINGS = DiagnosisSettings()
-COARSE = PredictSettings(elements=100)
+COARSE = 100
 FORTH_AND_BACK = (0.006, 0.012, 0.009, 0.003)
 
 
@@ -54,9 +53,9 @@ def result_of(name):
 @pytest.mark.parametrize("name", ["hysteresis", "plastic_set", "stiffness_varying"])
 def test_what_was_found_in_the_cable_is_in_the_prediction(name):
     result, cable = result_of(name), CABLES[name][0]
-    ahead = predict(result, FORTH_AND_BACK, settings=COARSE)
+    ahead = predict(result, FORTH_AND_BACK, elements=COARSE)
     truth = bend(cable, FORTH_AND_BACK)
-    plain = predict(without_causes(result), FORTH_AND_BACK, settings=COARSE)
+    plain = predict(without_causes(result), FORTH_AND_BACK, elements=COARSE)
     assert [finding.code for finding in ahead.findings] == ["predict/cause"]
     missed = []
     for step, true, bare in zip(ahead.steps, truth, plain.steps, strict=True):
@@ -76,7 +75,7 @@ def without_causes(result):
 def test_what_belongs_to_the_rig_stays_behind():
     result = result_of("bearing_friction")
     assert [cause.name for cause in result.diagnosis.causes] == ["bearing_friction"]
-    ahead = predict(result, FORTH_AND_BACK, settings=COARSE)
+    ahead = predict(result, FORTH_AND_BACK, elements=COARSE)
     for step, true in zip(ahead.steps, bend(Cable(), FORTH_AND_BACK), strict=True):
         assert step.force_N == pytest.approx(true.F, abs=4.0 * step.force_std_N + 3e-4 * true.F)
     assert [finding.code for finding in ahead.findings] == ["predict/left-out"]
@@ -84,7 +83,7 @@ def test_what_belongs_to_the_rig_stays_behind():
 
 def test_a_cable_that_remembers_is_not_predicted_after_a_refused_step():
     result = result_of("hysteresis")
-    ahead = predict(result, (0.006, 0.03, 0.006), settings=COARSE)
+    ahead = predict(result, (0.006, 0.03, 0.006), elements=COARSE)
     assert [step.status for step in ahead.steps] == ["predicted", "refused", "refused"]
     assert "remembers" in ahead.steps[2].reason
 
@@ -93,7 +92,7 @@ def test_the_band_is_that_of_cables_drawn_from_the_joint_covariance():
     """Law, pre-curvature, amount and place of the cause drawn together: the spread of the force is its band."""
     result = result_of("stiffness_varying")
     model, rng, forces = identified_model(result), np.random.default_rng(4), []
-    (ahead,) = predict(result, [0.008], settings=COARSE).steps
+    (ahead,) = predict(result, [0.008], elements=COARSE).steps
     for _ in range(100):
         drawn = rng.standard_normal(model.factor.shape[1])
         change = model.factor @ drawn

@@ -46,7 +46,8 @@ def test_the_answer_says_which_curve_it_is_and_why(measured):
     [
         ("size/force", "error", False),
         ("size/force", "warning", False),
-        ("force/unit", "warning", False),
+        ("length/other-cable", "error", False),
+        ("photo/moving-apart", "error", False),
         ("force/sign", "warning", False),
         ("force/factor", "error", True),  # corrected, and the bands know by what
         ("force/dead", "warning", True),  # left out
@@ -65,20 +66,6 @@ def test_a_sign_turned_midway_is_corrected_and_no_fault(measured):
     correction = ForceCorrectionPart(steps=[5, 6], factor=-1.0, offset_N=0.0)
     diagnosis = diagnosis_of("adequate", measured.photos).model_copy(update={"corrected_forces": [correction]})
     assert found(measured, "force/sign").model_copy(update={"diagnosis": diagnosis}).answer.usable
-
-
-def test_photos_of_something_else(measured):
-    longer = [p.model_copy(update={"traced_length_m": 1.2 * p.traced_length_m}) for p in measured.photos]
-    told = measured.model_copy(update={"photos": longer}).answer
-    assert not told.usable and "another cable" in told.reason
-    reversed_ = [p.model_copy(update={"chord_m": 0.18 + s.displacement_m}) for p, s in _with_steps(measured)]
-    told = measured.model_copy(update={"photos": reversed_}).answer
-    assert not told.usable and "another test" in told.reason
-
-
-def _with_steps(result):
-    steps = {step.step: step for step in result.steps}
-    return [(photo, steps[photo.step]) for photo in result.photos]
 
 
 def test_a_stiffness_that_is_negative(measured):

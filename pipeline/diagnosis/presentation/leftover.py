@@ -6,7 +6,7 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import whereabouts
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.evidence import something_else
-from pipeline.messages import Message, word
+from pipeline.messages import Message
 from pipeline.result import LeftoverPart
 
 
@@ -30,5 +30,4 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
         shape_m=[] if found.s is None else found.across,
         s_m=[] if found.s is None else found.s,
         step=step.step,
-        spoken=str(word(loudest)),
     )

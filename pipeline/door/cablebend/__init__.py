@@ -11,62 +11,36 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import rod
-from pipeline import __version__
+import rod as rod
+from pipeline import __version__ as __version__
 
 if TYPE_CHECKING:
-    from pipeline.compare import compare
-    from pipeline.diagnosis.plans.design import Plan, design
-    from pipeline.errors import InputError
-    from pipeline.predict import predict
-    from pipeline.report.exports import export
-    from pipeline.report.frames import (
-        causes_frame,
-        centerlines_frame,
-        characteristic_frame,
-        forces_frame,
-        photos_frame,
-        simulation_frame,
-    )
-    from pipeline.report.plots import plot_characteristic, plot_forces, plot_photo, plot_residuals
-    from pipeline.result import Answer, Result, read_result
-    from pipeline.run import measure, write
-    from pipeline.settings import Settings
-    from pipeline.vision.single import trace_photo
+    from pipeline.compare import compare as compare
+    from pipeline.diagnosis.plans.design import Plan as Plan
+    from pipeline.diagnosis.plans.design import design as design
+    from pipeline.errors import InputError as InputError
+    from pipeline.predict import predict as predict
+    from pipeline.report.exports import export as export
+    from pipeline.report.frames import causes_frame as causes_frame
+    from pipeline.report.frames import centerlines_frame as centerlines_frame
+    from pipeline.report.frames import characteristic_frame as characteristic_frame
+    from pipeline.report.frames import forces_frame as forces_frame
+    from pipeline.report.frames import photos_frame as photos_frame
+    from pipeline.report.frames import simulation_frame as simulation_frame
+    from pipeline.report.plots import plot_characteristic as plot_characteristic
+    from pipeline.report.plots import plot_forces as plot_forces
+    from pipeline.report.plots import plot_photo as plot_photo
+    from pipeline.report.plots import plot_residuals as plot_residuals
+    from pipeline.result import Answer as Answer
+    from pipeline.result import Result as Result
+    from pipeline.result import read_result as read_result
+    from pipeline.run import measure as measure
+    from pipeline.run import write as write
+    from pipeline.settings import Settings as Settings
+    from pipeline.vision.single import trace_photo as trace_photo
     from rod import *  # noqa: F403  # all that it exports
-    from rod.balance import balance
-    from rod.inverse import estimate
-
-__all__ = [
-    "Answer",
-    "InputError",
-    "Plan",
-    "Result",
-    "Settings",
-    "__version__",
-    "balance",
-    "causes_frame",
-    "centerlines_frame",
-    "characteristic_frame",
-    "compare",
-    "design",
-    "estimate",
-    "export",
-    "forces_frame",
-    "measure",
-    "photos_frame",
-    "plot_characteristic",
-    "plot_forces",
-    "plot_photo",
-    "plot_residuals",
-    "predict",
-    "read_result",
-    "rod",
-    "simulation_frame",
-    "trace_photo",
-    "write",
-]
-__all__ += rod.__all__
+    from rod.balance import balance as balance
+    from rod.inverse import estimate as estimate
 
 ROOMS = {
     "pipeline.compare": ("compare",),
@@ -88,6 +62,8 @@ ROOMS = {
     "rod.inverse": ("estimate",),
 }
 """Module -> public names that it holds."""
+
+__all__ = ["__version__", "rod", *(name for names in ROOMS.values() for name in names)]
 
 
 def __getattr__(name: str) -> Any:

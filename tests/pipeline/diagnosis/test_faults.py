@@ -132,14 +132,21 @@ def test_covers_above_the_cable_are_told_where_they_may_be_what_is_seen(honest, 
     assert finding.code == "length/traced" and finding.message.count("bearing covers") == covers
 
 
-def test_forces_of_the_wrong_sign_and_unit(honest):
-    def scaled(factor):
-        return tuple(
-            replace(step, force=factor * step.force, hold_forces=factor * step.hold_forces) for step in honest.steps
-        )
+def test_forces_of_the_wrong_sign(honest):
+    pulling = tuple(replace(step, force=-step.force, hold_forces=-step.hold_forces) for step in honest.steps)
+    assert codes(faults_of_input(replace(honest, steps=pulling))) == ["force/sign"]
 
-    assert codes(faults_of_input(replace(honest, steps=scaled(-1.0)))) == ["force/sign"]
-    assert codes(faults_of_input(replace(honest, steps=scaled(1e6)))) == ["force/unit"]
+
+def test_photos_of_another_cable(honest):
+    longer = faults_of_input(replace(honest, length=honest.length / 1.2))
+    assert [(finding.code, finding.level) for finding in longer.findings] == [("length/other-cable", "error")]
+    assert "another cable" in longer.findings[0].message
+
+
+def test_photos_of_another_test(honest):
+    steps = [replace(step, chord=honest.steps[0].chord + 0.4 * step.displacement) for step in honest.steps]
+    found = faults_of_input(replace(honest, steps=tuple(steps)))
+    assert codes(found) == ["photo/moving-apart"] and "another test" in found.findings[0].message
 
 
 def test_one_bad_photo_is_no_cause(honest):

@@ -202,7 +202,6 @@ def test_residual_figures_are_those_of_the_noise(found, measured):
     assert 2e-6 < misfit.shape_rmse_m < 5e-6
     assert misfit.force_rmse_N < 3 * max(s.force_std for s in measured.steps)
     assert misfit.chi2 == pytest.approx(misfit.degrees_of_freedom, abs=3.0 * np.sqrt(2.0 * misfit.degrees_of_freedom))
-    assert 0 < misfit.curvature_rmse_per_m < 1.0
 
 
 def test_photo_residuals_stand_at_the_points_of_the_centerline(found, measured):

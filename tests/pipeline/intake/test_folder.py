@@ -76,9 +76,11 @@ def test_a_picture_of_a_telephone_among_others_is_named(specimen_folder):
 def test_doubled_photos_are_told(specimen_folder):
     folder = specimen_folder()
     folder.write("images/step_2.png", (folder.path / "images/step_1.png").read_bytes())
-    assert folder.message("photo/doubled") == "images/step_2.png and images/step_1.png are the same picture"
+    assert folder.message("photo/doubled") == (
+        "the same picture under several names: images/step_1.png, images/step_2.png"
+    )
     folder.write("images/step_0.png", (folder.path / "images/step_1.png").read_bytes())
-    told = "images/step_1.png, images/step_2.png and images/step_0.png are the same picture"
+    told = "the same picture under several names: images/step_0.png, images/step_1.png, images/step_2.png"
     assert folder.message("photo/doubled") == told
     twice = specimen_folder(log=(folder.path / "force.csv").read_text().replace("step_2.png", "step_1.png"), name="b")
     assert "photo/doubled" in twice.codes()

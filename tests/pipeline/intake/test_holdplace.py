@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.intake.holdplace import hold_places
-from pipeline.settings.intake import IntakeSettings
 
-SETTINGS = IntakeSettings()
 SIGMA = 1.5e-4
 
 
@@ -35,7 +33,7 @@ def test_places_scatter_about_the_truth_as_much_as_they_say(name):
     z = []
     for seed in range(60):
         logged, photo, truth = holds(seed, COURSES[name])
-        found = hold_places(logged, photo, settings=SETTINGS)
+        found = hold_places(logged, photo)
         z.append((np.array(found.place) - truth) / np.array(found.std))
     z = np.concatenate(z)
     # 360 places; sigma itself is known to 15 % of a log, and late samples within its reach pull a mean a little
@@ -45,7 +43,7 @@ def test_places_scatter_about_the_truth_as_much_as_they_say(name):
 
 def test_a_mean_is_better_than_the_sample_at_the_photo():
     logged, photo, truth = holds(1, COURSES["stands still"], samples=25)
-    found = hold_places(logged, photo, settings=SETTINGS)
+    found = hold_places(logged, photo)
     assert found.sigma == pytest.approx(SIGMA, rel=0.33)  # the median of 144 changes is known to 11 %: three of those
     assert np.all(np.array(found.std) < 0.27 * SIGMA)  # one over the root of 25, that error of sigma, a sample less
     assert np.all(np.abs(np.array(found.place) - truth) < 4.0 * SIGMA / 5.0)
@@ -60,7 +58,7 @@ def test_a_mean_is_better_than_the_sample_at_the_photo():
     ],
 )
 def test_a_log_that_tells_no_scatter_says_so(logged, photo):
-    found = hold_places(logged, photo, settings=SETTINGS)
+    found = hold_places(logged, photo)
     assert found.std == (None, None)
     assert found.place == tuple(hold[-1] for hold in logged)
 

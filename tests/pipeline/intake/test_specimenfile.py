@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.intake.specimenfile import read_specimen_file
+from pipeline.intake.specimenfile import asked_of_log, read_source, read_specimen_file
 from pipeline.settings.intake import IntakeSettings
 
 SETTINGS = IntakeSettings()
@@ -57,10 +57,11 @@ def test_every_key(tmp_path):
     assert file.rig.moving_bearing == "right"
     assert file.rig.marker_diameter_m == pytest.approx(0.012)
     assert file.rig.bearings_px == ((100.0, 500.5), (2000.0, 498.0))
-    assert file.rig.force_sign == file.log.force_sign == "tension"
-    assert (file.log.file, file.log.separator, file.log.decimal, file.log.encoding) == ("log.txt", ";", ",", "cp1252")
-    assert file.log.columns == {"force": "Kraft [N]", "displacement": 3}
-    assert file.log.units == {"force": "mN"}
+    log = asked_of_log(read_source(tmp_path, SETTINGS))
+    assert file.rig.force_sign == log.force_sign == "tension"
+    assert (log.file, log.separator, log.decimal, log.encoding) == ("log.txt", ";", ",", "cp1252")
+    assert log.columns == {"force": "Kraft [N]", "displacement": 3}
+    assert log.units == {"force": "mN"}
 
 
 def test_with_byte_order_mark_and_windows_lines(tmp_path):

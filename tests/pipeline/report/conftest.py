@@ -18,7 +18,7 @@ def full_result():
 @pytest.fixture(scope="session")
 def diagnosed(full_result):
     """The full result with a diagnosis of the verdict asked for."""
-    few = full_result.model_copy(update={"photos": full_result.photos[2:5]})
+    few = full_result.model_copy(update={"photos": full_result.photos[2:4]})
     return lambda verdict: few.model_copy(update={"diagnosis": diagnosis_of(verdict, full_result.photos)})
 
 

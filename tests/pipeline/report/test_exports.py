@@ -42,26 +42,30 @@ def stiffness(full_result):
 
 def test_a_beam_table_starts_at_rest_and_follows_the_law(full_result):
     table = beam_table(full_result.answer.curve)
-    assert (table.bend[0], table.moment[0]) == (0.0, 0.0)
-    assert np.all(np.diff(table.bend) > 0.0) and table.measured.all()
+    assert (table.bend_per_m.to_numpy()[0], table.moment_Nm.to_numpy()[0]) == (0.0, 0.0)
+    assert np.all(np.diff(table.bend_per_m.to_numpy()) > 0.0) and table.measured.all()
     # the curve of the virtual result is the law itself plus the stated error of K0, four standard deviations of it
-    law = moment_of(K0 + table.bend)
-    assert np.abs(table.moment - law).max() < 4 * 0.013 * 20e-3 + 0.03 * law.max()
+    law = moment_of(K0 + table.bend_per_m.to_numpy())
+    assert np.abs(table.moment_Nm.to_numpy() - law).max() < 4 * 0.013 * 20e-3 + 0.03 * law.max()
 
 
 def test_the_other_side_is_added_where_the_cable_is_straight_at_rest(full_result):
     curve = full_result.answer.curve
     straight = replace(curve, kappa=curve.kappa - curve.pre_curvature, pre_curvature=0.0)
     table = beam_table(straight)
-    assert np.array_equal(table.bend, -table.bend[::-1]) and np.array_equal(table.moment, -table.moment[::-1])
-    assert np.array_equal(table.measured, table.bend >= 0.0)
-    assert beam_table(curve, both_sides=True).bend.size == table.bend.size
-    assert beam_table(curve).bend[0] == 0.0  # bent at rest: its two sides may differ
+    assert np.array_equal(table.bend_per_m.to_numpy(), -table.bend_per_m.to_numpy()[::-1]) and np.array_equal(
+        table.moment_Nm.to_numpy(), -table.moment_Nm.to_numpy()[::-1]
+    )
+    assert np.array_equal(table.measured == 1, table.bend_per_m.to_numpy() >= 0.0)
+    assert len(beam_table(curve, both_sides=True)) == len(table)
+    assert beam_table(curve).bend_per_m.to_numpy()[0] == 0.0  # bent at rest: its two sides may differ
 
 
 def test_the_frame_is_the_table(full_result, failed_result):
     table, frame = beam_table(full_result.answer.curve), beam_frame(full_result)
-    assert np.array_equal(frame.bend_per_m, table.bend) and np.array_equal(frame.moment_Nm, table.moment)
+    assert np.array_equal(frame.bend_per_m, table.bend_per_m.to_numpy()) and np.array_equal(
+        frame.moment_Nm, table.moment_Nm.to_numpy()
+    )
     assert beam_frame(failed_result).empty and list(beam_frame(failed_result)) == list(frame)
 
 
@@ -71,7 +75,7 @@ def test_a_plain_table(full_result):
     assert lines[len(head)] == "bend_per_m\tmoment_Nm"
     read = np.array([line.split("\t") for line in lines[len(head) + 1 :]], float)
     table = beam_table(full_result.answer.curve, both_sides=True)
-    assert read == pytest.approx(np.column_stack([table.bend, table.moment]), rel=1e-8)
+    assert read == pytest.approx(table[["bend_per_m", "moment_Nm"]].to_numpy(), rel=1e-8)
 
 
 def test_an_abaqus_section_holds_the_curve(full_result, stiffness):
@@ -83,7 +87,7 @@ def test_an_abaqus_section_holds_the_curve(full_result, stiffness):
     assert section[2] == [pytest.approx([area, INERTIA, 0.0, INERTIA, 2.0 * INERTIA], rel=1e-8)]
     table = beam_table(full_result.answer.curve, both_sides=True)
     assert one == ("M1", {"ELASTIC": ""}, one[2]) and one[2] == two[2]
-    assert np.array(one[2]) == pytest.approx(np.column_stack([table.moment, table.bend]), rel=1e-8)
+    assert np.array(one[2]) == pytest.approx(table[["moment_Nm", "bend_per_m"]].to_numpy(), rel=1e-8)
     assert (axial[1], torque[1]) == ({"LINEAR": ""}, {"LINEAR": ""})
     assert torque[2][0][0] == pytest.approx(stiffness, rel=1e-8)
 

@@ -5,11 +5,12 @@ import io
 import pandas as pd
 import pytest
 
+from pipeline.report.cells import neutral
 from pipeline.report.evidence import knot_rows, knot_title
 from pipeline.report.figures import stiffness_unit
 from pipeline.report.files import write_atomic
 from pipeline.report.frames import causes_frame, centerlines_frame, forces_frame, photos_frame, simulation_frame
-from pipeline.report.tables import csv_text, neutral, write_result, write_tables
+from pipeline.report.tables import csv_text, write_result, write_tables
 from pipeline.report.words import Words
 from pipeline.result import from_json, visited
 from pipeline.rounding import rounded

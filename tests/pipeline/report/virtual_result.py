@@ -179,7 +179,6 @@ def ways(rng):
         shape_rmse_m=1.3e-5,
         chi2=812.0,
         degrees_of_freedom=790.0,
-        chi2_by_block={"force": (6.1, 7)},
     )
     inverse = InversePart(
         outcome="converged",
