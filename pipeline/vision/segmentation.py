@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.records import Array, PhotoHints, Rejected
+from pipeline.records import Array, PhotoHints, Rejected, doubtful
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
@@ -33,6 +33,7 @@ Window = tuple[int, int, int, int]
 
 _WIDER = 1.08  # of the width; a course's strip that is wider by more has other edges
 _RIVAL = 0.35  # of the best strip's evidence; on wire piles another cable has more, pieces of one cable less
+_OF_A_CABLE = ("photo/crossing", "photo/leaves-frame", "photo/hidden-end")  # why a strip is refused that may be a cable
 _MIN_LENGTH_SHARE = 0.2  # share of the photo's long side; a shorter strip is not the subject of the photo
 _VISIBLE_SHARE = 0.55  # share of the known length that must be seen; covers hide up to a quarter
 _MAX_LENGTH_RATIO = 1.25  # ratio to the known length; longer strips are rails and edges of the table
@@ -217,7 +218,11 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     other = next((found for found in likely if _is_rival(found, best)), None)
     if other is not None:
         return _two(photo, best, other)
-    return best
+    beside = [_length_beyond(path, best) for _, refusal, path in refusals if refusal.code in _OF_A_CABLE]
+    if max(beside, default=0.0) <= _RIVAL * best.length_px:
+        return best
+    taken = doubtful("photo/two-candidates.taken", one_px=best.length_px, other_px=max(beside))
+    return replace(best, findings=(*best.findings, taken))
 
 
 def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
