@@ -27,7 +27,6 @@ from pipeline.vision.search.beyond import (
     goes_on_at,
     rest_faced_at,
     short_of_axis,
-    unlike_from,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
@@ -213,12 +212,8 @@ def _assemble(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], cable: Cable
 ) -> RoughCable | Rejected:
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.seen)
-    unlike = unlike_from(path, kept, axes, cut.usual_width)
-    if unlike is not None:
-        return _goes_on_beyond(photo, unlike)
     width = cut.usual_width * standout.reduction
-    closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width)
+    closeup, axes, path = _settled(photo, path[without_specks(cut.seen)], axes, cut.weights, width)
     ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
     leaving = [place for place in ends if at_border(place, photo, standout.reduction, width)]
     if leaving:

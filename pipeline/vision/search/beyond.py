@@ -47,7 +47,6 @@ _BEYOND_CONTRAST = (0.6, 1.6)
 do not; covers and clamps differ by more.
 """
 _HIDDEN_WIDTHS = 15.0  # widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm
-_UNLIKE_WIDTHS = 6.0  # widths; a longer rest of a strip that looks unlike it is no cover: those are 2 to 6 wide
 _CLAMP_TAIL_SHARE = 0.1  # of the strip's length; a cable's tail beyond a clamp is shorter, its rest longer
 _WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is the whole cable
 
@@ -277,17 +276,4 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None
         outward = cut.path[::-1] if at_start else cut.path
         if distance[end] > far or _ahead(standout, cut, outward, width)[0] is not None:
             return float(path[end, 0]), float(path[end, 1])
-    return None
-
-
-def unlike_from(path: Array, kept: slice, axes: Axes, width: float) -> Place | None:
-    """Where a strip (n, 2) in px, points a cell apart, begins to look unlike the part of it that is ``kept``, long.
-
-    A cable whose sheath changes its colour is a strip of one width, but what one colour tells ends with that; under a
-    visible end such a rest is no end of it.
-    """
-    rests = ((axes[0], kept.start, kept.start), (axes[1], len(path) - kept.stop, kept.stop - 1))
-    for axis, rest, last in rests:
-        if axis.kind in ("end", "clamp") and rest > _UNLIKE_WIDTHS * width:
-            return float(path[last, 0]), float(path[last, 1])
     return None
