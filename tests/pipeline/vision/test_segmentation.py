@@ -296,13 +296,6 @@ def test_unusable_photo_is_refused_with_its_reason(code: str, changes: dict[str,
     assert outcome.figure
 
 
-@pytest.mark.parametrize(("aside", "told"), [(0.06, True), (0.2, False)], ids=["half in the picture", "outside"])
-def test_another_cable_that_cannot_be_measured_is_told(aside: float, told: bool) -> None:
-    outcome, _ = find(scene(others=(replace(SECOND, place_m=(aside, 0.022)),), covers=(None, None)), UNKNOWN)
-    assert isinstance(outcome, RoughCable)
-    assert ("photo/two-candidates" in {finding.code for finding in outcome.findings}) == told
-
-
 @pytest.mark.parametrize(
     ("changes", "cable"),
     [
