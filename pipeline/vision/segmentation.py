@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from pipeline.records import Array, PhotoHints, Rejected, doubtful
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
-from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
+from pipeline.vision.judgement import Cable, judge_strip, refused, refused_at
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
@@ -214,7 +214,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
     # in one colour the arms of a crossing look alike, whatever cables they are of
     if best.evidence.crossed is not None or (best.branching and (best.grid_px > 1.0 or _is_piece(best))):
-        return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
+        return refused_at(photo, "photo/crossing", best.evidence.crossed or best.path_px[len(best.path_px) // 2])
     other = next((found for found in likely if _is_rival(found, best)), None)
     if other is not None:
         return _two(photo, best, other)
@@ -229,7 +229,7 @@ def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
     """The refusal of two strips, one of which may be the cable, or both, where they meet."""
     met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
     if met:
-        return crossing(photo, met[0])
+        return refused_at(photo, "photo/crossing", met[0])
     return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
 
 
