@@ -27,7 +27,6 @@ from pipeline.vision.search.beyond import (
     goes_on_at,
     rest_faced_at,
     short_of_axis,
-    unlike_from,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
@@ -102,18 +101,18 @@ def judge_strip(
 def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable) -> RoughCable | Rejected:
     cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
     if approaches_itself(strip.path, reading.width):
-        return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
+        return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     axes = _axes(photo, standout, reading, strip, cut, cable)
     branching = branches(strip, reading)
     if isinstance(axes, Rejected):
         if branching:  # which of its arms leaves the picture nobody can tell
-            return crossing(photo, standout.to_pixels(strip.path[len(strip.path) // 2]))
+            return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
     short = short_of_axis(standout, cut, axes)
     if short is not None:
-        return _goes_on_beyond(photo, short)
+        return refused_at(photo, "photo/hidden-end.goes-on", short)
     path = lead_to_axes(standout, strip.path, reading.width, axes)
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
@@ -124,7 +123,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     others = [other for other in reading.strips if other is not strip]
     more = goes_on_at(standout, cut, axes) or rest_faced_at(standout, cut, axes, others, length_px=cable.length_px)
     if more is not None and not cable.any_length:
-        return _goes_on_beyond(photo, more)
+        return refused_at(photo, "photo/hidden-end.goes-on", more)
     found = _assemble(photo, standout, cut, axes, cable)
     if isinstance(found, Rejected):
         return found
@@ -142,10 +141,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     return replace(found, branching=branching, goes_on=more is not None, evidence=evidence, findings=told)
 
 
-def crossing(photo: Photo, place: Sequence[float] | Array) -> Rejected:
-    """The refusal of a cable whose course is ambiguous at a place (u, v) px."""
-    u, v = float(place[0]), float(place[1])
-    return refused(photo, "photo/crossing", u_px=u, v_px=v)
+def refused_at(photo: Photo, key: str, place: Sequence[float] | Array) -> Rejected:
+    """The refusal of a photo for what is seen at a place (u, v) px."""
+    return refused(photo, key, u_px=float(place[0]), v_px=float(place[1]))
 
 
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None:
@@ -179,18 +177,13 @@ def _axes(
     )
     leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving and cover is None and cable.bearings.given_px is None:
-        return _leaves(photo, leaving[0])
+        return refused_at(photo, "photo/leaves-frame", leaving[0])
     first, second = find_bearings(photo, ends, width, cable.bearings)
     if first is not None and second is not None:
         return first, second
     if leaving:
-        return _leaves(photo, leaving[0])
-    place = ends[0 if first is None else 1].place
-    return refused(photo, "photo/bearing.no-cover", u_px=float(place[0]), v_px=float(place[1]))
-
-
-def _leaves(photo: Photo, place: Sequence[float] | Array) -> Rejected:
-    return refused(photo, "photo/leaves-frame", u_px=float(place[0]), v_px=float(place[1]))
+        return refused_at(photo, "photo/leaves-frame", leaving[0])
+    return refused_at(photo, "photo/bearing.no-cover", ends[0 if first is None else 1].place)
 
 
 def _check_width(photo: Photo, cut: CrossCut, reduction: int, cable: Cable) -> Rejected | None:
@@ -205,24 +198,12 @@ def _check_width(photo: Photo, cut: CrossCut, reduction: int, cable: Cable) -> R
     return None
 
 
-def _goes_on_beyond(photo: Photo, place: tuple[float, float]) -> Rejected:
-    return refused(photo, "photo/hidden-end.goes-on", u_px=float(place[0]), v_px=float(place[1]))
-
-
 def _assemble(
     photo: Photo, standout: Standout, cut: CrossCut, axes: tuple[Bearing, Bearing], cable: Cable
 ) -> RoughCable | Rejected:
     path = standout.to_pixels(cut.path)
-    kept = without_specks(cut.seen)
-    unlike = unlike_from(path, kept, axes, cut.usual_width)
-    if unlike is not None:
-        return _goes_on_beyond(photo, unlike)
     width = cut.usual_width * standout.reduction
-    closeup, axes, path = _settled(photo, path[kept], axes, cut.weights, width)
-    ends = [axis.center_px for axis in axes if axis.kind in ("end", "clamp")]
-    leaving = [place for place in ends if at_border(place, photo, standout.reduction, width)]
-    if leaving:
-        return _leaves(photo, leaving[0])
+    closeup, axes, path = _settled(photo, path[without_specks(cut.seen)], axes, cut.weights, width)
     path, visible = between_axes(path, axes, COVER_MARGIN_WIDTHS * width)
     if visible is None:
         return refused(photo, "photo/bearing.nothing")

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.records import Array, PhotoHints, Rejected
+from pipeline.records import Array, PhotoHints, Rejected, doubtful
 from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
 from pipeline.vision.evidence import unlike_a_cable
-from pipeline.vision.judgement import Cable, crossing, judge_strip, refused
+from pipeline.vision.judgement import Cable, judge_strip, refused, refused_at
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
@@ -33,6 +33,7 @@ Window = tuple[int, int, int, int]
 
 _WIDER = 1.08  # of the width; a course's strip that is wider by more has other edges
 _RIVAL = 0.35  # of the best strip's evidence; on wire piles another cable has more, pieces of one cable less
+_OF_A_CABLE = ("photo/crossing", "photo/leaves-frame", "photo/hidden-end")  # why a strip is refused that may be a cable
 _MIN_LENGTH_SHARE = 0.2  # share of the photo's long side; a shorter strip is not the subject of the photo
 _VISIBLE_SHARE = 0.55  # share of the known length that must be seen; covers hide up to a quarter
 _MAX_LENGTH_RATIO = 1.25  # ratio to the known length; longer strips are rails and edges of the table
@@ -213,18 +214,22 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
     # in one colour the arms of a crossing look alike, whatever cables they are of
     if best.evidence.crossed is not None or (best.branching and (best.grid_px > 1.0 or _is_piece(best))):
-        return crossing(photo, best.evidence.crossed or best.path_px[len(best.path_px) // 2])
+        return refused_at(photo, "photo/crossing", best.evidence.crossed or best.path_px[len(best.path_px) // 2])
     other = next((found for found in likely if _is_rival(found, best)), None)
     if other is not None:
         return _two(photo, best, other)
-    return best
+    beside = [_length_beyond(path, best) for _, refusal, path in refusals if refusal.code in _OF_A_CABLE]
+    if max(beside, default=0.0) <= _RIVAL * best.length_px:
+        return best
+    taken = doubtful("photo/two-candidates.taken", one_px=best.length_px, other_px=max(beside))
+    return replace(best, findings=(*best.findings, taken))
 
 
 def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
     """The refusal of two strips, one of which may be the cable, or both, where they meet."""
     met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
     if met:
-        return crossing(photo, met[0])
+        return refused_at(photo, "photo/crossing", met[0])
     return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
 
 

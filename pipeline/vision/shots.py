@@ -14,13 +14,12 @@ from functools import partial
 import numpy as np
 
 from pipeline.messages import Message
-from pipeline.records import Array, Finding, LoadStep, Preview, Rejected, Specimen, doubtful, inferred
+from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.cover_size import cover_radius
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
-    Fixed,
     apart_px,
     expected_covers,
     fixed_cover,
@@ -33,7 +32,7 @@ from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.scale.calibration import Calibration, chords_px, from_number
+from pipeline.vision.scale.calibration import Calibration, from_number
 from pipeline.vision.segmentation import find_cable
 
 
@@ -242,8 +241,7 @@ def with_fixed_cover(
 ) -> list[Shot]:
     """Photos on which something else was taken for the fixed bearing's cover: searched again where it stands.
 
-    A photo that shows it in neither place is refused, unless what was found is a cover all round and the chord from it
-    is what the log says: the camera moved.
+    A photo that shows it in neither place is refused, unless what was found is a cover all round: the camera moved.
     """
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
@@ -255,37 +253,16 @@ def with_fixed_cover(
     diameter = None if fixed.cover.radius_px is None else 2.0 * fixed.cover.radius_px
     hints = BearingHints(cover_px=diameter, seen=(fixed.cover,))
     expected = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
-    travel = np.array([shots[k].step.displacement_m for k in there]) * scale
     settled = list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
         again = _find_again(specimen, shots[k], expected, settings)
         if isinstance(again, RoughCable) and stands_still(again, fixed, play):
             settled[k] = replace(shots[k], found=again)
-        elif not is_sure(cable, fixed.side) or _chord_speaks_against(cable, found, fixed, travel, k=there.index(k)):
+        elif not is_sure(cable, fixed.side):
             apart = apart_px(cable, fixed) / scale
             said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart)
             settled[k] = replace(shots[k], found=Rejected(cable.image, said))
     return settled
-
-
-_NEARER = 0.25  # of the error of one chord, that of another which is right beside it
-
-
-def _chord_speaks_against(
-    cable: RoughCable, found: list[RoughCable], fixed: Fixed, travel_px: Array, *, k: int
-) -> bool:
-    """Whether the chord from where the fixed cover stands is what log and other photos say, and that found is not.
-
-    Of a camera that came nearer both are off, the first by half as much. ``k`` is the place of the cable among those
-    found; one without a displacement tells nothing.
-    """
-    others = [i for i in range(len(found)) if i not in fixed.astray and np.isfinite(travel_px[i])]
-    if not others or not np.isfinite(travel_px[k]):
-        return False
-    known = float(np.median(chords_px([found[i] for i in others]) + travel_px[others])) - travel_px[k]
-    other = cable.right if fixed.side == "left" else cable.left
-    there = float(np.hypot(*np.subtract(other.center_px, fixed.cover.center_px)))
-    return bool(abs(there - known) < _NEARER * abs(float(chords_px([cable])[0]) - known))
 
 
 _CROPPED_LENGTH = 0.03

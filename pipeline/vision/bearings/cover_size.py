@@ -28,9 +28,9 @@ from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Ci
 from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
-from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.ends import CableEnd
+from pipeline.vision.search.strips import end_direction
 
 _COVER_RADII_WIDTHS = (0.62, 3.2)
 """Widths of the cable; range of radii searched where no size is given: covers of 1.4 to 6 diameters, and the mask may
@@ -121,12 +121,8 @@ def _to_mark(lost: _LostEnd) -> float | None:
 def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     """The first and the last point in which the cable is seen, with the direction in which it goes on."""
     first, last = cable.visible
-    body = cable.path_px[first : last + 1]
-    gaps = step_lengths(body)
-    back = min(max(1, round(2.0 * cable.half_width_px / median(gaps))), len(body) - 1)
-    starts = body[0] - body[back], body[-1] - body[-1 - back]
-    ends = [CableEnd(place, way / np.hypot(*way)) for place, way in zip(body[[0, -1]], starts, strict=True)]
-    return ends[0], ends[1]
+    body, width = cable.path_px[first : last + 1], 2.0 * cable.half_width_px
+    return CableEnd(body[0], end_direction(body[::-1], width)), CableEnd(body[-1], end_direction(body, width))
 
 
 @dataclass

@@ -127,12 +127,11 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
     ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
     beside = np.abs(aside) < 0.8 * width_px
-    # Mostly the mask ends at the rim and all behind it is cable; if it ends behind the cover, cable begins before that.
+    # Mostly the mask ends at the rim and all behind it is cable.
     # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
     partial: Circle | None = None
     tries = (
         (along < 0.0, prior, 1.0, MIN_RIM),
-        (along < -2.4 * radius.px, prior, 1.0, MIN_RIM),
         (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
         (along < -np.inf, ahead, 1.0, SURE_RIM),
     )

@@ -17,7 +17,6 @@ covariance; the reasons for a spline of the curvature are measured in the tests.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -110,64 +109,9 @@ def fit_curve(
         Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
         Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
     """
-    found = _settle(
-        points,
-        std,
-        start,
-        s,
-        order=order,
-        longest=longest,
-        correlation_length=correlation_length,
-        iterations=iterations,
-    )
-    smooth = found.problem.smooth(found.length, bias_share=bias_share)
-    curve = found.before.moved(smooth.estimate - found.before.parameters)
-    s, residual = _step_to_foot(curve, points, curve.foot(points, found.s, steps=1))
-    return CurveFit(curve, smooth, points, std, s, residual, found.weight)
-
-
-def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int, iterations: int = 2) -> PlaneCurve:
-    """Smooth curve along points ``(n, 2)`` of equal errors, for the next search: a step or two, no covariance."""
-    spacing = median(np.diff(s))
-    return _settle(
-        points,
-        np.ones(len(points)),
-        start,
-        s,
-        order=order,
-        longest=spacing,
-        correlation_length=spacing,
-        iterations=iterations,
-    ).curve
-
-
-class _Settled(NamedTuple):
-    """Curve after the last step, and before it the curve with its problem, feet, weights and correlation length."""
-
-    curve: PlaneCurve
-    before: PlaneCurve
-    problem: Problem
-    s: Array
-    weight: Array
-    length: float
-
-
-def _settle(
-    points: Array,
-    std: Array,
-    curve: PlaneCurve,
-    s: Array,
-    *,
-    order: int,
-    longest: float,
-    correlation_length: float | None,
-    iterations: int,
-) -> _Settled:
-    """Gauss-Newton with robust weights, ``iterations`` steps at most."""
-    weight = np.ones(len(points))
+    curve, weight, moved = start, np.ones(len(points)), 0.0
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
     length = median(np.diff(s)) if correlation_length is None else correlation_length
-    moved = 0.0
     for iteration in range(iterations):
         s, residual = _step_to_foot(curve, points, s)
         spread = max(scatter(residual / std, 0.0), 1e-12)
@@ -175,17 +119,31 @@ def _settle(
             # A step leaves less than a tenth of its length: points as near as that may still be the curve's. A gap
             # among them starts the fit pixels off, and all beyond it would count as outliers.
             weight = _biweight(residual / std, max(spread, 0.1 * moved))
-        problem = _linear(curve, s, residual, std, weight, order)
+        before, problem = curve, _linear(curve, s, residual, std, weight, order)
         if iteration == 1 and correlation_length is None:
             length = problem.correlation_length(longest)
-        step = problem.estimate(length) - curve.parameters
-        found = _Settled(curve.moved(step), curve, problem, s, weight, length)
-        curve = found.curve
+        step = problem.estimate(length) - before.parameters
+        curve = before.moved(step)
         moved = float(np.max(np.abs(problem.design @ step)) / median(std))
         # A hundredth of a point's error: the curve's own is a tenth to a third of it.
         if iteration > 1 and moved < 0.01 * spread:
             break
-    return found
+    smooth = problem.smooth(length, bias_share=bias_share)
+    curve = before.moved(smooth.estimate - before.parameters)
+    s, residual = _step_to_foot(curve, points, curve.foot(points, s, steps=1))
+    return CurveFit(curve, smooth, points, std, s, residual, weight)
+
+
+def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int) -> PlaneCurve:
+    """Smooth curve along most of the points ``(n, 2)``, of equal errors, for the next search: no covariance."""
+    even, curve, apart = np.ones(len(points)), start, median(np.diff(s))
+    weight = even
+    for _ in range(2):
+        s, residual = _step_to_foot(curve, points, s)
+        curve = curve.moved(_linear(curve, s, residual, even, weight, order).estimate(apart) - curve.parameters)
+        _, left = _step_to_foot(curve, points, s)
+        weight = _biweight(left, max(scatter(left, 0.0), 1e-12))
+    return curve
 
 
 def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array, order: int) -> Problem:

@@ -29,6 +29,7 @@ from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
 from pipeline.vision.median import median, medians
+from pipeline.vision.search.flanks import steepest
 
 SEARCH_RADII = 0.35
 """Of the radius; how far from its expected place an edge is sought: a path misled by a shadow is off by less, the next
@@ -108,7 +109,7 @@ def search_edges(
     for side, sign in ((0, -1.0), (1, 1.0)):
         near = np.exp(-0.5 * ((t - middle[side]) / sigma) ** 2)
         score = np.where(ok[:, None], np.maximum(sign * rise, 0.0), 0.0) * near
-        edges[:, side] = _peak(score, t)
+        edges[:, side] = steepest(score, t, np.zeros(count), np.inf, -np.inf)
         ok &= score.max(axis=1) > 0.0
     return Found(s.reshape(count, block).mean(axis=1), edges, ok)
 
@@ -121,15 +122,6 @@ def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple
     pair = np.sqrt(np.maximum(-rise[:, None], 0.0) * np.maximum(rise[None, :], 0.0)) * np.exp(-0.5 * prior)
     first, second = np.unravel_index(int(np.nanargmax(pair)), pair.shape)
     return float(t[first]), float(t[second])
-
-
-def _peak(score: Array, t: Array) -> Array:
-    """Place of the largest value of each row, refined by the parabola through its neighbours."""
-    at = np.clip(np.argmax(score, axis=1), 1, len(t) - 2)
-    rows = np.arange(len(score))
-    a, b, c = score[rows, at - 1], score[rows, at], score[rows, at + 1]
-    bend = np.where(a - 2 * b + c < 0.0, a - 2 * b + c, -np.inf)
-    return np.asarray(t[at] + np.clip(0.5 * (a - c) / bend, -0.5, 0.5))
 
 
 def edge_pixels(

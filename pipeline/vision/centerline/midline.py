@@ -43,7 +43,7 @@ from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 LEAST_SECTIONS = 12  # measured, or found in the search, at all; fewer do not fix a curve that bends both ways
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
-_TOGETHER = 4  # sections
+_TOGETHER = 4  # sections; fewer make no stretch of cable
 _MEDIAN = 15  # sections of a running median: two to three diameters
 _INSIDE_RADII = 0.25
 """Of the radius; part of the sheath used for an edge: leaves out highlight and text, and the farther from the edge, the
@@ -155,7 +155,7 @@ def measure_sections(
     place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
-    keep = _from_stretch_to_stretch(keep)
+    keep = _from_stretch_to_stretch(keep, keep & good.all(axis=1))
     if np.count_nonzero(keep) < LEAST_SECTIONS:
         return None
     s, place, std = s[keep], place[keep], std[keep]
@@ -216,11 +216,21 @@ def _of_usual_width(width: Array) -> NDArray[np.bool_]:
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
 
 
-def _from_stretch_to_stretch(keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The mask ``(k,)`` without single sections beyond its outermost stretches: a pin on a block may be as wide."""
-    stretch = np.flatnonzero(binary_opening(keep, np.ones(_TOGETHER, dtype=bool)))
+def _from_stretch_to_stretch(keep: NDArray[np.bool_], both: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The mask ``(k,)`` without single sections beyond its outermost stretches, and without ends of one edge.
+
+    A pin on a block may be as wide as the cable, and one edge of a jaw that hides it may go on where the cable's did.
+    Such an end is longer than what stripes and shades leave of one edge farther in.
+    """
+    stretch = binary_opening(keep, np.ones(_TOGETHER, dtype=bool))
+    kept, shown = np.flatnonzero(stretch), np.flatnonzero(stretch & both)
+    if not len(shown):
+        return keep
+    longest = max(int(np.diff(shown).max(initial=0)), _TOGETHER)
+    first = shown[0] if shown[0] - kept[0] > longest else kept[0]
+    last = shown[-1] if kept[-1] - shown[-1] > longest else kept[-1]
     index = np.arange(len(keep))
-    return keep & (index >= stretch[0]) & (index <= stretch[-1]) if len(stretch) else keep
+    return np.asarray(keep & (index >= first) & (index <= last))
 
 
 def _running_median(values: Array) -> Array:

@@ -116,7 +116,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
     wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
     intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
-    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER, iterations=1)
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER)
     covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)

@@ -23,8 +23,8 @@ from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
 from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
-from pipeline.vision.search.ends import led_on, straight_body
-from pipeline.vision.search.strips import JOINT_ANGLE_DEG, THICK_WIDTHS, Strip, end_direction, thick_part
+from pipeline.vision.search.ends import led_on, runs_of, straight_body
+from pipeline.vision.search.strips import THICK_WIDTHS, Strip, arc_joins, thick_part
 
 LEAST_MORE_WIDTHS = 2.5  # widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter
 _BEYOND_WIDTHS = 10.0  # widths; so far beyond a visible end more of the cable is looked for
@@ -47,7 +47,6 @@ _BEYOND_CONTRAST = (0.6, 1.6)
 do not; covers and clamps differ by more.
 """
 _HIDDEN_WIDTHS = 15.0  # widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm
-_UNLIKE_WIDTHS = 6.0  # widths; a longer rest of a strip that looks unlike it is no cover: those are 2 to 6 wide
 _CLAMP_TAIL_SHARE = 0.1  # of the strip's length; a cable's tail beyond a clamp is shorter, its rest longer
 _WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is the whole cable
 
@@ -95,48 +94,34 @@ def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_sta
         The first point, else the last.
     """
     path, width = cut.path[::-1] if at_start else cut.path, cut.usual_width
-    leaving = end_direction(path, width)
     usual = median(_weber(standout, cut, width))
     facing = [
         (float(np.hypot(*(rest[0] - path[-1]))), rest)
         for other in others
         for rest in (other.path, other.path[::-1])
-        if other.length > MIN_PARTNER_WIDTHS * width and _arc_joins(path[-1], leaving, rest, width)
+        if other.length > MIN_PARTNER_WIDTHS * width and arc_joins(path, rest, width, _SHEET_TURN_DEG)
     ]
-    for gap, rest in sorted(facing, key=lambda found: found[0]):
+    near = [found for found in facing if found[0] <= _SHEET_WIDTHS * width]
+    for gap, rest in sorted(near, key=lambda found: found[0]):
         more = cut_across(standout, rest, width, known=True, weights=cut.weights)
         if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
             return gap
     return None
 
 
-def _arc_joins(end: Array, leaving: Array, rest: Array, width: float) -> bool:
-    """True if an arc from an end (2,), which it leaves along ``leaving``, arrives at the start of ``rest`` along it.
-
-    An arc leaves its chord by the angle by which it comes back to it; a cable that bends unevenly by about that.
-    """
-    gap, arriving = rest[0] - end, -end_direction(rest[::-1], width)
-    if np.hypot(*gap) > _SHEET_WIDTHS * width:
-        return False
-    out, back = (np.degrees(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)) for a, b in ((leaving, gap), (gap, arriving)))
-    return bool(max(abs(out), abs(back)) < _SHEET_TURN_DEG and abs(out - back) < JOINT_ANGLE_DEG)
-
-
 def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = LEAST_MORE_WIDTHS) -> Array | None:
     """The path of a strip, led on beyond both ends for as long as there is more of the same, ``least`` widths long.
 
-    None where it cannot be led on, or where there are scraps of the same beyond: the cable cannot be followed there.
+    None where it cannot be led on.
     """
     path = cut.path
     most = (1.0 + _BEYOND_MOST_SHARE) * len(path)
     for _ in range(2):
         path = path[::-1]
-        longer, scraps = _ahead(standout, cut, path, width, least)
+        longer = _ahead(standout, cut, path, width, least)
         while longer is not None and len(longer) < most:
             path = longer
-            longer, scraps = _ahead(standout, cut, path, width, least)
-        if scraps > LEAST_MORE_WIDTHS * width:
-            return None
+            longer = _ahead(standout, cut, path, width, least)
     return path if len(path) > len(cut.path) else None
 
 
@@ -167,13 +152,13 @@ def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Stri
 
 def _ahead(
     standout: Standout, cut: CrossCut, path: Array, width: float, least: float = LEAST_MORE_WIDTHS
-) -> tuple[Array | None, int]:
-    """The path and the more of the same beyond its last point, None if there is none; and how much in all there is.
+) -> Array | None:
+    """The path and the more of the same beyond its last point, None if there is none.
 
     A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place.
     """
     usual = median(_weber(standout, cut, width))
-    best, scraps = None, 0
+    best = None
     for lead in _BEYOND_LEADS_WIDTHS:
         led, ahead = _led_into_picture(standout, path, width, lead)
         if len(ahead) < least * width:
@@ -182,23 +167,21 @@ def _ahead(
         if more.dark != cut.dark:
             continue
         alike = _alike(standout, more, width, usual)
-        scraps = max(scraps, int(alike.sum()))
         # the cut's points are a cell apart, a bent lead's more: what it bends to at last is not followed
         stop = min(_end_of_more(more, alike, width, least, cut.contrast), len(ahead))
         if stop and (best is None or len(led) + stop > len(best)):
             best = np.vstack([led, more.path[:stop]])
             if stop > 0.8 * len(ahead):
                 break  # no other lead is much better
-    return best, scraps
+    return best
 
 
 def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, least: float, contrast: float) -> int:
     """How many sections there are to the end of the last long run of those alike; 0 without a long one."""
-    edges = np.flatnonzero(np.diff(np.r_[0, alike, 0]))
-    long = np.flatnonzero(edges[1::2] - edges[::2] > least * width)
-    if not len(long):
+    long = [stop for start, stop in runs_of(alike) if stop - start > least * width]
+    if not long:
         return 0
-    stop = int(edges[1::2][long[-1]])
+    stop = long[-1]
     # edges are lost at the rounded corners of an end, a width of it at most
     faint = np.flatnonzero(more.step[stop : stop + round(width)] < SEEN_SHARE * contrast)
     return min(stop + (int(faint[0]) if len(faint) else round(width)), len(alike))
@@ -234,7 +217,7 @@ def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
     width = cut.usual_width
     for axis, at_start in zip(axes, (True, False), strict=True):
         path = cut.path[::-1] if at_start else cut.path
-        if axis.kind in ("end", "clamp") and _ahead(standout, cut, path, width)[0] is not None:
+        if axis.kind in ("end", "clamp") and _ahead(standout, cut, path, width) is not None:
             return axis.center_px
         if axis.kind == "end" and fades(standout, cut, width, at_start=at_start):
             return axis.center_px
@@ -275,19 +258,6 @@ def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None
         if axis.kind != "given" or not ahead or distance[end] < near:
             continue
         outward = cut.path[::-1] if at_start else cut.path
-        if distance[end] > far or _ahead(standout, cut, outward, width)[0] is not None:
+        if distance[end] > far or _ahead(standout, cut, outward, width) is not None:
             return float(path[end, 0]), float(path[end, 1])
-    return None
-
-
-def unlike_from(path: Array, kept: slice, axes: Axes, width: float) -> Place | None:
-    """Where a strip (n, 2) in px, points a cell apart, begins to look unlike the part of it that is ``kept``, long.
-
-    A cable whose sheath changes its colour is a strip of one width, but what one colour tells ends with that; under a
-    visible end such a rest is no end of it.
-    """
-    rests = ((axes[0], kept.start, kept.start), (axes[1], len(path) - kept.stop, kept.stop - 1))
-    for axis, rest, last in rests:
-        if axis.kind in ("end", "clamp") and rest > _UNLIKE_WIDTHS * width:
-            return float(path[last, 0]), float(path[last, 1])
     return None

@@ -37,7 +37,6 @@ from pipeline.vision.search.strips import (
 
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
-_RING_GAP_WIDTHS = 2.5  # widths; a ring or writing on the sheath interrupts the skeleton so far, covers farther
 _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
 _JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
 _TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
@@ -181,9 +180,8 @@ def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) 
     mask = strip_mask(above, width)
     thick = thick_part(mask, THICK_WIDTHS * width)
     strips = [s for s in find_strips(mask, thick, width) if s.length <= wanted.most_length]
-    short = not strips or strips[0].length < wanted.least_length
-    gap = _JOINT_GAP_WIDTHS if short or wanted.across_objects else _RING_GAP_WIDTHS
-    joined = join_strips(strips, width, gap=gap * width, obstacle=None if wanted.across_objects else thick)
+    obstacle = None if wanted.across_objects else thick
+    joined = join_strips(strips, width, gap=_JOINT_GAP_WIDTHS * width, obstacle=obstacle)
     strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:
         width = strips[0].width

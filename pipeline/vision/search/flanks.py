@@ -85,8 +85,8 @@ def find_flanks(
     middle = np.interp(np.arange(len(relief)), every, course)
     least = _LEAST_EDGE_SHARE * usual
     slope = _pooled(slope, pooling)
-    left = _steepest(slope, offsets, middle - 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
-    right = _steepest(-slope, offsets, middle + 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
+    left = steepest(slope, offsets, middle - 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
+    right = steepest(-slope, offsets, middle + 0.5 * best, _EDGE_REACH_WIDTHS * best, least)
     return Flanks(left, right, middle, best)
 
 
@@ -155,8 +155,8 @@ def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, 
     return float(tried[np.flatnonzero(totals >= _PAIR_WIDTH_SHARE * totals.max())[-1]])
 
 
-def _steepest(slope: Array, offsets: Array, about: Array, reach: float, least: float) -> Array:
-    """Offset of the steepest place within ``reach`` of ``about``, by a parabola; NaN where it is flat there."""
+def steepest(slope: Array, offsets: Array, about: Array, reach: float, least: float) -> Array:
+    """Offsets ``(n,)`` of the steepest places within ``reach`` of ``about``, by a parabola; NaN where it is flat."""
     inside = np.abs(offsets - about[:, None]) <= reach
     place = np.argmax(np.where(inside, slope, -1.0), axis=1)
     rows, spacing = np.arange(len(slope)), float(offsets[1] - offsets[0])

@@ -186,7 +186,7 @@ def _best_joint(
                     gap = float(np.hypot(*(second[0] - first[-1])))
                     if gap >= least or (obstacle is not None and _blocked(first[-1], second[0], obstacle)):
                         continue
-                    if _continues(first, second, width):
+                    if arc_joins(first, second, width, JOINT_ANGLE_DEG):
                         best, least = (i, j, first, second), gap
     return best
 
@@ -196,15 +196,17 @@ def _blocked(start: Array, stop: Array, obstacle: Mask) -> bool:
     return bool(obstacle[v, u].any())
 
 
-def _continues(first: Array, second: Array, width: float) -> bool:
-    """True if ``second`` goes on where ``first`` ends, by the directions of both and of the gap."""
-    leaving, arriving = end_direction(first, width), -end_direction(second[::-1], width)
-    gap = second[0] - first[-1]
-    length = float(np.hypot(*gap))
-    # Skeletons end up to half a width short and aside, so the direction of a short gap means nothing.
-    along = gap / length if length > width else (leaving + arriving) / (np.hypot(*(leaving + arriving)) + 1e-12)
-    limit = np.cos(np.radians(JOINT_ANGLE_DEG))
-    return bool(leaving @ arriving > limit and leaving @ along > limit and arriving @ along > limit)
+def arc_joins(first: Array, second: Array, width: float, most_deg: float) -> bool:
+    """True if an arc that leaves the end of ``first`` along it arrives at the start of ``second`` along that.
+
+    An arc leaves its chord by the angle by which it comes back to it, at most ``most_deg``; a cable that bends unevenly
+    by about that. Skeletons end up to half a width short and aside, so the direction of a short gap means nothing.
+    """
+    leaving, arriving, gap = end_direction(first, width), -end_direction(second[::-1], width), second[0] - first[-1]
+    chord = gap if np.hypot(*gap) > width else leaving + arriving
+    ways = ((leaving, chord), (chord, arriving))
+    out, back = (np.degrees(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)) for a, b in ways)
+    return bool(max(abs(out), abs(back)) < most_deg and abs(out - back) < JOINT_ANGLE_DEG)
 
 
 def end_direction(path: Array, width: float) -> Array:

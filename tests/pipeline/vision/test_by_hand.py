@@ -47,6 +47,13 @@ def test_a_region_chooses_one_of_two_cables(tmp_path):
     assert _off(found, _bow(170.0)) < 0.3
 
 
+def test_another_cable_that_leaves_the_picture_is_told(tmp_path):
+    for others in ((), (_bow(390.0) + np.array([300.0, 0.0]),)):
+        found = trace_photo(_written(tmp_path, _bow(170.0), *others))
+        assert isinstance(found, Centerline), found.reason
+        assert ("photo/two-candidates" in {finding.code for finding in found.findings}) == bool(others)
+
+
 def test_clicks_tell_which_cable_and_where_it_ends(tmp_path):
     path = _written(tmp_path, _bow(170.0), _bow(390.0))
     clicks = tuple((float(u), float(v) + 3.0) for u, v in _bow(390.0)[5:-5:40])

@@ -209,7 +209,9 @@ def test_fewer_points_than_parameters_are_followed():
     frame = make_frame(0.0, LENGTH, intervals=16, order=3)
     assert frame.size > len(points)
     s = 0.2 * turn
-    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=3, iterations=3)
+    path = initial_curve(points, s, frame)
+    for _ in range(3):
+        path = follow_points(points, start=path, s=s, order=3)
     # three steps from a start that is the circle but for its chords, 1e-3 of the curvature: each squares what is off
     assert_allclose(path.at(path.foot(points, s))[0], points, atol=1e-8 * LENGTH)
     assert_allclose(path.curvature(s), 5.0, rtol=1e-4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -11,7 +12,7 @@ from scipy.stats import norm
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges, straighten
-from pipeline.vision.centerline.midline import Cover, free_of_covers
+from pipeline.vision.centerline.midline import Cover, free_of_covers, measure_sections
 
 BLUR, DARK, STEP = 0.9, 0.2, 0.6
 ACROSS = np.arange(-8.0, 7.0)
@@ -140,6 +141,18 @@ def test_straightened_strip_is_the_picture_along_the_path():
     s, t = np.linspace(50.0, 300.0, 7), np.array([-10.0, 0.0, 10.0])
     exact = 0.001 * (s[:, None] + 20.0) + 0.005 * (60.0 + t)
     assert_allclose(straighten(ground, straight(), s, t), exact, atol=1e-4)  # remap rounds to 1/32 px, at 0.006 a px
+
+
+@pytest.mark.parametrize("above", [False, True])
+def test_a_jaw_that_goes_on_beside_one_edge_is_no_cable(above):
+    """As dark as the cable and twice as wide: its own edge lies where the cable's would, its other one far away."""
+    ground = strip_picture(highlight=False)
+    jaw = slice(10, 82) if above else slice(38, 110)
+    ground.grey[jaw, :160] = 0.2
+    ground = Ground(cv2.GaussianBlur(ground.grey, (0, 0), 1.0), (0, 0))
+    s = np.linspace(20.0, 390.0, 240)
+    found = measure_sections(ground, straight(), s, half_width=24.0, diameter=48.0, blur=1.0)
+    assert found.s[0] > 140.0 - 4.0  # the jaw ends 140 px along the path, blurred by 1 px
 
 
 def test_sections_beside_the_picture_or_under_a_cover_are_left_out():
