@@ -33,6 +33,9 @@ from rod.support import BEARING, Support
 #: then P/EA = 1e-8 of the length for P = 10 EI/L^2; even for a cable of K0 L = 0.2 the force changes by less than 1e-6.
 RIGIDITY = 1e9
 
+#: Of the length: a rigid piece that is shorter is a point, and its two ends are one place of the shape.
+POINT = 1e-9
+
 
 class Mounted(NamedTuple):
     """The force-free rod in its chord frame: angles (n + 2,) rad and chord, m."""
@@ -213,7 +216,8 @@ class Rod:
     @cached_property
     def shown(self) -> slice:
         """The vertices that are shown, of n + 3: the joints, and the bearing axes where rigid pieces stand between."""
-        return slice(0 if self.edges[0] else 1, None if self.edges[-1] else -1)
+        left, right = self.edges[[0, -1]] > POINT * self.length
+        return slice(0 if left else 1, None if right else -1)
 
     def at_vertices(self, extent: Array, angles: Array, K: Array, m: Array) -> Array:
         """Position x and y, theta, kappa and moment at the vertices shown, (5, ..., vertices); or changes of them.

@@ -103,7 +103,7 @@ class Fit:
         For what a set adds to the rest see `rod.section`: it is not taken off.
         """
         rod = self.run.model.bending.rod
-        K0, first = rod.section.pre_curvature, 1 if rod.edges[0] else 0
+        K0, first = rod.section.pre_curvature, 1 - rod.shown.start
         return np.concatenate([(step.kappa[first : first + K0.size] - K0)[2:-2] for step in self.run.steps])
 
     def amount(self, term: int) -> tuple[float, float]:

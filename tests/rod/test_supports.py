@@ -15,6 +15,7 @@ from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Outcome, solve
 from rod.laws import StickSlip
 from rod.reduction import Hold
+from rod.sensitivity import derivatives
 from rod.support import Support
 
 LENGTH = 0.2
@@ -138,6 +139,16 @@ def test_imposed_chord_against_collocation(name: str) -> None:
 def test_tension_against_collocation(name: str) -> None:
     chord = 0.1992  # natural chord 0.19867
     held_against(BEARINGS[name], lambda test: simulate(test, chords=[chord])[0], chord=chord, turned=(-1.0, 1.0))
+
+
+def test_a_rigid_piece_of_no_length_is_no_piece_of_the_shape() -> None:
+    """A fit may end at 3e-16 m: between two vertices so near to each other no shape can be interpolated."""
+    short = Support(rigid_length=3e-16)
+    test = replace(BASE, left=short, right=short)
+    here, plain = (simulate(one, [0.01])[0] for one in (test, BASE))
+    assert here.s.size == plain.s.size and here.force == pytest.approx(plain.force, rel=1e-9)
+    found, expected = (derivatives(one, [step], ["length"])[0] for one, step in ((test, here), (BASE, plain)))
+    assert found.y == pytest.approx(expected.y, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("stiffening", [0.0, 1.5])
