@@ -19,7 +19,7 @@ Within one displacement step the response is a function of K alone with the memo
 a minimisation like any other. Memory is advanced once, when the step is done (`Section.advanced`).
 
 Source: constitutive extension of Eq. (5) of the paper; Prandtl-Ishlinskii model as in plasticity text books; Dahl
-(1976), Solid friction damping of mechanical vibrations, eq. 4 with exponent 1.
+(1976), Solid friction damping of mechanical vibrations, with exponent 1.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ def identified_again(
 def _with_other_forms(observation: Observation, again: Identified) -> Identified:
     """Where the law lies if the forms of a cause that add up may be any: part of the band, and no better answer.
 
-    A sum of few elements stands for a loop of friction whose true form nobody knows (Bouc and Wen's or Dahl's is none).
+    A sum of few elements stands for a loop of friction whose true form nobody knows (Bouc and Wen's is none).
     Elements of other slips, of either sign, take something from the law or give to it. How far it goes with them is as
     far as it is off: 0.7 to 1.7 % on five loops of such forms (true errors 1.2 to 1.6 %), 0.5 % on one of two elements.
     The size of the cause is known no better than the sum over all of them is, see `SPREAD`.
