@@ -153,7 +153,8 @@ def _data_at_fault(bench: Workbench) -> Faults | None:
     """A break in the forces, or one item, that explains more than causes do; None below the threshold of the score."""
     if bench.largest <= bench.limit:
         return None
-    for found in (force_break(bench), _item_at_fault(bench)):
+    for sought in (force_break, _item_at_fault):
+        found = sought(bench)
         if found is not None and not _causes_leave(bench, found[1] + FAULT**2):
             return found[0]
     return None
