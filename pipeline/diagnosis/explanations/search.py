@@ -13,7 +13,7 @@ A refit may fail to find its valley where another one, from beside it, does: so 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
@@ -48,6 +48,7 @@ class Search:
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
         self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
+        self._about: dict[tuple[int, ...], Suspicion] = {}
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
         first = weighed(self.grid, bench.base, bench.suspicion)
         self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]
@@ -99,29 +100,33 @@ class Search:
                 rival = min(rival, one.fitted.chi2)
                 yield one
 
-    def beside(self, best: Explanation) -> Suspicion:
+    def beside(self, one: Explanation) -> Suspicion:
         """Scores of all causes about a single cause."""
-        return suspect(self.bench.observation, best.fitted, self.bench.suspicion.causes)
+        if one.causes not in self._about:
+            self._about[one.causes] = suspect(self.bench.observation, one.fitted, self.bench.suspicion.causes)
+        return self._about[one.causes]
 
-    def pairs(
-        self, singles: Sequence[Explanation], best: Explanation, second: Suspicion, found: list[Explanation]
-    ) -> None:
-        """Refit pairs beside those ``found``: each single cause that the data allow with what scores most beside it."""
-        bench, near = self.bench, candidates(second)[:2]
-        found += pairs_beside(bench, best, second, near)
-        for one in singles:
-            if one is not best:
-                beside = self.beside(one)
-                found += pairs_beside(bench, one, beside, candidates(beside)[:2])
+    def pairs(self, singles: Sequence[Explanation], found: list[Explanation]) -> None:
+        """Refit pairs besides those ``found``: single causes with what scores most beside each.
+
+        Pairs are exchanged until none that shares a cause with the likeliest one is likelier: of two causes that act
+        together one alone may look like a third, and what scores most beside that third is neither.
+        """
+        bench, best, begun = self.bench, singles[0], {one.causes for one in singles}
+        found += [pair for one in singles for pair in self._with_others(one)]
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
+        while (member := self._member_alone(begun)) is not None:
+            begun.add(member.causes)
+            found += self.add(self._with_others(member))
         self.add(list(self._pruned(found)))
         believed = self.posterior
         # before something is called unexplained, the best cause is fitted with every other one
         if believed.word == "rest":
+            second = self.beside(best)
             every = candidates(second, margin=1.0, most=len(second.causes))
-            others = [cause for cause in every if cause not in near]
+            others = [cause for cause in every if not any({*best.causes, cause} == {*pair.causes} for pair in found)]
             found += self.add(pairs_beside(bench, best, second, others))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
@@ -130,6 +135,19 @@ class Search:
         new += in_any_form(bench, forms)
         new = self.add(new)
         self.add(list(self._pruned(new)))
+
+    def _with_others(self, one: Explanation) -> list[Explanation]:
+        """A single cause with each of the two that score most beside it."""
+        second = self.beside(one)
+        return pairs_beside(self.bench, one, second, candidates(second)[:2])
+
+    def _member_alone(self, begun: Container[tuple[int, ...]]) -> Explanation | None:
+        """A cause of the likeliest pair that no pairs began with, fitted alone."""
+        likeliest = next(iter(self.posterior.explanations(count=2)), None)
+        for cause in () if likeliest is None else likeliest.causes:
+            if (cause,) not in begun:
+                return refit_one(self.bench.observation, self.bench.base, self.bench.suspicion, cause)
+        return None
 
     def _pruned(self, pairs: Sequence[Explanation]) -> Iterator[Explanation]:
         """Pairs without a member that they do not need, the rest fitted again where no single refit is as good."""
@@ -146,9 +164,10 @@ class Search:
                 reached[left] = min(rest.chi2, reached.get(left, np.inf))
                 yield explanation_of(left, self.bench.base, rest)
 
-    def pairs_speak(self, best: Explanation, second: Suspicion) -> bool:
+    def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
-        beside, rest = weighed(self.grid.plain, best.fitted, second), self.hypotheses[0].rest
+        second, rest = self.beside(best), self.hypotheses[0].rest
+        beside = weighed(self.grid.plain, best.fitted, second)
         mine = next(one.plain for one in self.hypotheses if one.found is best)
         for cause, (plain, _) in beside.further.items():
             if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
@@ -170,10 +189,9 @@ def searched(bench: Workbench) -> Search:
     if silent and fits and not hidden:
         return search
     search.singles()
-    credible = [one.found for one in search.posterior.credible() if one.found is not None][:LIKELIEST]
-    best = next((one.found for one in search.posterior.explanations(count=1)), None)
-    if best is not None and (search.pairs_speak(best, second := search.beside(best)) or hidden):
+    singles = [one.found for one in search.posterior.explanations(count=1) if one.found is not None][:LIKELIEST]
+    if singles and (search.pairs_speak(singles[0]) or hidden):
         if not hidden and search.posterior.word == "rest":
             hidden = hidden_pair(bench.suspicion)
-        search.pairs(credible, best, second, together(bench, hidden) if hidden else [])
+        search.pairs(singles, together(bench, hidden) if hidden else [])
     return search
