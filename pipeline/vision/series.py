@@ -82,9 +82,9 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     return with_width_seen(specimen, traces, settings, _traces)
 
 
-def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
-    """All photos with the diameter as stated."""
-    planes = given_calibration(specimen, settings)
+def _traces(specimen: Specimen, settings: VisionSettings, known: Sequence[Calibration] = ()) -> Traces:
+    """All photos with the diameter as stated, by a calibration that is known or the given one."""
+    planes = list(known) or given_calibration(specimen, settings)
     calibration = next(iter(planes), None)
     shots, cover_findings = find_cables(specimen, calibration, settings)
     shots, sized = _together(shots, lambda some: of_one_size(some))
@@ -92,6 +92,8 @@ def _traces(specimen: Specimen, settings: VisionSettings) -> Traces:
     if calibration is None or len(planes) > 1:
         shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, planes, settings),))
         calibration = _by_what_is_seen(specimen, shots, planes, settings) if told is None else told[0]
+        if calibration is not None and planes and calibration.plane is not planes[0].plane:
+            return _traces(specimen, settings, [calibration])  # where axes that a person gave move to, hangs on it
     if calibration is None:
         photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
         return Traces(photos, Scale(1.0, 1.0, Message("scale.none")))

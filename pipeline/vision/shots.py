@@ -147,8 +147,8 @@ def _find_as_on(
 
 def _near(specimen: Specimen, cable: Cable, near: RoughCable, travel: float, calibration: Calibration | None) -> Cable:
     """What is known of the cable, with the covers that a neighbour photo, ``travel`` (m) before, lets expect."""
-    scale = np.nan if calibration is None else calibration.scale.px_per_m
-    seen = expected_covers(near, specimen.rig.moving_bearing, travel * scale)
+    plane = None if calibration is None else calibration.plane
+    seen = expected_covers(near, specimen.rig.moving_bearing, travel, plane)
     return replace(cable, bearings=replace(cable.bearings, seen=seen))
 
 
@@ -232,7 +232,7 @@ def _expected(specimen: Specimen, calibration: Calibration | None, travel: float
     cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
     given = None
     if rig.bearings_px is not None and cover is None:
-        given = moved_axes(rig.bearings_px, rig.moving_bearing, travel * scale)
+        given = moved_axes(rig.bearings_px, rig.moving_bearing, travel, calibration.plane)
     return Cable(specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=cover, given_px=given))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.records import Array, Side
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.scale.plane import PlaneMap
 
 Pair = tuple[tuple[float, float], tuple[float, float]]
 
@@ -22,27 +23,30 @@ _ASTRAY = 4.0  # standard deviations; a cover that stands still is found so far 
 _STEADY_SHARE = 0.6  # of the photos; so many show the fixed bearing in one place, or the camera moved
 
 
-def moved_axes(axes: Pair, moving: Side, travel_px: float) -> Pair:
-    """Left and right axis after the moving bearing went along the chord toward the fixed one."""
-    left, right = np.array(axes[0], float), np.array(axes[1], float)
-    along = (right - left) / np.hypot(*(right - left))
-    if moving == "left":
-        left = left + travel_px * along
-    else:
-        right = right - travel_px * along
-    return (float(left[0]), float(left[1])), (float(right[0]), float(right[1]))
+def moved_axes(axes: Pair, moving: Side, travel: float, plane: PlaneMap) -> Pair:
+    """Left and right axis, px, after the moving bearing went ``travel`` (m) toward the fixed one, in their plane.
+
+    A lens or a tilt shows a millimetre longer in one place than in another.
+    """
+    ends = plane.to_plane(np.array(axes, float))
+    side = 0 if moving == "left" else 1
+    toward = ends[1 - side] - ends[side]
+    ends[side] += travel * toward / np.hypot(*toward)
+    (u, v), fixed = plane.to_pixels(ends)[side], axes[1 - side]
+    moved = float(u), float(v)
+    return (moved, fixed) if side == 0 else (fixed, moved)
 
 
-def expected_covers(near: RoughCable, moving: Side, travel_px: float) -> tuple[Bearing, ...]:
-    """Covers of a photo taken ``travel_px`` of the moving bearing after the photo ``near``.
+def expected_covers(near: RoughCable, moving: Side, travel: float, plane: PlaneMap | None) -> tuple[Bearing, ...]:
+    """Covers of a photo taken ``travel`` (m) of the moving bearing after the photo ``near``.
 
     Both where they were, for the log may name the other bearing, and the moving one where the travel puts it (nowhere
-    if that is not known, NaN).
+    if that is NaN, or without a plane).
     """
     covers = (near.left, near.right)
-    if not np.isfinite(travel_px):
+    if plane is None or not np.isfinite(travel):
         return covers
-    places = moved_axes((near.left.center_px, near.right.center_px), moving, travel_px)
+    places = moved_axes((near.left.center_px, near.right.center_px), moving, travel, plane)
     side = 0 if moving == "left" else 1
     return (*covers, replace(covers[side], center_px=places[side]))
 

@@ -241,7 +241,8 @@ def _by_length(
     """Scale by the length of the cable in units of the one used."""
     if not found:
         return None
-    length = float(np.median([cable.length_px for cable in found])) / _local_scale(calibration, found)
+    paths = (calibration.plane.to_plane(cable.path_px) for cable in found)
+    length = float(np.median([np.sum(np.hypot(*np.diff(path, axis=0).T)) for path in paths]))
     return Scale(length / specimen.length_m, settings.length_scale_std, _LENGTH)
 
 

@@ -12,6 +12,7 @@ from pipeline.messages import Message
 from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Scale, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.vision.bearings.steady import moved_axes
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
 from pipeline.vision.render.strand import Curve
@@ -243,6 +244,31 @@ def test_few_positions_tell_the_lens_and_the_cable_tells_which_plane_is_its_own(
     best = in_plane_of_cable(planes, specimen(length_m=0.165), cables, travel, STAGE)  # the middle one of the four
     assert best.plane is planes[3].plane
     assert 1e6 * shape_error(best.plane, camera) < 200.0  # as with ten positions
+
+
+@pytest.mark.parametrize("k1", [-0.05, 0.05])
+def test_travel_and_length_are_seen_through_the_lens(k1: float) -> None:
+    """Along the picture such a lens shows a metre up to 15 % shorter or longer than in its middle."""
+    camera = Camera(2000, 600, 5_000.0, k1=k1, distance_m=0.45)
+    poses = [ChessBoard(13, 7, SQUARE, (0.13, 0.02), tilt) for tilt in [(0.0, 0.0, 0.0), (0.2, -0.1, 0.1), (0, 0.2, 0)]]
+    planes = [
+        Calibration(fit.plane, Scale(5_000.0, fit.scale_std, Message("scale.number")))
+        for fit in fit_views(views_of(camera, poses, 0.05, 8))
+    ]
+
+    def seen(x: tuple[float, float]) -> RoughCable:
+        u, v = camera.project(np.linspace(*x, 100), np.full(100, 0.11))
+        left, right = (Bearing((float(u[k]), float(v[k])), 0.02, None, None, "given") for k in (0, -1))
+        cable = replace(found(0.0, 1.0), path_px=np.column_stack([u, v]), visible=(0, 99))
+        return replace(cable, left=left, right=right)
+
+    first = seen((0.01, 0.39))
+    assert in_plane_of_cable(planes, specimen(length_m=0.38), [first], np.zeros(1), STAGE).plane is planes[0].plane
+    axes = (first.left.center_px, first.right.center_px)
+    (u, v), fixed = moved_axes(axes, "left", 0.05, planes[0].plane)
+    assert fixed == axes[1]
+    # px; what the lens is known to: unmoved places of the picture are drawn to a tenth of that by the same boards
+    assert np.hypot(*np.subtract((u, v), seen((0.06, 0.39)).left.center_px)) < 1.0
 
 
 def test_positions_in_one_plane_give_no_distance() -> None:
