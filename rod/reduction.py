@@ -77,10 +77,11 @@ class Hold:
         """Whether the x and the y position of the right axis are imposed."""
         return self.chord is not None, self.tip is None
 
-    def yielded(self, along: float) -> tuple[float, float]:
-        """What the rig yields under a reaction along the chord, m, and its derivative, m/N; in the direction of it."""
+    def yielded(self, along: float) -> tuple[float, float, float, float]:
+        """What the rig yields under a reaction along the chord, m; its slope by that, compliance and stiffening."""
         softer = 1.0 + self.stiffening * abs(along)
-        return self.compliance * along / softer, self.compliance / softer**2
+        slope = self.compliance / softer**2
+        return self.compliance * along / softer, slope, along / softer, -slope * along * abs(along)
 
     def reaction(self, R: Array) -> Array:
         """The reaction R (2,) N with the components that are prescribed by force put in."""
