@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from rod.moment_curve import LawOfBend, MomentCurve, moment_curve
+from rod.moment_curve import LawOfBend, moment_curve
 
 Array = NDArray[np.float64]
 
@@ -278,9 +278,9 @@ class ComplianceLaw(LawOfBend):
     # The moment curve -------------------------------------------------------------------------------------------------
 
     @cached_property
-    def curve(self) -> MomentCurve:
-        """The moment over the bend K - K0."""
-        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates)
+    def at(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Function from bends (n,) to moment and tangent."""
+        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates).at
 
     @property
     def stiffness_scale(self) -> float:
