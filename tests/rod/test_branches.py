@@ -201,6 +201,15 @@ def test_shape_after_the_snap_is_found_when_asked_for() -> None:
     assert simulate(test, chords=[test.zero_chord], starts=[snapped])[0].outcome is Outcome.BIFURCATION
 
 
+@pytest.mark.parametrize("branch", ["up", "down", "jump"])
+def test_a_trial_without_patience_ends_where_the_path_from_the_force_free_shape_does(branch: str) -> None:
+    test = arch(20.0)
+    asked = test.hold("displacements", 0.0)
+    trial, patient = (solve(test.rod, asked, branch=branch, patient=given) for given in (False, True))
+    assert trial.outcome is Outcome.BIFURCATION
+    assert trial.iterations < patient.iterations
+
+
 @pytest.mark.parametrize("K0", [5.0, 8.0])
 def test_other_side_of_a_taut_cable_does_not_exist(K0: float) -> None:
     step = simulate(BendingTest(0.2, LINEAR, K0), chords=[0.1999], branch="down")[0]
