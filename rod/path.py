@@ -47,10 +47,8 @@ PATH_STEPS = 600
 REACTION = 20.0
 #: Turn of the first state on a new branch, rad (root mean square), tried one after the other.
 BRANCHING = (0.1, 0.01)
-#: Halvings of a step to locate a critical point, and the stiffness below which it is one, relative to EI/L.
+#: Halvings of a step to locate a critical point or where ends meet, and the stiffness, over EI/L, of a critical point.
 LOCATING, CRITICAL = 24, 1e-3
-#: Halvings of a step to find where the ends meet.
-MEETING = 10
 
 
 class Point(NamedTuple):
@@ -157,7 +155,7 @@ class Ramp:
             return bool(one * other < 0.0)
 
         behind, low, span = there, 0.0, there.state - here.state
-        for halving in range(1, MEETING + 1) if passed(there) else ():
+        for halving in range(1, LOCATING + 1) if passed(there) else ():
             middle = self.corrected(here.state + (low + 0.5**halving) * span, way)
             if middle is None:
                 return there
