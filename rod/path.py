@@ -45,8 +45,8 @@ LEAP = 2.4
 PATH_STEPS = 600
 #: Reactions below this times EI/L^2 count absolutely, larger ones relative to themselves; Euler's load is 9.87.
 REACTION = 20.0
-#: Turn of the first state on a new branch, rad (root mean square), tried one after the other.
-BRANCHING = (0.1, 0.01)
+#: Turn of the first state on a new branch, rad (root mean square).
+BRANCHING = 0.01
 #: Halvings of a step to locate a critical point or where ends meet, and the stiffness, over EI/L, of a critical point.
 LOCATING, CRITICAL = 24, 1e-3
 
@@ -139,7 +139,7 @@ class Ramp:
         if there is None or there.share > 1.0:
             return None
         planned, off, mass = (goal - here.state)[:-3], (there.state - goal)[:-3], self.system.mass
-        near = mass @ off**2 < OFF**2 * (mass @ planned**2) + 0.01**2
+        near = mass @ off**2 < OFF**2 * (mass @ planned**2) + STEP_TOLERANCE**2
         between = self.system.section(0.5 * (here.balance.K + there.balance.K))[1]
         return there if near and np.all(between > 0.0) else None
 
@@ -256,16 +256,13 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
     rod = ramp.system.rod
     lift = rod.bow(angles + 1e-3 * mode) - rod.bow(angles - 1e-3 * mode)
     own = float(ramp.system.mass @ (way[:-3] * mode))
-    sign = -1.0 if (own if abs(own) > 1e-3 else side * lift) < -1e-9 else 1.0
-    aside = np.r_[sign * mode, np.zeros(3)]
-    for size in BRANCHING:
-        there = ramp.corrected(here.state + size * aside, aside)
-        if there is not None and there.share > 1.0:
-            # the share grows with the square of the turn
-            part = np.sqrt((1.0 - here.share) / (there.share - here.share))
-            goal = here.state + part * size * aside + 2.0 * (1.0 - here.share) * ramp.half
-            goal[-1] = 1.0
-            there = ramp.corrected(goal, ramp.along_share)
-        if there is not None and there.share >= here.share and not ramp.negatives(there):
-            return there
-    return None
+    sign = -1.0 if (own if abs(own) > 1e-9 else side * lift) < 0.0 else 1.0
+    aside = BRANCHING * np.r_[sign * mode, np.zeros(3)]
+    there = ramp.corrected(here.state + aside, aside)
+    if there is not None and there.share > 1.0:
+        # the share grows with the square of the turn
+        part = np.sqrt((1.0 - here.share) / (there.share - here.share))
+        goal = here.state + part * aside + 2.0 * (1.0 - here.share) * ramp.half
+        goal[-1] = 1.0
+        there = ramp.corrected(goal, ramp.along_share)
+    return there if there is not None and there.share >= here.share and not ramp.negatives(there) else None
