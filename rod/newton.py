@@ -27,7 +27,7 @@ STEP_LIMIT = 0.8
 ITERATIONS = 25
 #: Largest turn of an edge in a step downhill, rad, and how many such steps a cable takes at most to come to rest.
 DESCENT_LIMIT, DESCENT_STEPS = 0.3, 300
-#: How far beside an unstable equilibrium the way down begins, rad (root mean square).
+#: How far beside an unstable equilibrium the way down begins or goes on, rad (root mean square).
 TILT = 1e-2
 
 
@@ -154,9 +154,11 @@ def descended(system: System, start: Start) -> Trial:
             shift = 4.0 * max(shift, 0.1)
             continue
         angles, R = angles + dalpha[:, 0], R + dR[:, 0]
-        if shift < 0.01 and step < 0.01:
-            trial = newton(system, Start(angles, R))
-            return trial._replace(steps=trial.steps + count)
+        if step <= STEP_TOLERANCE:  # at rest: at a minimum, or on a saddle, where a symmetric cable would stay for long
+            if system.excess_negatives(balance) == 0:
+                trial = newton(system, Start(angles, R))
+                return trial._replace(steps=trial.steps + count)
+            angles = angles + TILT * softest(system, balance)[1]
         shift *= 0.25 if step < 0.5 * DESCENT_LIMIT else 1.0
     return Trial(*start, system.balance(*start), DESCENT_STEPS, Outcome.STALLED)
 

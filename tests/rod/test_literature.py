@@ -295,29 +295,6 @@ def test_a_bow_whose_ends_meet_bears_no_larger_force(K0, elements):
         assert lost.force == pytest.approx(largest, rel=2e-3)  # 60 elements
 
 
-SPRING = Support(stiffness=5.0 * EI / LENGTH)
-
-
-@pytest.mark.parametrize("K0", [1e-6, 1e-4, 1e-3, 3e-3, 1e-2])
-@pytest.mark.parametrize("held", [{"left": CLAMP}, {"right": CLAMP}, {"left": SPRING}], ids=["left", "right", "spring"])
-def test_a_nearly_straight_bar_follows_the_straight_one_round_the_corner_where_that_buckles(held, K0):
-    """Beside its path lies another one, bowed to the other side, that begins at nothing and loses its stability."""
-    straight, bent = (replace(STRAIGHT, pre_curvature=bend, elements=60, **held) for bend in (0.0, K0))
-    near, step = (simulate(test, chords=[0.1 * LENGTH])[0] for test in (straight, bent))
-    assert step.good
-    assert step.force / UNIT == pytest.approx(near.force / UNIT, abs=10.0 * K0 * LENGTH)  # of the order of K0 L
-    load = 1.005 * simulate(straight, chords=[0.9999 * LENGTH])[0].force
-    near, step = (simulate(test, forces=[load])[0] for test in (straight, bent))
-    assert step.good
-    assert step.chord / LENGTH == pytest.approx(near.chord / LENGTH, abs=5.0 * K0 * LENGTH)
-
-
-@pytest.mark.parametrize("K0", [-1e-2, -1e-4, -1e-6, 1e-6, 1e-4, 1e-2])
-def test_the_least_pre_curvature_tells_the_side_to_which_a_column_buckles(K0):
-    step = tip_load(replace(CANTILEVER, pre_curvature=K0, elements=60), -0.5 * EULER, 0.0)
-    assert step.good and step.y[-1] * K0 < 0.0  # curvature K0 = -dtheta/ds turns the free end down
-
-
 # Displacement control, coils, jumps -----------------------------------------------------------------------------------
 
 
