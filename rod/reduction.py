@@ -144,7 +144,7 @@ class System:
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
         self._even_softness = np.array(((self._axial * rod.length, 0.0), (0.0, self._axial * rod.length)))
-        self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
+        self._middle, self._spring = rod.edges.size // 2, self.moment_scale
         self._imposed = slice(hold.imposed.count(False), 2)  # x and y, y, or none
         units = [self.force_scale / rod.length] * hold.imposed.count(True) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]
