@@ -26,8 +26,8 @@ import numpy as np
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import STEP_LIMIT, Outcome, Start, Trial, descended, judged, newton, tilted
-from rod.path import PATH_STEPS, followed
+from rod.newton import PATH_STEPS, STEP_LIMIT, Outcome, Start, Trial, descended, judged, newton, tilted
+from rod.path import followed
 from rod.reduction import Balance, Hold, System
 from rod.section import Memory, Section
 

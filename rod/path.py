@@ -29,7 +29,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rod.characteristic import Array
-from rod.newton import RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
+from rod.newton import PATH_STEPS, RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
 from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, root mean square of the turns of the edges, rad.
@@ -41,8 +41,6 @@ OFF = 0.6
 #: Largest turn of an edge by which a path is followed at once to an imposed chord, rad. At 2.405, the zero of J0, the
 #: ends of a straight cable meet.
 LEAP = 2.4
-#: A path gives up after so many Newton steps; a shallow arch (K0 L = 0.002) needs 100.
-PATH_STEPS = 600
 #: Reactions below this times EI/L^2 count absolutely, larger ones relative to themselves; Euler's load is 9.87.
 REACTION = 20.0
 #: Turn of the first state on a new branch, rad (root mean square).
@@ -229,7 +227,7 @@ def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
         return None
     angles = begin + brentq(beyond, 0.0, LEAP / largest, rtol=1e-4) * turns
     still = ramp.system.balance(angles, np.zeros(2))
-    R = np.linalg.lstsq(still.border.T / rod.length, -still.gradient / rod.length, rcond=None)[0]
+    R = np.linalg.lstsq(still.border.T, -still.gradient, rcond=None)[0]
     there = ramp.reached(here, np.r_[angles, R, 1.0], ramp.along_share)
     return None if there is None or ramp.negatives(there) else there
 
