@@ -219,7 +219,7 @@ def test_a_nearly_straight_bar_follows_the_straight_one_round_the_corner_where_t
     """Beside its path lies another one, bowed to the other side, that begins at nothing and loses its stability."""
     straight, bent = (BendingTest(0.2, LINEAR, bend, elements=60, **HELD[held]) for bend in (0.0, K0))
     near, step = (simulate(test, chords=[0.02])[0] for test in (straight, bent))
-    assert step.good
+    assert step.good and step.iterations < 300  # once round the corner, steps grow by and by: half of it
     assert step.force * 0.2**2 / 5e-3 == pytest.approx(near.force * 0.2**2 / 5e-3, abs=10.0 * K0 * 0.2)  # order of K0 L
     load = 1.005 * simulate(straight, chords=[0.9999 * 0.2])[0].force
     near, step = (simulate(test, forces=[load])[0] for test in (straight, bent))
